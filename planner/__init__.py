@@ -1,0 +1,1 @@
+"""Optimisation-based feedrate planning for CNC machines."""

@@ -1,0 +1,36 @@
+"""Arrays inside records: right shape, finite, and read-only, or an error that names the field."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+FloatArray = NDArray[np.float64]
+
+
+def freeze(record: object, name: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True) -> Array:
+    """Convert field `name` of a frozen dataclass to a contiguous read-only array, in place, and return it.
+
+    shape  : expected shape; None where any length will do
+    finite : refuse NaN and infinity (floating point fields only)
+
+    Raises ValueError naming record, field, found and expected.
+    """
+    given = getattr(record, name)
+    array = np.ascontiguousarray(given, dtype=dtype)
+    if array is given and array.flags.writeable:
+        array = array.view()  # the caller keeps a writable array of its own; ours is not
+    where = f"{type(record).__name__}.{name}"
+    if array.ndim != len(shape) or any(
+        want is not None and got != want for got, want in zip(array.shape, shape, strict=True)
+    ):
+        raise ValueError(f"{where}: shape {array.shape}, expected {shape}")
+    if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
+        bad = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{where}: {array[bad]} at index {bad}; every value must be finite")
+    array.flags.writeable = False
+    object.__setattr__(record, name, array)
+    return array

@@ -1,0 +1,36 @@
+"""What goes wrong, and how it is said.
+
+Three kinds of failure, three treatments:
+
+* bad input          -> an `InputError`, raised before any work, naming the file, line and column, what was found
+                        and what is allowed;
+* an unsolved problem-> a status with a sentence and a remedy; `require()` turns it into `NotSolvedError`;
+* our own bug        -> an assertion or an uncaught exception.
+"""
+
+from __future__ import annotations
+
+
+class PlannerError(Exception):
+    """Base of everything this package raises on purpose."""
+
+
+class InputError(PlannerError, ValueError):
+    """Input that cannot be planned: a program, a machine file or an argument.
+
+    message : what was found, what is allowed, what to do
+    source  : file name, or None for values passed from Python
+    line    : 1-based line in that file, or None
+    column  : 1-based column in that line, or None
+    """
+
+    def __init__(
+        self, message: str, *, source: str | None = None, line: int | None = None, column: int | None = None
+    ):
+        self.message, self.source, self.line, self.column = message, source, line, column
+        place = ":".join(str(part) for part in (source, line, column) if part is not None)
+        super().__init__(f"{place}: {message}" if place else message)
+
+
+class NotSolvedError(PlannerError, RuntimeError):
+    """A solver ended without a solution; the text is the status' sentence with its remedy."""

@@ -1,0 +1,1 @@
+"""The programmed path: lines, arcs and helices, and the joints between them."""

@@ -1,0 +1,195 @@
+"""From the blocks of a program to the segments and joints of a toolpath.
+
+A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
+or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
+tangents agree it is smooth; everywhere else it is a corner.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.errors import InputError
+from planner.geometry.toolpath import Arcs, Joint, Toolpath
+from planner.machine import Machine
+from planner.nc.program import Kind, PathControl, Program
+
+# Turning angle below which two tangents are the same [rad]. Coordinates of 1e3 mm carry 1e-13 mm of rounding, so a segment of
+# 1e-4 mm has a direction good to 1e-9; at 1e-8 rad the velocity jump is 1e-6 mm/s at 100 mm/s, far below any drive's resolution.
+COLLINEAR_ANGLE = 1e-8
+# Turning angle above which a corner is a reversal and becomes a full stop [rad]: 175 degrees. The corner speed of paper 002
+# eq. (19), (20) is sqrt(1.5 X eps) cot(theta/2): 0.044 of sqrt(1.5 X eps), at X = 2000 mm/s2 and eps = 0.05 mm only 0.5 mm/s.
+REVERSAL_ANGLE = np.deg2rad(175.0)
+# Coordinates beyond this have lost the micrometre in float64 products and are certainly a mistake [mm].
+COORDINATE_MAX = 1e9
+# A move shorter than this goes nowhere [mm]: a picometre, the rounding of coordinates around 1e3 mm.
+ZERO_LENGTH = 1e-9
+
+
+def toolpath_from_program(program: Program, machine: Machine, tolerance: float | None = None) -> Toolpath:
+    """Lay out the program's blocks as segments and joints.
+
+    tolerance : contour error budget [mm] that beats the program's G64 P and the machine's tolerance; None to use those
+
+    Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis the machine lacks, and
+    coordinates beyond `COORDINATE_MAX`.
+    """
+    if tolerance is not None and not (0 < tolerance < np.inf):
+        raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
+    machine.limits("velocity", program.axes)
+    if not len(program):
+        raise InputError("the program has no move", source=program.source)
+    _check_coordinates(program)
+    position = np.vstack([program.start, program.end])
+    arc_of_block = np.full(len(program), -1, dtype=np.int64)
+    arc_of_block[program.arc_block] = np.arange(len(program.arc_block))
+    chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    moves = (program.kind == Kind.RAPID) | (program.kind == Kind.LINE) | (program.kind == Kind.ARC)
+    real = moves & ((chord > ZERO_LENGTH) | (arc_of_block >= 0))
+    block = np.flatnonzero(real)
+    if not len(block):
+        raise InputError("the program moves nowhere: every move ends where it starts", source=program.source)
+
+    start, end = position[block], position[block + 1]
+    arc_row = arc_of_block[block]
+    is_arc = arc_row >= 0
+    rows = arc_row[is_arc]
+    arcs, arc_length = _arcs(program, start[is_arc], end[is_arc], rows)
+    arc = np.full(len(block), -1, dtype=np.int64)
+    arc[is_arc] = np.arange(len(rows))
+    length = chord[block].copy()
+    length[is_arc] = arc_length
+    tangent_start, tangent_end = _tangents(start, end, length, arc, arcs)
+    curvature = np.zeros(len(block))
+    curvature[is_arc] = _curvature_bound(arcs)
+
+    theta = np.zeros(len(block) + 1)
+    theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
+    joint, dwell = _joints(program, machine, block, theta)
+    return Toolpath(
+        source=program.source,
+        axes=program.axes,
+        start=start,
+        end=end,
+        length=length,
+        feed=_feeds(program, machine, block),
+        rapid=program.kind[block] == Kind.RAPID,
+        block=block,
+        line=program.line[block],
+        arc=arc,
+        arcs=arcs,
+        tangent_start=tangent_start,
+        tangent_end=tangent_end,
+        curvature=curvature,
+        joint=joint,
+        theta=theta,
+        tolerance=_tolerances(program, machine, block, tolerance),
+        dwell=dwell,
+        zero_length=np.flatnonzero(moves & ~real),
+    )
+
+
+def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
+    """Angle between unit vectors (n, A), row by row [rad]; exact to rounding near 0 and pi, where acos is not."""
+    return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
+
+
+def _check_coordinates(program: Program) -> None:
+    bad = np.flatnonzero(np.abs(program.end).max(axis=1, initial=0.0) > COORDINATE_MAX)
+    if len(bad):
+        block = int(bad[0])
+        axis = int(np.abs(program.end[block]).argmax())
+        raise InputError(
+            f"{program.axes[axis].upper()} = {program.end[block, axis]:g} mm; coordinates up to {COORDINATE_MAX:g} mm "
+            "are allowed",
+            source=program.source,
+            line=int(program.line[block]),
+        )
+
+
+def _arcs(program: Program, start: FloatArray, end: FloatArray, rows: Array) -> tuple[Arcs, FloatArray]:
+    """Arc data and lengths of the arcs in `rows`, given their end points (K, A)."""
+    count, axes = start.shape
+    pick = np.arange(count)
+    normal = program.arc_normal[rows]
+    first, second = (normal + 1) % 3, (normal + 2) % 3
+    sweep = program.arc_sweep[rows]
+    radial = start - program.arc_center[rows]
+    radial[pick, normal] = 0.0
+    radius = np.linalg.norm(radial, axis=1)
+    if not (radius > 0).all():
+        bad = int(np.flatnonzero(~(radius > 0))[0])
+        raise InputError(
+            "arc of radius 0 mm", source=program.source, line=int(program.line[program.arc_block[rows[bad]]])
+        )
+    e1 = radial / radius[:, None]
+    e2 = np.zeros((count, axes))
+    e2[pick, first], e2[pick, second] = -e1[pick, second], e1[pick, first]
+    rise = end[pick, normal] - start[pick, normal]
+    length = np.hypot(radius * sweep, rise)
+    center = program.arc_center[rows].copy()
+    center[pick, normal] = start[pick, normal]
+    on_circle = center + radius[:, None] * (np.cos(sweep)[:, None] * e1 + np.sin(sweep)[:, None] * e2)
+    drift = (end - on_circle) / length[:, None]
+    return Arcs(center=center, e1=e1, e2=e2, drift=drift, radius=radius, rate=sweep / length), length
+
+
+def _tangents(
+    start: FloatArray, end: FloatArray, length: FloatArray, arc: Array, arcs: Arcs
+) -> tuple[FloatArray, FloatArray]:
+    first = (end - start) / length[:, None]
+    last = first.copy()
+    is_arc = arc >= 0
+    speed = (arcs.radius * arcs.rate)[:, None]
+    angle = (arcs.rate * length[is_arc])[:, None]
+    first[is_arc] = speed * arcs.e2 + arcs.drift
+    last[is_arc] = speed * (np.cos(angle) * arcs.e2 - np.sin(angle) * arcs.e1) + arcs.drift
+    return (
+        first / np.linalg.norm(first, axis=1, keepdims=True),
+        last / np.linalg.norm(last, axis=1, keepdims=True),
+    )
+
+
+def _curvature_bound(arcs: Arcs) -> FloatArray:
+    """|p''| / (smallest |p'|)^2 on the arc [1/mm]; |p'| is at least what remains after the in-plane gap."""
+    in_plane = arcs.radius * np.abs(arcs.rate)
+    rise = np.sqrt(np.maximum(1.0 - in_plane**2, 0.0))
+    gap = np.sqrt(np.maximum((arcs.drift**2).sum(axis=1) - rise**2, 0.0))
+    return arcs.radius * arcs.rate**2 / np.maximum(1.0 - gap, 0.5) ** 2
+
+
+def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
+    feed = program.feed[block].copy()
+    if machine.feed_max is not None:
+        cut = program.kind[block] != Kind.RAPID
+        feed[cut] = np.minimum(feed[cut], machine.feed_max)
+    return feed
+
+
+def _tolerances(program: Program, machine: Machine, block: Array, tolerance: float | None) -> FloatArray:
+    """Budget at each joint: that of the block that ends there."""
+    if tolerance is not None:
+        return np.full(len(block) + 1, tolerance)
+    own = program.tolerance[block]
+    own = np.where(np.isnan(own), machine.tolerance, own)
+    return np.concatenate([own[:1], own])
+
+
+def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray) -> tuple[Array, FloatArray]:
+    """Kind and dwell of every joint."""
+    joint = np.where(theta < COLLINEAR_ANGLE, Joint.SMOOTH, Joint.CORNER).astype(np.uint8)
+    joint[theta > REVERSAL_ANGLE] = Joint.STOP
+    control = program.path_control[block]
+    joint[1:][(control == PathControl.EXACT_PATH) & (joint[1:] == Joint.CORNER)] = Joint.STOP
+    joint[1:][control == PathControl.EXACT_STOP] = Joint.STOP
+    if not machine.blend_rapids:
+        rapid = program.kind[block] == Kind.RAPID
+        joint[1:-1][rapid[:-1] != rapid[1:]] = Joint.STOP
+    still = np.flatnonzero((program.kind == Kind.DWELL) | (program.kind == Kind.STOP))
+    at = np.searchsorted(block, still)  # the joint before the first segment that comes after the standstill
+    joint[at] = Joint.STOP
+    dwell = np.zeros(len(block) + 1)
+    np.add.at(dwell, at, program.dwell[still])
+    joint[0] = joint[-1] = Joint.STOP
+    return joint, dwell

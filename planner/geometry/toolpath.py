@@ -1,0 +1,117 @@
+"""The record of the programmed path: M segments (lines, arcs, helices) and the M+1 joints around them.
+
+Segment i runs from joint i to joint i+1. Every segment is a curve over its own parameter x in [0, length_i]:
+
+    line   p(x) = start + x * u
+    arc    p(x) = center + radius * (cos(rate x) e1 + sin(rate x) e2) + drift * x
+
+`rate` [rad/mm] is signed; e1 points from the centre to the start, e2 is e1 turned by 90 degrees counter-clockwise about the
+plane's normal; `drift` is the helix' rise per mm. Programs print arcs with rounded numbers, so that start and end lie on
+circles of slightly different radius; the gap is spread over the arc as a part of `drift` inside the plane, which makes the
+curve smooth and lets it end exactly on the programmed point. x is the arc length but for that gap (relative error gap/length),
+so nothing downstream may assume |dp/dx| = 1 on arcs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray, freeze
+
+
+class Joint(IntEnum):
+    """How the motion passes the joint between two segments."""
+
+    STOP = 0  # full stop: path ends, dwells, reversals, exact stop
+    SMOOTH = 1  # the tangents agree: passed as it is, the curvature may jump
+    CORNER = 2  # the tangents differ: to be rounded within the joint's tolerance
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Arcs:
+    """Data of the K arcs and helices of a toolpath, one row each (formula in the module's text)."""
+
+    center: FloatArray  # (K, A) [mm]
+    e1: FloatArray  # (K, A) unit vector from the centre to the start
+    e2: FloatArray  # (K, A) e1 turned counter-clockwise about the plane's normal
+    drift: FloatArray  # (K, A) rise and closing gap per mm of x [-]
+    radius: FloatArray  # (K,) [mm]
+    rate: FloatArray  # (K,) signed turning [rad/mm]
+
+    def __post_init__(self) -> None:
+        arcs, axes = np.shape(self.center)
+        for name in ("center", "e1", "e2", "drift"):
+            freeze(self, name, np.float64, (arcs, axes))
+        for name in ("radius", "rate"):
+            freeze(self, name, np.float64, (arcs,))
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Toolpath:
+    """The programmed path: M segments over A axes, M+1 joints.
+
+    start, end      : (M, A) end points [mm]
+    length          : (M,) range of the segment's parameter x [mm], > 0
+    feed            : (M,) programmed feed [mm/s]; inf on rapids
+    rapid           : (M,) True on G0 moves
+    block           : (M,) index of the program's block, non-decreasing
+    line            : (M,) source line of that block
+    arc             : (M,) row in `arcs`, or -1 for a line
+    tangent_start   : (M, A) unit tangent at x = 0
+    tangent_end     : (M, A) unit tangent at x = length
+    curvature       : (M,) bound of the curvature on the segment [1/mm], 0 on lines
+    joint           : (M+1,) `Joint`; the first and the last are STOP
+    theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
+    tolerance       : (M+1,) contour error budget eps at the joint [mm]
+    dwell           : (M+1,) standstill at the joint [s], > 0 only where the joint is STOP
+    zero_length     : blocks that move nowhere, kept as events
+    """
+
+    source: str
+    axes: tuple[str, ...]
+    start: FloatArray
+    end: FloatArray
+    length: FloatArray
+    feed: FloatArray
+    rapid: Array
+    block: Array
+    line: Array
+    arc: Array
+    arcs: Arcs
+    tangent_start: FloatArray
+    tangent_end: FloatArray
+    curvature: FloatArray
+    joint: Array
+    theta: FloatArray
+    tolerance: FloatArray
+    dwell: FloatArray
+    zero_length: Array
+
+    def __post_init__(self) -> None:
+        segments, axes = len(self.length), len(self.axes)
+        for name in ("start", "end", "tangent_start", "tangent_end"):
+            freeze(self, name, np.float64, (segments, axes))
+        for name in ("length", "curvature"):
+            freeze(self, name, np.float64, (segments,))
+        freeze(self, "feed", np.float64, (segments,), finite=False)
+        freeze(self, "rapid", np.bool_, (segments,))
+        freeze(self, "block", np.int64, (segments,))
+        freeze(self, "line", np.int32, (segments,))
+        freeze(self, "arc", np.int64, (segments,))
+        freeze(self, "joint", np.uint8, (segments + 1,))
+        for name in ("theta", "tolerance", "dwell"):
+            freeze(self, name, np.float64, (segments + 1,))
+        freeze(self, "zero_length", np.int64, (None,))
+        if segments and (self.joint[0] != Joint.STOP or self.joint[-1] != Joint.STOP):
+            raise ValueError("Toolpath.joint: the first and the last joint must be STOP")
+        if not (self.length > 0).all():
+            raise ValueError("Toolpath.length: every segment must have a length > 0 mm")
+
+    def __len__(self) -> int:
+        return len(self.length)

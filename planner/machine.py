@@ -1,0 +1,188 @@
+"""The machine: limits per axis, interpolation period, tolerance, filters. TOML in, validated, frozen.
+
+The file speaks mm, s and degrees (rotary axes); the record speaks mm, s and rad. `planner machine init FILE` writes a
+template with every key and its unit.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from planner.arrays import FloatArray
+from planner.errors import InputError
+from planner.units import RAD_PER_DEG
+
+LINEAR_AXES = ("x", "y", "z")
+ROTARY_AXES = ("a", "b", "c")
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class Axis(_Record):
+    """Limits of one axis: [mm/s], [mm/s2], [mm/s3]; in a machine file rotary axes are in degrees."""
+
+    velocity: Positive
+    acceleration: Positive
+    jerk: Positive
+
+
+class Fir(_Record):
+    """FIR filters behind the interpolator (papers 000, 001): time constants [s], largest phase lag [deg]."""
+
+    time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
+    phase_lag_max: Positive | None = None
+
+
+class Mode(_Record):
+    """A vibration mode of the machine: frequency [Hz], damping ratio [-]."""
+
+    frequency: Positive
+    damping: Annotated[float, Field(ge=0, lt=1)] = 0.0
+
+
+class Machine(_Record):
+    """A machine. Lengths [mm], times [s]; see the template for every key.
+
+    axes                : limits by axis letter, at least x and y
+    dt                  : interpolation period [s]
+    tolerance           : contour error budget eps [mm]
+    path_control        : what holds before the program's first G61, G61.1 or G64
+    feed_max            : largest path feed [mm/s], or None
+    normal_acceleration : A_max of paper 002 eq. (19) [mm/s2], or None
+    blend_rapids        : round the joints between G0 and feed moves too
+    """
+
+    name: str
+    dt: Positive
+    tolerance: Positive
+    path_control: Literal["blend", "exact_path", "exact_stop"] = "blend"
+    axes: dict[str, Axis]
+    feed_max: Positive | None = None
+    normal_acceleration: Positive | None = None
+    blend_rapids: bool = False
+    fir: Fir | None = None
+    modes: tuple[Mode, ...] = ()
+    tools: dict[str, Finite] = {}
+    positions: dict[str, dict[str, Finite]] = {}
+    work_offsets: dict[str, dict[str, Finite]] = {}
+
+    @field_validator("axes")
+    @classmethod
+    def _axes_known(cls, axes: dict[str, Axis]) -> dict[str, Axis]:
+        known = LINEAR_AXES + ROTARY_AXES
+        for letter in axes:
+            if letter not in known:
+                raise ValueError(f"axis '{letter}' is not known; allowed are {', '.join(known)}")
+        for letter in ("x", "y"):
+            if letter not in axes:
+                raise ValueError(f"axis '{letter}' is missing; write a table [axes.{letter}]")
+        return {letter: axes[letter] for letter in known if letter in axes}
+
+    @model_validator(mode="after")
+    def _names_known(self) -> Machine:
+        for table, allowed in (("positions", ("g28", "g30")), ("work_offsets", WORK_OFFSETS)):
+            for key, values in getattr(self, table).items():
+                if key not in allowed:
+                    raise ValueError(f"{table}: '{key}' is not known; allowed are {', '.join(allowed)}")
+                for letter in values:
+                    if letter not in LINEAR_AXES:
+                        raise ValueError(f"{table}.{key}: axis '{letter}' is not known; allowed are x, y, z")
+        for tool in self.tools:
+            if not tool.isdecimal():
+                raise ValueError(f"tools: '{tool}' is not a tool number; write e.g. 1 = 25.0")
+        return self
+
+    def limits(self, quantity: Literal["velocity", "acceleration", "jerk"], axes: tuple[str, ...]) -> FloatArray:
+        """Limits of `axes` for one quantity, (A,), in mm or rad.
+
+        Raises InputError if the machine lacks one of the axes.
+        """
+        for letter in axes:
+            if letter not in self.axes:
+                raise InputError(
+                    f"machine '{self.name}' has no axis '{letter}', which the program uses; add a table "
+                    f"[axes.{letter}] with velocity, acceleration and jerk"
+                )
+        scale = [RAD_PER_DEG if letter in ROTARY_AXES else 1.0 for letter in axes]
+        return np.array([getattr(self.axes[letter], quantity) for letter in axes]) * scale
+
+
+WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
+
+
+def load_machine(path: str | Path) -> Machine:
+    """Read and validate a machine file; a name without a suffix means a built-in machine.
+
+    Raises InputError naming file, key, value and what is allowed; all faults at once.
+    """
+    if str(path) in builtin_machines():
+        text, source = builtin_text(str(path)), str(path)
+    else:
+        text, source = _read(Path(path)), str(path)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        raise InputError(f"not valid TOML: {fault}", source=source) from fault
+    return machine_from_dict(data, source=source)
+
+
+def machine_from_dict(data: dict, *, source: str | None = None) -> Machine:
+    """Validate a machine given as nested dictionaries (the TOML file's keys). Raises InputError with all faults."""
+    try:
+        return Machine(**data)
+    except (ValidationError, TypeError) as fault:
+        raise InputError(_faults(fault), source=source) from fault
+
+
+def builtin_machines() -> tuple[str, ...]:
+    """Names of the machines that come with the package."""
+    folder = resources.files("planner") / "machines"
+    return tuple(sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+def builtin_text(name: str) -> str:
+    """The commented TOML of a built-in machine. Raises InputError for an unknown name."""
+    if name not in builtin_machines():
+        raise InputError(f"no built-in machine '{name}'; there are {', '.join(builtin_machines())}")
+    return (resources.files("planner") / "machines" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as fault:
+        names = ", ".join(builtin_machines())
+        raise InputError(
+            f"machine file not found; give a TOML file or one of the built-in machines: {names}", source=str(path)
+        ) from fault
+    except (OSError, UnicodeDecodeError) as fault:
+        raise InputError(f"machine file cannot be read: {fault}", source=str(path)) from fault
+
+
+def _faults(fault: ValidationError | TypeError) -> str:
+    if isinstance(fault, TypeError):
+        return str(fault)
+    said = []
+    for error in fault.errors():
+        key = ".".join(str(part) for part in error["loc"])
+        text = error["msg"].removeprefix("Value error, ")
+        if error["type"] == "missing":
+            said.append(f"{key}: missing")
+        elif error["type"] == "extra_forbidden":
+            said.append(f"{key}: unknown key")
+        elif error["type"] == "value_error":
+            said.append(f"{key}: {text}" if key else text)
+        else:
+            said.append(f"{key}: {text}, found {error['input']!r}")
+    return "; ".join(said)

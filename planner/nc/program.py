@@ -1,0 +1,104 @@
+"""The record that reading an NC program yields: blocks in arrays, all modal state resolved, in mm, s and rad.
+
+One row per *block that moves or dwells*. A source line can give several blocks (G28 through an intermediate point) or none.
+Arcs keep their extra data in rows of their own, so that memory follows what is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray, freeze
+
+
+class Kind(IntEnum):
+    """What a block does."""
+
+    RAPID = 0  # straight, at the axes' limits (G0)
+    LINE = 1  # straight, at the programmed feed (G1)
+    ARC = 2  # circular or helical (G2, G3)
+    DWELL = 3  # stand still (G4)
+    STOP = 4  # come to a full stop without a dwell: M0, M1, M2, M30, M6
+
+
+class PathControl(IntEnum):
+    """How the joint at the end of a block is taken."""
+
+    BLEND = 0  # G64: rounded within the tolerance
+    EXACT_PATH = 1  # G61: on the path; a full stop unless tangent
+    EXACT_STOP = 2  # G61.1: a full stop
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Event:
+    """A word without influence on the motion (M3, S, T, M8 ...), kept with its place in the program."""
+
+    block: int  # it happens before this block; equal to the number of blocks at the end of the program
+    line: int  # 1-based source line
+    text: str  # as normalised: "M3", "S12000", "T2"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Program:
+    """An NC program: B blocks over A axes.
+
+    source       : file name, for messages
+    axes         : axis letters, ("x", "y", "z")
+    start        : (A,) machine position before the first block [mm]
+    kind         : (B,) `Kind`
+    end          : (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
+    feed         : (B,) programmed feed [mm/s]; inf for RAPID, DWELL and STOP
+    dwell        : (B,) standstill [s], > 0 for DWELL only
+    line         : (B,) 1-based source line
+    path_control : (B,) `PathControl` in force at the end of the block
+    tolerance    : (B,) P of G64 [mm]; NaN where the program gives none
+    arc_block    : (K,) block index of each arc, ascending
+    arc_center   : (K, A) centre in the plane; the axial coordinate is the start's [mm]
+    arc_normal   : (K,) index of the axis normal to the arc's plane: 2 for G17, 1 for G18, 0 for G19
+    arc_sweep    : (K,) signed angle [rad], counter-clockwise about the normal axis positive, full turns included
+    events       : words without influence on the motion
+    notes        : what the reader assumed and a user should know ("tool 3 has no length in the machine file: 0")
+    """
+
+    source: str
+    axes: tuple[str, ...]
+    start: FloatArray
+    kind: Array
+    end: FloatArray
+    feed: FloatArray
+    dwell: FloatArray
+    line: Array
+    path_control: Array
+    tolerance: FloatArray
+    arc_block: Array
+    arc_center: FloatArray
+    arc_normal: Array
+    arc_sweep: FloatArray
+    events: Sequence[Event] = field(default=())
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        axes = len(self.axes)
+        blocks = len(self.kind)
+        arcs = len(self.arc_block)
+        freeze(self, "start", np.float64, (axes,))
+        freeze(self, "kind", np.uint8, (blocks,))
+        freeze(self, "end", np.float64, (blocks, axes))
+        freeze(self, "feed", np.float64, (blocks,), finite=False)
+        freeze(self, "dwell", np.float64, (blocks,))
+        freeze(self, "line", np.int32, (blocks,))
+        freeze(self, "path_control", np.uint8, (blocks,))
+        freeze(self, "tolerance", np.float64, (blocks,), finite=False)
+        freeze(self, "arc_block", np.int64, (arcs,))
+        freeze(self, "arc_center", np.float64, (arcs, axes))
+        freeze(self, "arc_normal", np.int64, (arcs,))
+        freeze(self, "arc_sweep", np.float64, (arcs,))
+        if not (self.feed > 0).all():
+            raise ValueError("Program.feed: every feed must be positive")
+
+    def __len__(self) -> int:
+        return len(self.kind)

@@ -1,0 +1,19 @@
+"""Units. Inside the package everything is mm, s and rad; conversions happen only at the edges, with these names.
+
+Glossary (used in every public name)
+    s         arc length along the path [mm]            feed      ds/dt [mm/s]
+    feed_sq   feed squared [mm2/s2]                     acc_s     d2s/dt2 [mm/s2]
+    jerk_s    d3s/dt3 [mm/s3]                           kappa     curvature [1/mm]
+    theta     turning angle at a corner [rad], 0 = straight on, pi = reversal
+    tol_*     a part of the contour error budget [mm]   dt        interpolation period [s]
+    *_max     a limit      *_grid  sampled along s      *_t       sampled in time      *_sq  squared
+"""
+
+from __future__ import annotations
+
+import math
+
+MM_PER_INCH = 25.4
+SECONDS_PER_MINUTE = 60.0
+RAD_PER_DEG = math.pi / 180.0
+MICROMETRE = 1e-3  # [mm]

@@ -1,0 +1,73 @@
+"""The Bezier-pair corner of paper 002.
+
+Two mirrored rational cubics, control points P - d u1, P - d/2 u1, P - d/4 u1, joint, ... ; two numbers describe all weights:
+
+    sigma1 = w0 w2 / w1^2,   sigma2 = w1 w3 / w2^2            (eq. (2), (3))
+
+With w0 = w3 = 1: w1 = (sigma1^2 sigma2)^(-1/3), w2 = (sigma1 sigma2^2)^(-1/3).
+
+    eps       = (d/4) sin(theta/2)                            (eq. (15), beta = theta/2)
+    kappa_max = sigma2 * 8 sin(theta/2) / (3 d cos^2(theta/2))    at the joint, for every theta in (0, pi)   (eq. (17), PAPERS C)
+
+The pair is G3 at the joint iff sigma1 = 4 - 3/sigma2 (PAPERS C.G3). sigma = (2/3, 0.9) has 10 % less curvature and a smaller
+curvature slope than the polynomial pair sigma = (1, 1) for all turning angles, so it is the default.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.corners.blend import Shape
+from planner.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class BezierCorner:
+    """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given."""
+
+    sigma2: float = 0.9
+    sigma1: float | None = None
+
+    name = "bezier"
+    shape = Shape.BEZIER
+    # m / d: retreat and advance at the middle, 1/8 for every pair of weights (the joint is a control point)
+    MIDDLE = 0.125
+
+    def __post_init__(self) -> None:
+        if not 0.75 < self.sigma2 < np.inf:
+            raise InputError(f"sigma2 = {self.sigma2}; the G3 joint needs sigma2 > 3/4")
+        if self.sigma1 is not None and not 0 < self.sigma1 < np.inf:
+            raise InputError(f"sigma1 = {self.sigma1}; it must be positive")
+
+    @property
+    def weights(self) -> tuple[float, float]:
+        """Inner weights (w1, w2) for w0 = w3 = 1."""
+        sigma1 = 4.0 - 3.0 / self.sigma2 if self.sigma1 is None else self.sigma1
+        return (sigma1**2 * self.sigma2) ** (-1 / 3), (sigma1 * self.sigma2**2) ** (-1 / 3)
+
+    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
+        """Tangent length d [mm] for the middle value m [mm]."""
+        return middle / self.MIDDLE
+
+    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Middle value m [mm] for the tangent length d [mm]."""
+        return reach * self.MIDDLE
+
+    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Parameter rows (n, 4) for tangent lengths d (n,) [mm]."""
+        w1, w2 = self.weights
+        rows = np.zeros((len(reach), 4))
+        rows[:, 0], rows[:, 1], rows[:, 2] = reach, w1, w2
+        return rows
+
+    def breaks(self, params: FloatArray) -> tuple[float, ...]:
+        """Parameters w where two pieces meet."""
+        return (0.5,)
+
+
+def kappa_max(d: FloatArray, theta: FloatArray, sigma2: float) -> FloatArray:
+    """Largest curvature of the pair between straight legs [1/mm] (eq. (17) times sigma2)."""
+    return sigma2 * 8.0 * np.sin(theta / 2) / (3.0 * d * np.cos(theta / 2) ** 2)

@@ -1,0 +1,133 @@
+"""The smooth path: the legs of a toolpath with a corner blended at each joint, within the error budget.
+
+Corners are data, not objects: the record holds, for each of the R+1 joints between legs, how far the corner reaches back (d),
+the shape's parameters, the part of the budget it uses and the normal acceleration that is left for the motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray, freeze
+from planner.corners.allocation import (
+    allocate,
+    error_rate,
+    normal_acceleration_max,
+    normal_acceleration_of_axes,
+)
+from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_from_tolerance
+from planner.corners.sharing import share_legs
+from planner.geometry.legs import Legs, legs_of
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+
+
+class CornerShape(Protocol):
+    """A family of corners: how tangent length d and middle value m belong together (see corners/blend.py)."""
+
+    name: str
+    shape: Shape
+
+    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray: ...
+
+    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+
+    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+
+    def breaks(self, params: FloatArray) -> tuple[float, ...]: ...
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SmoothPath:
+    """Legs and corners of a job; R legs, R+1 joints between and around them.
+
+    joint       : (R+1,) `Joint`: STOP, SMOOTH (tangent, passed as it is) or CORNER (blended)
+    d           : (R+1,) tangent length of the corner [mm]; 0 where there is none
+    params      : (R+1, 4) parameters of the corner's shape
+    tol         : (R+1,) contour error budget eps [mm]
+    tol_ap      : (R+1,) what the rounding uses of it, E(m) [mm]
+    normal_max  : (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
+    """
+
+    toolpath: Toolpath
+    legs: Legs
+    corner: CornerShape
+    joint: Array
+    d: FloatArray
+    params: FloatArray
+    tol: FloatArray
+    tol_ap: FloatArray
+    normal_max: FloatArray
+
+    def __post_init__(self) -> None:
+        joints = len(self.legs) + 1
+        freeze(self, "joint", np.uint8, (joints,))
+        freeze(self, "params", np.float64, (joints, 4))
+        for name in ("d", "tol", "tol_ap", "normal_max"):
+            freeze(self, name, np.float64, (joints,))
+
+    @property
+    def theta(self) -> FloatArray:
+        """(R+1,) turning angle at each joint [rad]."""
+        return self.toolpath.theta[self.legs.first]
+
+
+def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> SmoothPath:
+    """Blend every corner of the toolpath within its budget.
+
+    Raises InputError if the machine lacks an axis of the toolpath.
+    """
+    legs = legs_of(toolpath)
+    at = legs.first
+    joint = toolpath.joint[at]
+    blend = joint == Joint.CORNER
+    theta, tol = toolpath.theta[at], toolpath.tolerance[at]
+    sin_half = np.sin(theta / 2)
+    before, after = _neighbours(at, len(toolpath))
+    curvature = toolpath.curvature[before] + toolpath.curvature[after]
+    feed = np.minimum(_finite_feed(toolpath, machine, before), _finite_feed(toolpath, machine, after))
+
+    limits = machine.limits("acceleration", toolpath.axes)
+    reachable = normal_acceleration_of_axes(limits, toolpath.tangent_end[before], toolpath.tangent_start[after])
+    if machine.normal_acceleration is not None:
+        reachable = np.minimum(reachable, machine.normal_acceleration)
+    rate = error_rate(machine)
+
+    longest = legs.length[np.clip([np.arange(len(at)) - 1, np.arange(len(at))], 0, len(legs) - 1)].min(axis=0)
+    wanted = np.zeros(len(at))
+    middle = middle_from_tolerance(allocate(tol, reachable, rate), sin_half, curvature)[blend]
+    wanted[blend] = np.minimum(corner.reach(middle, feed[blend]), longest[blend])
+    bend = np.maximum(toolpath.curvature[before], toolpath.curvature[after])
+    with np.errstate(divide="ignore"):
+        wanted = np.minimum(wanted, np.maximum(BEND_MAX - theta, 0.0) / bend)
+    ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half, 1e-12)
+    d = share_legs(wanted, np.maximum(ease, 1e-12), legs.length)
+
+    params = np.zeros((len(at), 4))
+    params[blend] = corner.params(d[blend], feed[blend])
+    tol_ap = np.zeros(len(at))
+    tol_ap[blend] = error_from_middle(corner.middle(d, feed)[blend], sin_half[blend], curvature[blend])
+    return SmoothPath(
+        toolpath=toolpath,
+        legs=legs,
+        corner=corner,
+        joint=joint,
+        d=d,
+        params=params,
+        tol=tol,
+        tol_ap=tol_ap,
+        normal_max=normal_acceleration_max(tol, tol_ap, reachable, rate),
+    )
+
+
+def _neighbours(at: Array, segments: int) -> tuple[Array, Array]:
+    """Segments before and after each joint; at the path's ends the only one there is."""
+    return np.maximum(at - 1, 0), np.minimum(at, segments - 1)
+
+
+def _finite_feed(toolpath: Toolpath, machine: Machine, segment: Array) -> FloatArray:
+    """Programmed feed, on rapids what the fastest axis allows [mm/s]."""
+    return np.minimum(toolpath.feed[segment], machine.limits("velocity", toolpath.axes).max())

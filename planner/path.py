@@ -1,0 +1,420 @@
+"""The smooth path sampled along its arc length, on a grid that adapts until linear interpolation is good enough.
+
+A second-order solver sees the axis acceleration g(s) = r'(s) u + r''(s) x(s) only at grid points; in an interval u is constant
+and x = feed^2 linear. Between the points g leaves the chord of its end values by at most (midpoint values, one interval of
+length h, fastest x and largest u that the limits allow there)
+
+    e_k = x |r''_mid - (r''_0 + r''_1)/2|  +  u h |r''_1 - r''_0|/2  +  u |r'_mid - (r'_0 + r'_1)/2|        per axis k
+
+(the second term comes from the product of two linear functions). An interval is halved until max_k e_k / a_k is below
+`RESOLUTION`; what remains is kept per interval as `margin`, and the constraints are tightened by it, so that they hold between
+grid points and not only at them. Straight stretches need one interval: there g is exactly linear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from planner.arrays import Array, FloatArray, freeze
+from planner.corners.blend import shape_at
+from planner.corners.elements import (
+    ElementTable,
+    element_length,
+    element_point,
+    element_table,
+    to_arc_length,
+)
+from planner.corners.smooth import SmoothPath
+from planner.geometry.toolpath import Joint
+from planner.machine import Machine
+
+# Interpolation error of the axis accelerations that the grid may have [share of the limit]; measured in benchmarks: the cycle
+# time is within 1e-3 of the one on a grid ten times finer.
+RESOLUTION = 5e-3
+# The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
+MARGIN_SAFETY = 1.25
+# Halvings of one interval at most; 2^-20 of a corner is below a nanometre.
+HALVINGS_MAX = 20
+# Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
+ARC_STEP = np.pi / 8
+# Free parts of legs shorter than this share of the leg are nothing but the rounding of d_i + d_{i+1} = L [-].
+FREE_PART_MIN = 1e-9
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PathSamples:
+    """The path on a grid: G pieces between full stops, P points in all, one interval to the right of every point but the last of
+    each piece. At a full stop the point is there twice, as the end of one piece and the start of the next.
+
+    piece     : (G+1,) piece g holds the points piece[g] : piece[g+1]
+    stop      : (G+1,) joint (0..R) at which each piece starts; the last entry is the end of the path
+    s         : (P,) arc length from the start of the job [mm]
+    position  : (P, A) [mm]
+    d1        : (P, A) r' = dr/ds
+    d2_left, d2_right : (P, A) r'' just before and just after the point [1/mm]; they differ where the curvature jumps
+    d3_left, d3_right : (P, A) r''' [1/mm2]
+    element   : (P,) element of the interval to the right (corners/elements.py); of the last interval at a piece's end
+    w0, w1    : (P,) parameter range of that interval on its element
+    segment   : (P,) toolpath segment of that interval
+    margin    : (P,) interpolation error of that interval, share of the acceleration limits [-]
+    """
+
+    path: SmoothPath
+    table: ElementTable
+    piece: Array
+    stop: Array
+    s: FloatArray
+    position: FloatArray
+    d1: FloatArray
+    d2_left: FloatArray
+    d2_right: FloatArray
+    d3_left: FloatArray
+    d3_right: FloatArray
+    element: Array
+    w0: FloatArray
+    w1: FloatArray
+    segment: Array
+    margin: FloatArray
+
+    def __post_init__(self) -> None:
+        points, axes = np.shape(self.position)
+        freeze(self, "piece", np.int64, (None,))
+        freeze(self, "stop", np.int64, (len(self.piece),))
+        for name in ("s", "w0", "w1", "margin"):
+            freeze(self, name, np.float64, (points,))
+        for name in ("position", "d1", "d2_left", "d2_right", "d3_left", "d3_right"):
+            freeze(self, name, np.float64, (points, axes))
+        for name in ("element", "segment"):
+            freeze(self, name, np.int64, (points,))
+
+    def __len__(self) -> int:
+        return len(self.s)
+
+    @property
+    def intervals(self) -> Array:
+        """Indices of the points that have an interval to their right."""
+        inner = np.ones(len(self), dtype=bool)
+        inner[self.piece[1:] - 1] = False
+        return np.flatnonzero(inner)
+
+
+def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTION) -> PathSamples:
+    """Sample a smooth path on an adaptive grid.
+
+    resolution : interpolation error allowed between grid points [share of the acceleration limits]
+
+    Raises InputError if the machine lacks an axis of the path.
+    """
+    axes = path.toolpath.axes
+    table = element_table(path)
+    velocity, acceleration = machine.limits("velocity", axes), machine.limits("acceleration", axes)
+    element, w0, w1, segment, last = _grid(
+        table,
+        path.legs.first,
+        path.legs.offset,
+        path.d,
+        path.joint == Joint.STOP,
+        _corner_breaks(path),
+        path.toolpath.feed,
+        velocity,
+        acceleration,
+        resolution,
+    )
+    ends = np.flatnonzero(last)  # the points that close a piece
+    piece = np.concatenate([[0], ends + 1])
+    stop = np.flatnonzero(path.joint == Joint.STOP)
+    columns = _evaluate(table, element, w0, w1, segment, last, path.toolpath.feed, velocity, acceleration)
+    names = ("s", "position", "d1", "d2_left", "d2_right", "d3_left", "d3_right", "margin")
+    return PathSamples(
+        path=path,
+        table=table,
+        piece=piece,
+        stop=stop,
+        element=element,
+        w0=w0,
+        w1=w1,
+        segment=segment,
+        **dict(zip(names, columns, strict=True)),
+    )
+
+
+def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
+    """Add grid points at arc lengths `s` (n,) inside straight intervals (n,), sorted by place.
+
+    Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
+    """
+    table = samples.table
+    element = samples.element[interval]
+    if (element < 0).any() or (table.curves.arc[np.maximum(element, 0)] >= 0).any():
+        raise ValueError("insert_points: only straight intervals can be split")
+    after = interval + 1
+    ds = s - samples.s[interval]
+    w = samples.w0[interval] + ds
+
+    def put(values: Array, new: Array) -> Array:
+        return np.insert(values, after, new, axis=0)
+
+    w0 = put(samples.w0, w)
+    w1 = put(samples.w1, samples.w1[interval])
+    place = interval + 1 + np.arange(len(interval))  # where the new points are now
+    w1[place - 1] = w
+    zero = np.zeros((len(interval), samples.d1.shape[1]))
+    return PathSamples(
+        path=samples.path,
+        table=table,
+        piece=samples.piece + np.searchsorted(interval, samples.piece, side="left"),
+        stop=samples.stop,
+        s=put(samples.s, s),
+        position=put(samples.position, samples.position[interval] + ds[:, None] * samples.d1[interval]),
+        d1=put(samples.d1, samples.d1[interval]),
+        d2_left=put(samples.d2_left, zero),
+        d2_right=put(samples.d2_right, zero),
+        d3_left=put(samples.d3_left, zero),
+        d3_right=put(samples.d3_right, zero),
+        element=put(samples.element, element),
+        w0=w0,
+        w1=w1,
+        segment=put(samples.segment, samples.segment[interval]),
+        margin=put(samples.margin, samples.margin[interval]),
+    )
+
+
+def _corner_breaks(path: SmoothPath) -> FloatArray:
+    """(R+1, B) parameters where each corner starts with a grid point, ascending, padded with 1.
+
+    Quarters besides the shape's own breaks, so that no symmetric half is mistaken for a straight line.
+    """
+    always = (0.25, 0.5, 0.75)
+    blended = np.flatnonzero(path.d > 0)
+    width = 3 if not len(blended) else max(len(path.corner.breaks(path.params[blended[0]])), 1) + 8
+    out = np.ones((len(path.d), width))
+    if path.corner.shape == 0:
+        out[:, :3] = always
+        return out
+    for k in blended:
+        points = sorted(set(path.corner.breaks(path.params[k])) | set(always))
+        out[k, : len(points)] = points
+    return out
+
+
+@njit(cache=True)
+def _interval_error(left, mid, right, x, u, h, acceleration):
+    """max_k e_k / a_k of the module's text, from arc-length derivatives (4, A) at both ends and the middle."""
+    worst = 0.0
+    for k in range(left.shape[1]):
+        curve = x * abs(mid[2, k] - 0.5 * (left[2, k] + right[2, k]))
+        product = 0.5 * u * h * abs(right[2, k] - left[2, k])
+        turn = u * abs(mid[1, k] - 0.5 * (left[1, k] + right[1, k]))
+        worst = max(worst, (curve + product + turn) / acceleration[k])
+    return worst
+
+
+@njit(cache=True)
+def _fastest(point, feed, velocity, acceleration):
+    """Bounds (x, u) of feed^2 and of the acceleration along the path that the limits allow at a point (4, A)."""
+    feed_max = feed
+    u = 0.0
+    normal = 0.0
+    kappa_sq = 0.0
+    for k in range(point.shape[1]):
+        along = abs(point[1, k])
+        if along * feed_max > velocity[k]:
+            feed_max = velocity[k] / along
+        u += along * acceleration[k]
+        normal += abs(point[2, k]) * acceleration[k]
+        kappa_sq += point[2, k] * point[2, k]
+    x = feed_max * feed_max
+    if normal < x * kappa_sq:  # |r''| x <= sum_k a_k |n_k|, the box' support along the normal
+        x = normal / kappa_sq
+    return x, u
+
+
+@njit(cache=True)
+def _measure(table, element, wa, wb, feed, velocity, acceleration, work, left, mid, right):
+    """Evaluate an interval at both ends and the middle; returns its arc length and interpolation error."""
+    w_ref = 0.5 * (wa + wb)
+    element_point(table, element, wa, w_ref, work, left)
+    element_point(table, element, wb, w_ref, work, right)
+    element_point(table, element, w_ref, w_ref, work, mid)
+    to_arc_length(left)
+    to_arc_length(right)
+    h = to_arc_length(mid) * (wb - wa)
+    x, u = _fastest(mid, feed, velocity, acceleration)
+    x_left, _ = _fastest(left, feed, velocity, acceleration)
+    x_right, _ = _fastest(right, feed, velocity, acceleration)
+    x = min(x, max(x_left, x_right))
+    return h, _interval_error(left, mid, right, x, u, h, acceleration)
+
+
+@njit(cache=True)
+def _subdivide(table, element, wa, wb, feed, velocity, acceleration, resolution, work, points, out):
+    """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number."""
+    stack = np.empty(HALVINGS_MAX + 1)
+    stack[0] = wb
+    depth = 1
+    count = 0
+    left = wa
+    while depth > 0:
+        right = stack[depth - 1]
+        _, error = _measure(
+            table, element, left, right, feed, velocity, acceleration, work, points[0], points[1], points[2]
+        )
+        if error > resolution and depth <= HALVINGS_MAX and count + depth < len(out):
+            stack[depth] = 0.5 * (left + right)
+            depth += 1
+        else:
+            out[count] = right
+            count += 1
+            depth -= 1
+            left = right
+    return count
+
+
+@njit(cache=True)
+def _corner_parameter(table, k, z):
+    """w of corner k whose matched point lies z [mm] after the vertex, Y(w) - X(w) = z (corners/blend.py)."""
+    wa, wb = 0.0, 1.0
+    for _ in range(60):
+        w = 0.5 * (wa + wb)
+        X, Y = shape_at(table.shape, table.params[k], w, w)
+        if Y[0] - X[0] < z:
+            wa = w
+        else:
+            wb = w
+    return 0.5 * (wa + wb)
+
+
+@njit(cache=True)
+def _grown(array, needed):
+    if needed <= len(array):
+        return array
+    out = np.empty(max(2 * len(array), needed), array.dtype)
+    out[: len(array)] = array
+    return out
+
+
+@njit(cache=True)
+def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration, resolution):
+    """Intervals of the whole path in order; a closing row (w0 = w1) where a piece ends.
+
+    Returns element, w0, w1, segment (P,) and `last` (P,), True on closing rows.
+    """
+    legs = len(first) - 1
+    axes = len(velocity)
+    work = np.empty((2, 4, axes))
+    points = np.empty((3, 4, axes))
+    ends = np.empty(1 << 14)
+    size = 8 * legs + 64
+    element, segment = np.empty(size, np.int64), np.empty(size, np.int64)
+    w0, w1 = np.empty(size), np.empty(size)
+    last = np.empty(size, np.bool_)
+    n = 0
+    for leg in range(legs):
+        length = table.curves.length[leg]
+        row = table.curves.arc[leg]
+        # The leg's free part, then the corner behind it: spans (curve, wa, wb, seg) cut at the block boundaries.
+        for half in range(3):  # 0: free part, 1: corner before its apex, 2: after it
+            k = leg + 1
+            if half == 0:
+                if length - d[leg] - d[k] <= FREE_PART_MIN * length:
+                    continue
+            elif d[k] <= 0.0:
+                continue
+            owner = k if half == 2 else leg
+            for seg in range(first[owner], first[owner + 1]):
+                begin = offset[seg]
+                end = offset[seg + 1] if seg + 1 < first[owner + 1] else table.curves.length[owner]
+                if half == 0:
+                    wa, wb = max(begin, d[leg]), min(end, length - d[k])
+                    if wb - wa <= FREE_PART_MIN * length:
+                        continue
+                    curve = leg
+                elif half == 1:
+                    if end <= length - d[k]:
+                        continue
+                    wa = _corner_parameter(table, k, begin - length) if begin > length - d[k] else 0.0
+                    wb = _corner_parameter(table, k, end - length) if seg + 1 < first[owner + 1] else 0.5
+                    curve = ~k
+                else:
+                    if begin >= d[k]:
+                        break
+                    wa = _corner_parameter(table, k, begin) if seg > first[owner] else 0.5
+                    wb = _corner_parameter(table, k, end) if end < d[k] else 1.0
+                    curve = ~k
+                parts = 1
+                if half == 0 and row >= 0:
+                    parts = int(np.ceil(abs(table.curves.rate[row]) * (wb - wa) / ARC_STEP))
+                cut = 0
+                left = wa
+                while left < wb:
+                    right = wb
+                    if half == 0:
+                        cut += 1
+                        if cut < parts:
+                            right = wa + (wb - wa) * cut / parts
+                    else:
+                        while cut < breaks.shape[1] and breaks[k, cut] <= left:
+                            cut += 1
+                        if cut < breaks.shape[1]:
+                            right = min(wb, breaks[k, cut])
+                    count = 1
+                    ends[0] = right
+                    if half > 0 or row >= 0:
+                        count = _subdivide(
+                            table, curve, left, right, feed[seg], velocity, acceleration, resolution,
+                            work, points, ends,
+                        )  # fmt: skip
+                    if n + count + 1 > len(w0):
+                        element, segment = _grown(element, n + count + 1), _grown(segment, n + count + 1)
+                        w0, w1, last = _grown(w0, n + count + 1), _grown(w1, n + count + 1), _grown(last, n + count + 1)
+                    for c in range(count):
+                        element[n], segment[n], last[n] = curve, seg, False
+                        w0[n], w1[n] = left, ends[c]
+                        left = ends[c]
+                        n += 1
+        if is_stop[leg + 1]:
+            if n + 1 > len(w0):
+                element, segment = _grown(element, n + 1), _grown(segment, n + 1)
+                w0, w1, last = _grown(w0, n + 1), _grown(w1, n + 1), _grown(last, n + 1)
+            element[n], segment[n], last[n] = element[n - 1], segment[n - 1], True
+            w0[n], w1[n] = w1[n - 1], w1[n - 1]
+            n += 1
+    return element[:n].copy(), w0[:n].copy(), w1[:n].copy(), segment[:n].copy(), last[:n].copy()
+
+
+@njit(cache=True)
+def _evaluate(table, element, w0, w1, segment, last, feed, velocity, acceleration):
+    """Arc length, position, derivatives and margins at all points; see `PathSamples`."""
+    points, axes = len(w0), len(velocity)
+    s = np.zeros(points)
+    position, d1 = np.empty((points, axes)), np.empty((points, axes))
+    d2_left, d2_right = np.empty((points, axes)), np.empty((points, axes))
+    d3_left, d3_right = np.empty((points, axes)), np.empty((points, axes))
+    margin = np.zeros(points)
+    work = np.empty((2, 4, axes))
+    left, mid, right = np.empty((4, axes)), np.empty((4, axes)), np.empty((4, axes))
+    fresh = True  # the point starts a piece: nothing to its left
+    for i in range(points):
+        if last[i]:
+            d2_right[i], d3_right[i] = d2_left[i], d3_left[i]
+            if i + 1 < points:
+                s[i + 1] = s[i]
+            fresh = True
+            continue
+        h, error = _measure(
+            table, element[i], w0[i], w1[i], feed[segment[i]], velocity, acceleration, work, left, mid, right
+        )
+        w_ref = 0.5 * (w0[i] + w1[i])
+        s[i + 1] = s[i] + element_length(table, element[i], w0[i], w1[i], w_ref, work, mid)
+        margin[i] = MARGIN_SAFETY * error
+        if fresh:
+            position[i], d1[i] = left[0], left[1]
+            d2_left[i], d3_left[i] = left[2], left[3]
+            fresh = False
+        d2_right[i], d3_right[i] = left[2], left[3]
+        position[i + 1], d1[i + 1] = right[0], right[1]
+        d2_left[i + 1], d3_left[i + 1] = right[2], right[3]
+    return s, position, d1, d2_left, d2_right, d3_left, d3_right, margin

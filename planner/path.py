@@ -200,7 +200,7 @@ def _corner_breaks(path: SmoothPath) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _interval_error(left, mid, right, x, u, h, acceleration):
     """max_k e_k / a_k of the module's text, from arc-length derivatives (4, A) at both ends and the middle."""
     worst = 0.0
@@ -212,7 +212,7 @@ def _interval_error(left, mid, right, x, u, h, acceleration):
     return worst
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fastest(point, feed, velocity, acceleration):
     """Bounds (x, u) of feed^2 and of the acceleration along the path that the limits allow at a point (4, A)."""
     feed_max = feed
@@ -232,7 +232,7 @@ def _fastest(point, feed, velocity, acceleration):
     return x, u
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _measure(table, element, wa, wb, feed, velocity, acceleration, work, left, mid, right):
     """Evaluate an interval at both ends and the middle; returns its arc length and interpolation error."""
     w_ref = 0.5 * (wa + wb)
@@ -249,7 +249,7 @@ def _measure(table, element, wa, wb, feed, velocity, acceleration, work, left, m
     return h, _interval_error(left, mid, right, x, u, h, acceleration)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _subdivide(table, element, wa, wb, feed, velocity, acceleration, resolution, work, points, out):
     """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number."""
     stack = np.empty(HALVINGS_MAX + 1)
@@ -273,7 +273,7 @@ def _subdivide(table, element, wa, wb, feed, velocity, acceleration, resolution,
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _corner_parameter(table, k, z):
     """w of corner k whose matched point lies z [mm] after the vertex, Y(w) - X(w) = z (corners/blend.py)."""
     wa, wb = 0.0, 1.0
@@ -287,7 +287,7 @@ def _corner_parameter(table, k, z):
     return 0.5 * (wa + wb)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _grown(array, needed):
     if needed <= len(array):
         return array
@@ -296,7 +296,7 @@ def _grown(array, needed):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration, resolution):
     """Intervals of the whole path in order; a closing row (w0 = w1) where a piece ends.
 
@@ -385,7 +385,7 @@ def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration
     return element[:n].copy(), w0[:n].copy(), w1[:n].copy(), segment[:n].copy(), last[:n].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _evaluate(table, element, w0, w1, segment, last, feed, velocity, acceleration):
     """Arc length, position, derivatives and margins at all points; see `PathSamples`."""
     points, axes = len(w0), len(velocity)

@@ -59,7 +59,7 @@ def error_from_middle(middle: FloatArray, sin_half: FloatArray, curvature: Float
     return 2.0 * sin_half * middle + curvature * middle**2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cubic(c0, c1, c2, c3, t):
     """Cubic Bernstein polynomial and its three derivatives at t."""
     a = 1.0 - t
@@ -71,7 +71,7 @@ def _cubic(c0, c1, c2, c3, t):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _quotient(n, q):
     """Value and three derivatives of n/q, each given as value and three derivatives."""
     v0 = n[0] / q[0]
@@ -81,13 +81,13 @@ def _quotient(n, q):
     return v0, v1, v2, v3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _scaled(v, scale, rate):
     """scale * v(rate * w): value and derivatives with respect to w."""
     return scale * v[0], scale * rate * v[1], scale * rate * rate * v[2], scale * rate * rate * rate * v[3]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bezier_shape(d, w1, w2, w, w_ref):
     """Paper 002: the halves have control values (1, 1/2, 1/4, 1/8) on the near leg, (0, 0, 0, 1/8) on the far one."""
     first = w_ref <= 0.5
@@ -100,7 +100,7 @@ def _bezier_shape(d, w1, w2, w, w_ref):
     return _scaled(far, d, -2.0), _scaled(near, d, -2.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _ramp(t, t_ref, T1, T2):
     """Ramp response R of two FIR filters and its three derivatives (S, h, h'), on the branch of t_ref (PAPERS 0)."""
     if t_ref <= T2:
@@ -114,7 +114,7 @@ def _ramp(t, t_ref, T1, T2):
     return t - delay / 2.0 + q * r * r * r / 6.0, 1.0 - q * r * r / 2.0, q * r, -q
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fir_shape(V, T1, T2, Tk, w, w_ref):
     """Paper 000: X = V R(Tk - tau), Y = V R(tau), tau = Tk w."""
     near = _ramp(Tk * (1.0 - w), Tk * (1.0 - w_ref), T1, T2)
@@ -122,7 +122,7 @@ def _fir_shape(V, T1, T2, Tk, w, w_ref):
     return _scaled(near, V, -Tk), _scaled(far, V, Tk)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shape_at(shape, params, w, w_ref):
     """Retreat X and advance Y at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
 
@@ -133,7 +133,7 @@ def shape_at(shape, params, w, w_ref):
     return _fir_shape(params[0], params[1], params[2], params[3], w, w_ref)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def corner_point(table, k, shape, params, w, w_ref, work1, work2, out):
     """Point and three w-derivatives of corner k (between legs k-1 and k), into out (4, A)."""
     X, Y = shape_at(shape, params[k], w, w_ref)

@@ -42,7 +42,7 @@ def element_table(path: SmoothPath) -> ElementTable:
     return ElementTable(path.legs.table, int(path.corner.shape), path.params)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def element_point(table, element, w, w_ref, work, out):
     """Point and three w-derivatives of an element at w, into out (4, A); work is (2, 4, A) scratch."""
     if element >= 0:
@@ -51,7 +51,7 @@ def element_point(table, element, w, w_ref, work, out):
         corner_point(table.curves, ~element, table.shape, table.params, w, w_ref, work[0], work[1], out)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def to_arc_length(out):
     """Turn w-derivatives in out (4, A) into arc-length derivatives, in place; returns |dB/dw|."""
     axes = out.shape[1]
@@ -77,7 +77,7 @@ def to_arc_length(out):
     return speed
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def element_length(table, element, w0, w1, w_ref, work, out):
     """Arc length of an element between w0 and w1 [mm]."""
     if element >= 0 and table.curves.arc[element] < 0:

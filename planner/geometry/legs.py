@@ -79,7 +79,7 @@ def legs_of(toolpath: Toolpath) -> Legs:
     return Legs(first=first, offset=offset, length=length, table=table)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def leg_point(table, leg, x, out):
     """Point and first three x-derivatives of a leg at x, into out (4, A)."""
     axes = out.shape[1]

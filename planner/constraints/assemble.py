@@ -1,0 +1,130 @@
+"""All limits of a job put together: from a sampled path to the feedrate problem."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.constraints import bounds
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.allocation import error_rate
+from planner.machine import Machine
+from planner.path import PathSamples
+from planner.units import RAD_PER_DEG
+
+# Jumps of r'' below this are rounding of the two elements' formulas [share of the larger r''].
+JUMP_ROUNDING = 1e-6
+
+
+def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
+    """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
+
+    Raises InputError if the machine lacks an axis of the path.
+    """
+    axes = samples.path.toolpath.axes
+    collected = _Collector(len(samples))
+    interval_max = interval_feed_sq_max(samples, machine)
+    left, right = interval_sides(samples)
+    feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])
+    collected.tighten("feed", np.minimum(feed_sq[left], feed_sq[right]))
+    per_axis, axis = bounds.axis_velocity(samples.d1, machine.limits("velocity", axes))
+    for k, letter in enumerate(axes):
+        collected.tighten(f"velocity.{letter}", np.where(axis == k, per_axis, np.inf))
+    budget = _remaining_budget(samples, machine)
+    for side, d2 in ((left, samples.d2_left), (right, samples.d2_right)):
+        kappa = np.linalg.norm(d2, axis=1)
+        keep = 1.0 - samples.margin[side]
+        for name, bound in _curvature_bounds(kappa, budget[side], machine):
+            collected.tighten(name, bound * keep)
+    jump, axis = bounds.curvature_jump(*_jumps(samples), machine.limits("acceleration", axes))
+    for k, letter in enumerate(axes):
+        collected.tighten(f"curvature_jump.{letter}", np.where(axis == k, jump, np.inf))
+    assert (collected.feed_sq_max <= np.maximum(interval_max[left], interval_max[right]) * (1 + 1e-12)).all()
+    pieces = len(samples.piece) - 1
+    return FeedrateProblem(
+        piece=samples.piece,
+        s=samples.s,
+        axes=axes,
+        d1=samples.d1,
+        d2_left=samples.d2_left,
+        d2_right=samples.d2_right,
+        d3_left=samples.d3_left,
+        d3_right=samples.d3_right,
+        velocity=machine.limits("velocity", axes),
+        acceleration=machine.limits("acceleration", axes),
+        jerk=machine.limits("jerk", axes),
+        feed_sq_max=collected.feed_sq_max,
+        feed_sq_bound=collected.which,
+        bound_names=tuple(collected.names),
+        margin=samples.margin,
+        feed_sq_start=np.zeros(pieces),
+        feed_sq_end=np.zeros(pieces),
+    )
+
+
+def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
+    """(P,) bound of feed^2 inside straight intervals: programmed feed and axis velocities [mm2/s2]."""
+    feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])
+    velocity, _ = bounds.axis_velocity(samples.d1, machine.limits("velocity", samples.path.toolpath.axes))
+    return np.minimum(feed_sq, velocity)
+
+
+def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
+    """Index of the interval to the left and to the right of every point; at a piece's ends the only one there is."""
+    right = np.arange(len(samples))
+    left = right - 1
+    left[samples.piece[:-1]] += 1
+    right[samples.piece[1:] - 1] -= 1
+    return left, right
+
+
+def _remaining_budget(samples: PathSamples, machine: Machine) -> FloatArray:
+    """(P,) what the rounding leaves of the contour budget for chord and filter errors, per interval [mm]."""
+    path = samples.path
+    element = samples.element
+    corner = element < 0
+    joint = np.where(corner, ~element, 0)
+    tolerance = path.toolpath.tolerance
+    whole = np.minimum(tolerance[samples.segment], tolerance[samples.segment + 1])
+    return np.where(corner, path.tol[joint] - path.tol_ap[joint], whole)
+
+
+def _curvature_bounds(kappa: FloatArray, budget: FloatArray, machine: Machine) -> list[tuple[str, FloatArray]]:
+    """The bounds that depend on curvature; chord and filter errors share the budget in proportion (PAPERS D)."""
+    rate = error_rate(machine)
+    found = []
+    if machine.normal_acceleration is not None:
+        found.append(("normal_acceleration", bounds.normal_acceleration(kappa, machine.normal_acceleration)))
+    tol_chord = budget * (machine.dt**2 / 8.0 / rate)
+    found.append(("chord_error", bounds.chord_error(kappa, tol_chord, machine.dt)))
+    if machine.fir is not None:
+        filters = machine.fir.time_constants
+        found.append(("filter_error", bounds.filter_error(kappa, budget - tol_chord, filters)))
+        if machine.fir.phase_lag_max is not None:
+            angle = machine.fir.phase_lag_max * RAD_PER_DEG
+            found.append(("phase_lag", bounds.phase_lag(kappa, angle, filters)))
+    return found
+
+
+def _jumps(samples: PathSamples) -> tuple[FloatArray, FloatArray]:
+    """r'' on both sides of every point, made equal where they differ by rounding only."""
+    left, right = samples.d2_left, samples.d2_right
+    size = np.maximum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
+    real = np.linalg.norm(right - left, axis=1) > JUMP_ROUNDING * size
+    return left, np.where(real[:, None], right, left)
+
+
+class _Collector:
+    """The running minimum of all bounds, and which one it is."""
+
+    def __init__(self, points: int):
+        self.feed_sq_max = np.full(points, np.inf)
+        self.which = np.zeros(points, dtype=np.int64)
+        self.names: list[str] = []
+
+    def tighten(self, name: str, bound: FloatArray) -> None:
+        if name not in self.names:
+            self.names.append(name)
+        tighter = bound < self.feed_sq_max
+        self.feed_sq_max[tighter] = bound[tighter]
+        self.which[tighter] = self.names.index(name)

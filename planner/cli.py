@@ -1,0 +1,311 @@
+"""The command line. Every command imports what it needs itself, so that `planner --help` answers at once.
+
+Exit codes: 0 done and verified; 1 the verdict failed; 2 bad input; 3 not solved; 70 a bug of ours; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planner.errors import InputError, NotSolvedError
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+FAILED, BAD_INPUT, NOT_SOLVED, BUG, INTERRUPTED, BROKEN_PIPE = 1, 2, 3, 70, 130, 141
+DEFAULT_MACHINE = "mill"
+PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
+PIPE_WIDTH = 120  # columns where the output is no terminal
+
+
+class Method(str, Enum):
+    """Names of the methods."""
+
+    toppra = "toppra"
+    stop = "stop"
+
+
+class Corner(str, Enum):
+    """Names of the corner shapes."""
+
+    bezier = "bezier"
+    fir = "fir"
+
+
+class Format(str, Enum):
+    """Formats of trajectory files."""
+
+    parquet = "parquet"
+    csv = "csv"
+    npz = "npz"
+
+
+app = typer.Typer(
+    help="The fastest motion of an NC program within the limits of a machine, planned and verified.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+machine_app = typer.Typer(help="Machine files.", no_args_is_help=True)
+app.add_typer(machine_app, name="machine")
+
+Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
+MachineOption = Annotated[
+    str | None,
+    typer.Option("-m", "--machine", metavar="FILE", help=f"machine file or built-in machine [default: {DEFAULT_MACHINE}]"),
+]
+ToleranceOption = Annotated[
+    float | None,
+    typer.Option(metavar="MM", help="contour error budget; beats G64 P in the program and the machine's tolerance"),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
+
+
+def _guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn what a command raises into a message and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+            sys.stdout.flush()
+        except InputError as fault:
+            typer.echo(str(fault), err=True)
+            raise typer.Exit(BAD_INPUT) from None
+        except NotSolvedError as fault:
+            typer.echo(f"not solved: {fault}", err=True)
+            raise typer.Exit(NOT_SOLVED) from None
+        except KeyboardInterrupt:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the flush at exit fails once more
+            raise typer.Exit(BROKEN_PIPE) from None
+        except typer.Exit:
+            raise
+        except Exception:
+            import traceback
+
+            traceback.print_exc()
+            typer.echo(
+                "\nThis is a bug in planner, not in your program. Please report it with the lines above, the NC program and "
+                "the machine file.",
+                err=True,
+            )
+            raise typer.Exit(BUG) from None
+
+    return run
+
+
+# ---------------------------------------------------------------------------------------------- commands
+
+
+@app.command()
+@_guarded
+def plan(
+    job: Job,
+    machine: MachineOption = None,
+    method: Annotated[Method, typer.Option(help="how to plan")] = Method.toppra,
+    corner: Annotated[Corner, typer.Option(help="shape of the rounded corners")] = Corner.bezier,
+    tolerance: ToleranceOption = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="write trajectory and summary into DIR")
+    ] = None,
+    file_format: Annotated[Format, typer.Option("--format", help="format of the trajectory")] = Format.parquet,
+    plot: Annotated[bool, typer.Option("--plot", help="write pictures into DIR (PNG)")] = False,
+    corners: Annotated[bool, typer.Option("--corners", help="print the corners next to their closed-form speed")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan, sample and verify the motion of a program."""
+    if plot and output is None:
+        raise InputError("--plot writes its pictures into the output directory: give one with -o DIR")
+    from planner.methods import plan_program
+    from planner.report.export import summary, write_plan
+
+    with _Progress() as progress:
+        result = plan_program(
+            job, machine or DEFAULT_MACHINE, method=method.value, corner=corner.value, tolerance=tolerance, progress=progress
+        )
+        written: list[str] = []
+        if output is not None and result.trajectory is not None:
+            progress("write", 0.0)
+            written = write_plan(result, output, file_format=file_format.value, plots=plot)
+
+    if as_json:
+        typer.echo(json.dumps(summary(result), indent=2, allow_nan=False))
+    else:
+        from planner.report.tables import corner_table, plan_table
+
+        _show(plan_table(result))
+        table = corner_table(result) if corners else None
+        if table is not None:
+            _show("", table)
+        for name in written:
+            typer.echo(str(output / name) if output else name)
+    if result.trajectory is None:
+        kept = f"; {output} was not touched" if output is not None else ""
+        raise NotSolvedError(f"{result.sentence}{kept}")
+    if result.verdict is None or not result.verdict.passed:
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+@_guarded
+def verify(
+    trajectory: Annotated[Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")],
+    job: Job,
+    machine: Annotated[
+        str | None,
+        typer.Option(
+            "-m",
+            "--machine",
+            metavar="FILE",
+            help=f"machine file or built-in machine [default: the one recorded in TRAJECTORY, or {DEFAULT_MACHINE}]",
+        ),
+    ] = None,
+    tolerance: ToleranceOption = None,
+    not_limited: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LIMIT", help="report this limit without judging it (jerk); repeat for more"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Judge a trajectory against its program and a machine; it may come from anywhere."""
+    from planner.geometry.build import toolpath_from_program
+    from planner.machine import load_machine, machine_from_dict
+    from planner.nc.reader import read_program
+    from planner.report.export import read_trajectory, verdict_summary
+    from planner.report.tables import verdict_table
+    from planner.verify import verify as judge
+
+    read = read_trajectory(trajectory)
+    recorded = read.metadata.get("machine")
+    if machine is None and recorded is not None:
+        limits = machine_from_dict(recorded, source=f"{trajectory} (recorded machine)")
+    else:
+        limits = load_machine(machine or DEFAULT_MACHINE)
+    if tolerance is None:
+        tolerance = read.metadata.get("tolerance_mm")
+    if not_limited is None:
+        not_limited = read.metadata.get("not_limited", [])
+    toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance)
+    verdict = judge(read.trajectory, toolpath, limits, not_limited=tuple(not_limited))
+    if as_json:
+        typer.echo(json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2))
+    else:
+        for note in read.notes:
+            typer.echo(f"note: {note}", err=True)
+        _show(verdict_table(verdict, f"{trajectory} on {job}, machine {limits.name}"))
+    if not verdict.passed:
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+@_guarded
+def info(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -> None:
+    """What a program holds; every construct that is not supported, with its line."""
+    from planner.machine import load_machine
+    from planner.nc.info import inspect_program
+    from planner.report.tables import info_summary, info_table
+
+    found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE))
+    if as_json:
+        typer.echo(json.dumps(info_summary(found), indent=2, allow_nan=False))
+    else:
+        _show(info_table(found))
+    if found.faults:
+        raise typer.Exit(BAD_INPUT)
+
+
+@machine_app.command("list")
+@_guarded
+def machine_list() -> None:
+    """List the built-in machines."""
+    from planner.machine import builtin_machines, load_machine
+    from planner.report.tables import machines_table
+
+    _show(machines_table([load_machine(name) for name in builtin_machines()]))
+
+
+@machine_app.command("show")
+@_guarded
+def machine_show(name: Annotated[str, typer.Argument(metavar="NAME", help="built-in machine")]) -> None:
+    """Print the file of a built-in machine."""
+    from planner.machine import builtin_text
+
+    typer.echo(builtin_text(name), nl=False)
+
+
+@machine_app.command("init")
+@_guarded
+def machine_init(file: Annotated[Path, typer.Argument(metavar="FILE", help="file to write (.toml)")]) -> None:
+    """Write a commented machine file to start from; it names every key and its unit."""
+    from importlib import resources
+
+    text = (resources.files("planner") / "templates" / "machine.toml").read_text(encoding="utf-8")
+    try:
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except FileExistsError:
+        raise InputError("exists already and is not overwritten; give another name", source=str(file)) from None
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror}", source=str(file)) from fault
+    typer.echo(f"{file} written; plan with: planner plan JOB -m {file}")
+
+
+# ---------------------------------------------------------------------------------------------- terminal
+
+
+class _Progress:
+    """A bar on standard error that appears when a job takes longer than a moment, on a terminal only."""
+
+    def __enter__(self) -> _Progress:
+        self._start = time.monotonic()
+        self._bar: Any = None
+        self._task: Any = None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        """Show that `stage` is done to `fraction` (0 to 1)."""
+        if self._bar is None:
+            if not sys.stderr.isatty() or time.monotonic() - self._start < PROGRESS_AFTER:
+                return
+            self._open()
+        self._bar.update(self._task, description=stage, completed=fraction)
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
+        )
+        self._task = self._bar.add_task("", total=1.0)
+        self._bar.start()
+
+
+def _show(*tables: RenderableType) -> None:
+    from rich.console import Console
+
+    console: Console = Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH)
+    for table in tables:
+        console.print(table)
+
+
+def main() -> None:
+    """Entry point of the command `planner`."""
+    app(prog_name="planner")

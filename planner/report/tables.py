@@ -1,0 +1,149 @@
+"""Tables for the terminal: a plan, its corners, a verdict, a program, the machines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from planner.machine import LINEAR_AXES, Machine
+from planner.units import MICROMETRE, SECONDS_PER_MINUTE
+
+if TYPE_CHECKING:
+    from planner.nc.info import ProgramInfo
+    from planner.plan import Plan
+    from planner.verify import Verdict
+
+CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table
+FAULTS_SHOWN = 8
+
+
+def plan_table(plan: Plan) -> Table:
+    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, time per stage."""
+    corner = f" on {plan.corner} corners" if plan.corner else ""
+    table = _pairs(f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}")
+    if plan.trajectory is not None:
+        time = plan.trajectory.cycle_time
+        table.add_row("cycle time", f"{time:.4f} s{_hours(time)}")
+        if plan.method != "stop" and np.isfinite(plan.stop_time):
+            table.add_row(
+                "stopping at every block", f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long"
+            )
+    if plan.verdict is not None:
+        _add_verdict(table, plan.verdict)
+    if plan.corners is not None and len(plan.corners.theta):
+        table.add_row("corners", f"{len(plan.corners.theta):,}; fastest {_ratio(plan.corners.worst_ratio())} of eq. 19-20")
+    table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
+    stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
+    table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
+    return table
+
+
+def verdict_table(verdict: Verdict, title: str) -> Table:
+    """A verdict by itself."""
+    table = _pairs(title)
+    _add_verdict(table, verdict)
+    return table
+
+
+def corner_table(plan: Plan) -> Table | None:
+    """The corners that come closest to the speed of the closed form; None without corners."""
+    corners = plan.corners
+    if corners is None or not len(corners.theta):
+        return None
+    ratio = corners.feed_planned / corners.feed_closed_form
+    worst = np.argsort(-ratio, kind="stable")[:CORNERS_SHOWN]
+    shown = f"the {len(worst)} fastest of " if len(worst) < len(ratio) else ""
+    table = Table(title=f"{shown}{len(ratio):,} corners", title_justify="left", box=None, pad_edge=False)
+    for name in ("line", "theta\ndeg", "d in\nmm", "d out\nmm", "eps_ap\nµm", "kappa\n1/mm", "eq. 19-20\nmm/s", "planned\nmm/s"):
+        table.add_column(name, justify="right")
+    table.add_column("limited by")
+    for k in sorted(worst):
+        table.add_row(
+            str(corners.line[k]),
+            f"{np.rad2deg(corners.theta[k]):.2f}",
+            f"{corners.d_in[k]:.4f}",
+            f"{corners.d_out[k]:.4f}",
+            f"{corners.tol_ap[k] / MICROMETRE:.2f}",
+            f"{corners.kappa_max[k]:.4g}",
+            f"{corners.feed_closed_form[k]:.3f}",
+            f"{corners.feed_planned[k]:.3f}",
+            str(corners.limited_by[k]),
+        )
+    return table
+
+
+def machines_table(machines: Iterable[Machine]) -> Table:
+    """Built-in machines and their main limits, axis by axis."""
+    table = Table(box=None, pad_edge=False)
+    for name in ("machine", "dt\nms", "tolerance\nmm", "axes", "velocity\nmm/s", "acceleration\nmm/s²", "jerk\nm/s³"):
+        table.add_column(name, justify="left" if name in ("machine", "axes") else "right")
+    for machine in machines:
+        axes = [machine.axes[letter] for letter in machine.axes if letter in LINEAR_AXES]
+        table.add_row(
+            machine.name,
+            f"{machine.dt * 1e3:g}",
+            f"{machine.tolerance:g}",
+            " ".join(machine.axes),
+            " ".join(f"{axis.velocity:g}" for axis in axes),
+            " ".join(f"{axis.acceleration:g}" for axis in axes),
+            " ".join(f"{axis.jerk * MICROMETRE:g}" for axis in axes),
+        )
+    return table
+
+
+def _add_verdict(table: Table, verdict: Verdict) -> None:
+    for quantity, checks in _by_quantity(verdict).items():
+        said = ", ".join(
+            f"{name.partition('.')[2] or ''} {_ratio(check.ratio)}".strip() for name, check in checks
+        )
+        free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
+        table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
+    table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
+    table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
+    if verdict.passed:
+        table.add_row("verdict", Text("passed", style="green"))
+        return
+    table.add_row("verdict", Text("FAILED", style="bold red"))
+    for fault in _first(verdict.faults, FAULTS_SHOWN):
+        table.add_row("", Text(fault))
+
+
+def _by_quantity(verdict: Verdict) -> dict[str, list]:
+    """Limits grouped by what stands before the dot: velocity.x, velocity.y -> velocity."""
+    groups: dict[str, list] = {}
+    for name, check in verdict.limits.items():
+        groups.setdefault(name.partition(".")[0], []).append((name, check))
+    return groups
+
+
+def _ratio(value: float) -> str:
+    """A ratio to a limit, rounded up in the sixth digit, so that 1.0000004 does not pass for 1."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{np.ceil(value * 1e6) / 1e6:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
+
+
+def _hours(seconds: float) -> str:
+    if seconds < SECONDS_PER_MINUTE:
+        return ""
+    minutes, rest = divmod(seconds, SECONDS_PER_MINUTE)
+    hours, minutes = divmod(int(minutes), 60)
+    return f" ({hours} h {minutes} min {rest:.0f} s)" if hours else f" ({minutes} min {rest:.0f} s)"
+
+
+def _first(items: Sequence[str], count: int) -> list[str]:
+    more = len(items) - count
+    return [*items[:count], *([f"and {more} more"] if more > 0 else [])]
+
+
+def _pairs(title: str) -> Table:
+    table = Table(title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    return table

@@ -1,6 +1,7 @@
 """The command line. Every command imports what it needs itself, so that `planner --help` answers at once.
 
-Exit codes: 0 done and verified; 1 the verdict failed; 2 bad input; 3 not solved; 70 a bug of ours; 130 interrupted.
+Exit codes: 0 done and verified; 1 the verdict failed; 2 bad input; 3 not solved; 70 a bug of ours; 130
+interrupted.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,21 +29,21 @@ PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
 PIPE_WIDTH = 120  # columns where the output is no terminal
 
 
-class Method(str, Enum):
+class Method(StrEnum):
     """Names of the methods."""
 
     toppra = "toppra"
     stop = "stop"
 
 
-class Corner(str, Enum):
+class Corner(StrEnum):
     """Names of the corner shapes."""
 
     bezier = "bezier"
     fir = "fir"
 
 
-class Format(str, Enum):
+class Format(StrEnum):
     """Formats of trajectory files."""
 
     parquet = "parquet"
@@ -62,11 +63,18 @@ app.add_typer(machine_app, name="machine")
 Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
 MachineOption = Annotated[
     str | None,
-    typer.Option("-m", "--machine", metavar="FILE", help=f"machine file or built-in machine [default: {DEFAULT_MACHINE}]"),
+    typer.Option(
+        "-m",
+        "--machine",
+        metavar="FILE",
+        help=f"machine file or built-in machine [default: {DEFAULT_MACHINE}]",
+    ),
 ]
 ToleranceOption = Annotated[
     float | None,
-    typer.Option(metavar="MM", help="contour error budget; beats G64 P in the program and the machine's tolerance"),
+    typer.Option(
+        metavar="MM", help="contour error budget; beats G64 P in the program and the machine's tolerance"
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
 
@@ -89,7 +97,8 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
             typer.echo("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the flush at exit fails once more
+            # without this the flush at exit would fail once more
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(BROKEN_PIPE) from None
         except typer.Exit:
             raise
@@ -98,8 +107,8 @@ def _guarded(command: Callable[..., None]) -> Callable[..., None]:
 
             traceback.print_exc()
             typer.echo(
-                "\nThis is a bug in planner, not in your program. Please report it with the lines above, the NC program and "
-                "the machine file.",
+                "\nThis is a bug in planner, not in your program. Please report it with the lines above, "
+                "the NC program and the machine file.",
                 err=True,
             )
             raise typer.Exit(BUG) from None
@@ -119,11 +128,16 @@ def plan(
     corner: Annotated[Corner, typer.Option(help="shape of the rounded corners")] = Corner.bezier,
     tolerance: ToleranceOption = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="write trajectory and summary into DIR")
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="write trajectory and summary into DIR"),
     ] = None,
-    file_format: Annotated[Format, typer.Option("--format", help="format of the trajectory")] = Format.parquet,
+    file_format: Annotated[
+        Format, typer.Option("--format", help="format of the trajectory")
+    ] = Format.parquet,
     plot: Annotated[bool, typer.Option("--plot", help="write pictures into DIR (PNG)")] = False,
-    corners: Annotated[bool, typer.Option("--corners", help="print the corners next to their closed-form speed")] = False,
+    corners: Annotated[
+        bool, typer.Option("--corners", help="print the corners next to their closed-form speed")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Plan, sample and verify the motion of a program."""
@@ -134,7 +148,12 @@ def plan(
 
     with _Progress() as progress:
         result = plan_program(
-            job, machine or DEFAULT_MACHINE, method=method.value, corner=corner.value, tolerance=tolerance, progress=progress
+            job,
+            machine or DEFAULT_MACHINE,
+            method=method.value,
+            corner=corner.value,
+            tolerance=tolerance,
+            progress=progress,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:
@@ -162,7 +181,9 @@ def plan(
 @app.command()
 @_guarded
 def verify(
-    trajectory: Annotated[Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")],
+    trajectory: Annotated[
+        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
+    ],
     job: Job,
     machine: Annotated[
         str | None,
@@ -170,7 +191,7 @@ def verify(
             "-m",
             "--machine",
             metavar="FILE",
-            help=f"machine file or built-in machine [default: the one recorded in TRAJECTORY, or {DEFAULT_MACHINE}]",
+            help=f"machine file or built-in machine [default: TRAJECTORY's own, or {DEFAULT_MACHINE}]",
         ),
     ] = None,
     tolerance: ToleranceOption = None,
@@ -184,8 +205,9 @@ def verify(
     from planner.geometry.build import toolpath_from_program
     from planner.machine import load_machine, machine_from_dict
     from planner.nc.reader import read_program
-    from planner.report.export import read_trajectory, verdict_summary
+    from planner.report.export import verdict_summary
     from planner.report.tables import verdict_table
+    from planner.report.trajectory_file import read_trajectory
     from planner.verify import verify as judge
 
     read = read_trajectory(trajectory)
@@ -201,7 +223,9 @@ def verify(
     toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance)
     verdict = judge(read.trajectory, toolpath, limits, not_limited=tuple(not_limited))
     if as_json:
-        typer.echo(json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2))
+        typer.echo(
+            json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2)
+        )
     else:
         for note in read.notes:
             typer.echo(f"note: {note}", err=True)
@@ -216,14 +240,15 @@ def info(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -
     """What a program holds; every construct that is not supported, with its line."""
     from planner.machine import load_machine
     from planner.nc.info import inspect_program
-    from planner.report.tables import info_summary, info_table
+    from planner.report.export import info_summary
+    from planner.report.tables import info_table
 
     found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE))
     if as_json:
         typer.echo(json.dumps(info_summary(found), indent=2, allow_nan=False))
     else:
         _show(info_table(found))
-    if found.faults:
+    if found.unsupported:
         raise typer.Exit(BAD_INPUT)
 
 
@@ -257,7 +282,9 @@ def machine_init(file: Annotated[Path, typer.Argument(metavar="FILE", help="file
         with file.open("x", encoding="utf-8") as stream:
             stream.write(text)
     except FileExistsError:
-        raise InputError("exists already and is not overwritten; give another name", source=str(file)) from None
+        raise InputError(
+            "exists already and is not overwritten; give another name", source=str(file)
+        ) from None
     except OSError as fault:
         raise InputError(f"cannot be written: {fault.strerror}", source=str(file)) from fault
     typer.echo(f"{file} written; plan with: planner plan JOB -m {file}")
@@ -292,7 +319,11 @@ class _Progress:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self._bar = Progress(
-            TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
         )
         self._task = self._bar.add_task("", total=1.0)
         self._bar.start()

@@ -3,19 +3,22 @@
 The files are first written into a hidden directory beside the output directory and forced to disk. Then
 
 * a directory that does not exist yet is made by one rename;
-* an existing one is *exchanged* with the new one by one system call (Linux `renameat2`, RENAME_EXCHANGE). Whatever else it
-  holds is hard-linked into the new directory before, so that files that are not ours stay as they are.
+* an existing one is *exchanged* with the new one by one system call (Linux `renameat2`, RENAME_EXCHANGE).
+  Whatever else it holds is hard-linked into the new directory before, so that files that are not ours stay as
+  they are.
 
-Either way one atomic step separates "all old" from "all new", and files of the old set that the new one lacks (another format,
-no pictures) go in the same step.
+Either way one atomic step separates "all old" from "all new", and files of the old set that the new one
+lacks (another format, no pictures) go in the same step.
 
-Some directories cannot be exchanged: mount points, the current directory (the shell in it would be left in a deleted one),
-directories that hold directories (which cannot be hard-linked), systems other than Linux. There the files are renamed into place
-one by one, `summary.json` last. Each file is then still old or new as a whole; a kill in the fraction of a millisecond between
-two renames leaves files of two runs, whose `run_id` differ.
+Some directories cannot be exchanged: mount points, the current directory (the shell in it would be left in a
+deleted one), directories that hold directories (which cannot be hard-linked), systems other than Linux. There
+the files are renamed into place one by one, `summary.json` last. Each file is then still old or new as a
+whole; a kill in the fraction of a millisecond between two renames leaves files of two runs, whose `run_id`
+differ.
 
-A killed run leaves its hidden directory behind; the next run with the same output directory removes it. A file lock, which
-the kernel releases with the process, tells it from the directory of a run that is still at work.
+A killed run leaves its hidden directory behind; the next run with the same output directory removes it. A
+file lock, which the kernel releases with the process, tells it from the directory of a run that is still at
+work.
 """
 
 from __future__ import annotations
@@ -39,7 +42,8 @@ _AT_FDCWD = -100  # fcntl.h
 
 @contextlib.contextmanager
 def replacing(directory: Path, previous: Collection[str] = ()) -> Iterator[Path]:
-    """Give an empty directory to write files into; when the block ends well, they take their place in `directory`.
+    """Give an empty directory to write into; when the block ends well, its files take their place in
+    `directory`.
 
     previous : names of files of an earlier set in `directory`, to vanish where the new set lacks them
 
@@ -50,7 +54,9 @@ def replacing(directory: Path, previous: Collection[str] = ()) -> Iterator[Path]
     if directory.exists() and not directory.is_dir():
         raise NotADirectoryError(20, "is a file, not a directory", str(directory))
     exchangeable = _exchangeable(directory)
-    place, prefix = (directory.parent, f".{directory.name}.planner-") if exchangeable else (directory, ".planner-")
+    place, prefix = (
+        (directory.parent, f".{directory.name}.planner-") if exchangeable else (directory, ".planner-")
+    )
     _remove_leftovers(place, prefix)
     new, lock = _make_locked(place, prefix)
     try:
@@ -77,7 +83,7 @@ def _exchangeable(directory: Path) -> bool:
 
 
 def _take_place(new: Path, directory: Path, previous: Collection[str]) -> bool:
-    """Put directory `new` in the place of `directory` in one step; False if the system cannot, with nothing changed."""
+    """Put `new` in the place of `directory` in one step; False, and nothing changed, if that fails."""
     ours = {*previous, *os.listdir(new)}
     try:
         if not directory.exists():
@@ -122,7 +128,7 @@ def _exchange(a: Path, b: Path) -> None:
 
 
 def _make_locked(place: Path, prefix: str) -> tuple[Path, int | None]:
-    """Make a directory under a fresh name and lock it; another run may take it for a leftover in between: again then."""
+    """Make and lock a new directory; once more if another run took it for a leftover in between."""
     while True:
         new = place / f"{prefix}{uuid.uuid4().hex[:12]}"
         new.mkdir(parents=True)

@@ -14,6 +14,7 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
+    from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
     from planner.plan import Plan
     from planner.verify import Verdict
@@ -22,32 +23,37 @@ CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them tog
 FAULTS_SHOWN = 8
 
 
-def plan_table(plan: Plan) -> Table:
+def plan_table(plan: Plan) -> Group:
     """The plan in a dozen lines: times, worst ratio per limit, errors, corners, time per stage."""
     corner = f" on {plan.corner} corners" if plan.corner else ""
-    table = _pairs(f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}")
+    title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
+    table = _pairs()
     if plan.trajectory is not None:
         time = plan.trajectory.cycle_time
         table.add_row("cycle time", f"{time:.4f} s{_hours(time)}")
         if plan.method != "stop" and np.isfinite(plan.stop_time):
             table.add_row(
-                "stopping at every block", f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long"
+                "stopping at every block",
+                f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long",
             )
     if plan.verdict is not None:
         _add_verdict(table, plan.verdict)
     if plan.corners is not None and len(plan.corners.theta):
-        table.add_row("corners", f"{len(plan.corners.theta):,}; fastest {_ratio(plan.corners.worst_ratio())} of eq. 19-20")
+        table.add_row(
+            "corners",
+            f"{len(plan.corners.theta):,}; fastest {_ratio(plan.corners.worst_ratio())} of eq. 19-20",
+        )
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
-    return table
+    return _titled(title, table)
 
 
-def verdict_table(verdict: Verdict, title: str) -> Table:
+def verdict_table(verdict: Verdict, title: str) -> Group:
     """A verdict by itself."""
-    table = _pairs(title)
+    table = _pairs()
     _add_verdict(table, verdict)
-    return table
+    return _titled(title, table)
 
 
 def corner_table(plan: Plan) -> Table | None:
@@ -59,7 +65,16 @@ def corner_table(plan: Plan) -> Table | None:
     worst = np.argsort(-ratio, kind="stable")[:CORNERS_SHOWN]
     shown = f"the {len(worst)} fastest of " if len(worst) < len(ratio) else ""
     table = Table(title=f"{shown}{len(ratio):,} corners", title_justify="left", box=None, pad_edge=False)
-    for name in ("line", "theta\ndeg", "d in\nmm", "d out\nmm", "eps_ap\nµm", "kappa\n1/mm", "eq. 19-20\nmm/s", "planned\nmm/s"):
+    for name in (
+        "line",
+        "theta\ndeg",
+        "d in\nmm",
+        "d out\nmm",
+        "eps_ap\nµm",
+        "kappa\n1/mm",
+        "eq. 19-20\nmm/s",
+        "planned\nmm/s",
+    ):
         table.add_column(name, justify="right")
     table.add_column("limited by")
     for k in sorted(worst):
@@ -77,10 +92,65 @@ def corner_table(plan: Plan) -> Table | None:
     return table
 
 
+def info_table(info: ProgramInfo) -> Group:
+    """What a program holds, then what the reader assumed and every construct that is not supported."""
+    blocks = sum(info.blocks.values())
+    title = f"{info.source}: {info.lines:,} lines, {blocks:,} blocks"
+    table = _pairs()
+    table.add_row("blocks", _counts(info.blocks))
+    if info.full_circles or info.helices:
+        table.add_row(
+            "arcs among them", _counts({"full circles": info.full_circles, "helices": info.helices})
+        )
+    ends = zip("xyz", info.extent_min, info.extent_max, strict=False)
+    table.add_row("extent [mm]", ", ".join(f"{axis} {low:.3f} to {high:.3f}" for axis, low, high in ends))
+    table.add_row(
+        "length [mm]", ", ".join(f"{kind} {length:,.3f}" for kind, length in info.length.items() if length)
+    )
+    if np.isfinite(info.feed[0]):
+        low, high = (feed * SECONDS_PER_MINUTE for feed in info.feed)
+        table.add_row("feed [mm/min]", f"{low:g} to {high:g}, {info.feed_changes:,} changes")
+        least, _, median, _, largest = info.segment_length
+        table.add_row("feed moves [mm]", f"{least:.4g} to {largest:.4g} long, median {median:.4g}")
+    turns = ", ".join(f"{count:,} over {angle:g}°" for angle, count in info.corners.items() if count)
+    table.add_row("corners", turns or "none")
+    if info.zero_moves:
+        table.add_row("moves that go nowhere", f"{info.zero_moves:,}")
+    if info.dwell:
+        table.add_row("dwells", f"{info.dwell:g} s")
+    if info.tools:
+        table.add_row("tools", ", ".join(f"T{tool}" for tool in info.tools))
+    if info.events:
+        table.add_row("other words", _counts(info.events))
+    notes = [Text(f"note: {note}") for note in info.notes]
+    if not info.unsupported:
+        return _titled(title, table, *notes, Text("every construct is supported", style="green"))
+    return _titled(title, table, *notes, *_unsupported(info.unsupported))
+
+
+def _unsupported(faults: Sequence[Fault]) -> list[Text]:
+    """Every place of every fault, gathered by message: 10,000 expressions give one message, not 10,000."""
+    places: dict[str, list[str]] = {}
+    for fault in faults:
+        places.setdefault(fault.message, []).append(f"{fault.line}:{fault.column} {fault.word}")
+    said = [Text(f"not supported, {len(faults):,} places (line:column word):", style="bold red")]
+    for message, where in places.items():
+        said += [Text(f"{message} ({len(where):,})"), Text("    " + ", ".join(where), style="dim")]
+    return said
+
+
 def machines_table(machines: Iterable[Machine]) -> Table:
     """Built-in machines and their main limits, axis by axis."""
     table = Table(box=None, pad_edge=False)
-    for name in ("machine", "dt\nms", "tolerance\nmm", "axes", "velocity\nmm/s", "acceleration\nmm/s²", "jerk\nm/s³"):
+    for name in (
+        "machine",
+        "dt\nms",
+        "tolerance\nmm",
+        "axes",
+        "velocity\nmm/s",
+        "acceleration\nmm/s²",
+        "jerk\nm/s³",
+    ):
         table.add_column(name, justify="left" if name in ("machine", "axes") else "right")
     for machine in machines:
         axes = [machine.axes[letter] for letter in machine.axes if letter in LINEAR_AXES]
@@ -137,13 +207,22 @@ def _hours(seconds: float) -> str:
     return f" ({hours} h {minutes} min {rest:.0f} s)" if hours else f" ({minutes} min {rest:.0f} s)"
 
 
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count:,} {name}" for name, count in counts.items() if count) or "none"
+
+
 def _first(items: Sequence[str], count: int) -> list[str]:
     more = len(items) - count
     return [*items[:count], *([f"and {more} more"] if more > 0 else [])]
 
 
-def _pairs(title: str) -> Table:
-    table = Table(title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False)
+def _pairs() -> Table:
+    table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     return table
+
+
+def _titled(title: str, *parts: RenderableType) -> Group:
+    # not the table's own title, which is folded to the table's width
+    return Group(Text(title, style="bold"), *parts)

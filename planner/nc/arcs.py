@@ -1,0 +1,134 @@
+"""Centre and sweep of an arc from I J K or R, with the tolerances of RS274NGC as LinuxCNC applies them.
+
+In the plane of the arc, with start p0, end p1 and centre c, r0 = |p0 - c| and r1 = |p1 - c| should be equal;
+programs round. The arc is refused where
+
+    |r0 - r1| > 100 T      or      |r0 - r1| > T  and  |r0 - r1| > 0.001 max(r0, r1),      T = CLOSURE
+
+and where a radius is below RADIUS_MIN. With R the centre lies on the perpendicular bisector of the chord of
+half length h, at sqrt(R^2 - h^2) from it; R > 0 means at most half a turn, R < 0 more. h may exceed |R| by
+RADIUS_MIN (a rounded half circle), and where h and R agree to HALF_CIRCLE the centre is the chord's middle:
+the square root would turn a rounding of 1e-13 into 4e-7.
+
+The sweep is the angle from p0 to p1 in the arc's direction, in (FULL_TURN, 2 pi + FULL_TURN]: closer than
+FULL_TURN the arc is read as a full turn. P adds P - 1 turns. Planes are right-handed: (x, y) about z, (z, x)
+about y, (y, z) about x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from planner.arrays import FloatArray
+from planner.units import MM_PER_INCH
+
+AXES = "xyz"
+IN_PLANE = {2: (0, 1), 1: (2, 0), 0: (1, 2)}  # the plane's axes by its normal, right-handed
+
+# By programmed unit [mm]; LinuxCNC's own numbers, sqrt(2) * 0.02 mm and sqrt(2) * 0.002 inch, found again by
+# bisection on it.
+CLOSURE = {1.0: 0.02 * math.sqrt(2.0), MM_PER_INCH: 0.002 * math.sqrt(2.0) * MM_PER_INCH}
+RADIUS_MIN = {1.0: 0.00127, MM_PER_INCH: 0.00005 * MM_PER_INCH}
+CLOSURE_RELATIVE = 1e-3
+HALF_CIRCLE = 1e-12  # relative
+FULL_TURN = 1e-6  # [rad]
+
+
+class ArcError(ValueError):
+    """The arc's words contradict each other; the text says how, in mm."""
+
+
+@dataclass(frozen=True)
+class Arc:
+    """centre : (3,), its axial coordinate the start's [mm]; sweep [rad], positive counter-clockwise about the
+    normal."""
+
+    centre: FloatArray
+    sweep: float
+
+
+def arc_from_centre(
+    start: FloatArray,
+    end: FloatArray,
+    centre: FloatArray,
+    *,
+    normal: int,
+    clockwise: bool,
+    turns: int,
+    unit: float,
+) -> Arc:
+    """The arc about a given centre. Raises ArcError if start and end are not on one circle."""
+    fault = _not_closed(start, end, centre, normal, unit)
+    if fault:
+        raise ArcError(fault)
+    return Arc(centre, _sweep(start, end, centre, normal, clockwise, turns))
+
+
+def arc_from_radius(
+    start: FloatArray,
+    end: FloatArray,
+    radius: float,
+    *,
+    normal: int,
+    clockwise: bool,
+    turns: int,
+    unit: float,
+) -> Arc:
+    """The arc of a given radius [mm], more than half a turn if it is negative. Raises ArcError if there is
+    none."""
+    a, b = IN_PLANE[normal]
+    da, db = end[a] - start[a], end[b] - start[b]
+    half, size = math.hypot(da, db) / 2.0, abs(radius)
+    if half == 0.0:
+        raise ArcError("an arc with R must not end where it starts; write a full circle with I J K")
+    if half - size > RADIUS_MIN[unit] or size == 0.0:
+        raise ArcError(
+            f"radius {size:.6g} mm does not reach the end point, which is {2 * half:.6g} mm away; at least "
+            f"{half:.6g} mm is needed (rounding of {RADIUS_MIN[unit]:.3g} mm allowed)"
+        )
+    height = math.sqrt((size - half) * (size + half)) if half < size * (1.0 - HALF_CIRCLE) else 0.0
+    # left of the chord for a counter-clockwise arc of less than half a turn
+    left = height if clockwise == (radius < 0) else -height
+    centre = start.copy()
+    centre[a] = (start[a] + end[a]) / 2.0 - left * db / (2.0 * half)
+    centre[b] = (start[b] + end[b]) / 2.0 + left * da / (2.0 * half)
+    return Arc(centre, _sweep(start, end, centre, normal, clockwise, turns))
+
+
+def closes(start: FloatArray, end: FloatArray, centre: FloatArray, *, normal: int, unit: float) -> bool:
+    """Whether start and end lie on one circle about the centre."""
+    return _not_closed(start, end, centre, normal, unit) is None
+
+
+def _not_closed(
+    start: FloatArray, end: FloatArray, centre: FloatArray, normal: int, unit: float
+) -> str | None:
+    a, b = IN_PLANE[normal]
+    r0 = math.hypot(start[a] - centre[a], start[b] - centre[b])
+    r1 = math.hypot(end[a] - centre[a], end[b] - centre[b])
+    if r0 < RADIUS_MIN[unit] or r1 < RADIUS_MIN[unit]:
+        return f"the arc has radius {r0:.6g} mm at its start and {r1:.6g} mm at its end; at least {RADIUS_MIN[unit]:.3g} mm"
+    gap, closure = abs(r0 - r1), CLOSURE[unit]
+    allowed = min(100.0 * closure, max(closure, CLOSURE_RELATIVE * max(r0, r1)))
+    if gap <= allowed:
+        return None
+    return (
+        f"the arc has radius {r0:.6g} mm at its start and {r1:.6g} mm at its end: {gap:.6g} mm apart, allowed are "
+        f"{allowed:.6g} mm (centre at {AXES[a]} {centre[a]:.6g}, {AXES[b]} {centre[b]:.6g})"
+    )
+
+
+def _sweep(
+    start: FloatArray, end: FloatArray, centre: FloatArray, normal: int, clockwise: bool, turns: int
+) -> float:
+    a, b = IN_PLANE[normal]
+    ua, ub = start[a] - centre[a], start[b] - centre[b]
+    va, vb = end[a] - centre[a], end[b] - centre[b]
+    angle = math.atan2(ua * vb - ub * va, ua * va + ub * vb)
+    if clockwise:
+        angle = -angle
+    if angle < FULL_TURN:
+        angle += 2.0 * math.pi
+    angle += 2.0 * math.pi * (turns - 1)
+    return -angle if clockwise else angle

@@ -1,0 +1,196 @@
+"""What a program holds: counts, extents, lengths, feeds, corners, and every construct that is not supported.
+
+Inspecting never stops at the first fault: what can be read is read, so for a program with faults the figures
+describe only that. A corner is the turn between the end of one feed move and the start of the next, at the
+tangents; moves that go nowhere are passed over, and a rapid, dwell or stop between two moves separates them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.machine import Machine
+from planner.nc.arcs import IN_PLANE
+from planner.nc.events import plain
+from planner.nc.faults import Fault
+from planner.nc.program import Kind, Program
+from planner.nc.reader import interpret, load
+
+CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
+LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
+_NOWHERE = 1e-9  # a move shorter than this turns no corner [mm]: the rounding of coordinates around 1e3 mm
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ProgramInfo:
+    """Lengths [mm], times [s], feeds [mm/s]; NaN where there is nothing to measure.
+
+    source           : file name
+    lines            : source lines
+    blocks           : number of blocks by `Kind` name, in lower case
+    full_circles     : arcs of a full turn and more;  helices : arcs that rise along their axis
+    events           : number of events by letter or code ("S", "T", "M3" ...)
+    extent_min, _max : (3,) box around the start and all motion, arcs included [mm]
+    length           : path length by kind "rapid", "line", "arc" [mm]
+    feed             : (least, largest) programmed feed [mm/s]
+    feed_changes     : number of feed moves whose feed differs from the one before
+    segment_length   : quantiles LENGTH_QUANTILES of the feed moves' lengths [mm]
+    corners          : number of corners that turn by more than each of CORNER_DEGREES
+    zero_moves       : moves that end where they start
+    dwell            : sum of all dwells [s]
+    tools            : tool numbers in the order of their T words
+    notes            : what the reader assumed
+    unsupported      : every construct that is not supported or not valid
+    """
+
+    source: str
+    lines: int
+    blocks: dict[str, int]
+    full_circles: int
+    helices: int
+    events: dict[str, int]
+    extent_min: FloatArray
+    extent_max: FloatArray
+    length: dict[str, float]
+    feed: tuple[float, float]
+    feed_changes: int
+    segment_length: tuple[float, ...]
+    corners: dict[float, int]
+    zero_moves: int
+    dwell: float
+    tools: tuple[int, ...]
+    notes: tuple[str, ...]
+    unsupported: tuple[Fault, ...]
+
+
+def inspect_program(
+    path: str | Path, machine: Machine | None = None, *, block_delete: bool = True
+) -> ProgramInfo:
+    """Read a program as far as it can be read and describe it.
+
+    Raises InputError only if the file cannot be read, is empty or is not a text.
+    """
+    data = load(path)
+    interpreter, faults = interpret(data, machine, source=str(path), block_delete=block_delete)
+    return describe(interpreter.program(), lines=len(data.splitlines()), unsupported=tuple(faults))
+
+
+def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = ()) -> ProgramInfo:
+    """The figures of a program that has been read."""
+    start = np.vstack([program.start, program.end])[:-1]
+    length = _lengths(program, start)
+    is_feed = np.isin(program.kind, (Kind.LINE, Kind.ARC))
+    feed = program.feed[is_feed]
+    low, high = _extents(program, start)
+    return ProgramInfo(
+        source=program.source,
+        lines=lines,
+        blocks={kind.name.lower(): int((program.kind == kind).sum()) for kind in Kind},
+        full_circles=int((np.abs(program.arc_sweep) >= 2 * np.pi - 1e-9).sum()),
+        helices=int((np.abs(_rise(program, start)) > _NOWHERE).sum()),
+        events=_count_events(program),
+        extent_min=low,
+        extent_max=high,
+        length={
+            kind.name.lower(): float(length[program.kind == kind].sum())
+            for kind in (Kind.RAPID, Kind.LINE, Kind.ARC)
+        },
+        feed=(float(feed.min()), float(feed.max())) if len(feed) else (np.nan, np.nan),
+        feed_changes=int((np.diff(feed) != 0).sum()),
+        segment_length=tuple(
+            float(q) for q in (np.quantile(length[is_feed], LENGTH_QUANTILES) if len(feed) else [np.nan] * 5)
+        ),
+        corners=_corners(program, start, length, is_feed),
+        zero_moves=int(((length <= _NOWHERE) & (program.kind <= Kind.ARC)).sum()),
+        dwell=float(program.dwell.sum()),
+        tools=tuple(int(event.text[1:]) for event in program.events if event.text[0] == "T"),
+        notes=program.notes,
+        unsupported=unsupported,
+    )
+
+
+def _rise(program: Program, start: FloatArray) -> FloatArray:
+    """(K,) travel along the arc's axis [mm]."""
+    k, n = program.arc_block, program.arc_normal
+    return program.end[k, n] - start[k, n]
+
+
+def _lengths(program: Program, start: FloatArray) -> FloatArray:
+    """(B,) path length of every block [mm]; an arc whose radii differ counts with their mean."""
+    length = np.linalg.norm(program.end - start, axis=1)
+    from_start, from_end = _spokes(program, start)
+    radius = (np.hypot(*from_start) + np.hypot(*from_end)) / 2.0
+    length[program.arc_block] = np.hypot(radius * program.arc_sweep, _rise(program, start))
+    return length
+
+
+def _spokes(program: Program, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(2, K) vectors from the centre to the start and to the end of each arc, in its plane."""
+    k = program.arc_block
+    rows = np.arange(len(k))
+    axes = _plane_axes(program)
+    centre = program.arc_center[rows, axes]
+    return start[k, axes] - centre, program.end[k, axes] - centre
+
+
+def _plane_axes(program: Program) -> Array:
+    """(2, K) the two axes of each arc's plane, right-handed."""
+    return np.array([IN_PLANE[n] for n in range(3)])[program.arc_normal].T.reshape(2, -1)
+
+
+def _extents(program: Program, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The box around all motion. An arc reaches centre + radius along an axis where its sweep passes that
+    direction."""
+    points = np.vstack([program.start, program.end])
+    low, high = points.min(axis=0), points.max(axis=0)
+    (ua, ub), to_end = _spokes(program, start)
+    radius = np.maximum(np.hypot(ua, ub), np.hypot(*to_end))
+    axes, rows = _plane_axes(program), np.arange(len(radius))
+    for quarter in range(4):
+        turn = (quarter * np.pi / 2 - np.arctan2(ub, ua)) * np.sign(program.arc_sweep)
+        passed = turn % (2 * np.pi) <= np.abs(program.arc_sweep)
+        axis, side = axes[quarter % 2], 1.0 if quarter < 2 else -1.0
+        reach = program.arc_center[rows, axis] + side * radius
+        bound, extreme = (np.maximum, high) if quarter < 2 else (np.minimum, low)
+        bound.at(extreme, axis[passed], reach[passed])
+    return low, high
+
+
+def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: Array) -> dict[float, int]:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        leaving = (program.end - start) / length[:, None]
+    arriving = leaving.copy()
+    k, rows, axes, n = (
+        program.arc_block,
+        np.arange(len(program.arc_block)),
+        _plane_axes(program),
+        program.arc_normal,
+    )
+    for spoke, tangent in zip(_spokes(program, start), (leaving, arriving), strict=True):
+        size = np.maximum(length[k], _NOWHERE)
+        tangent[k, axes[0]] = -spoke[1] * program.arc_sweep / size
+        tangent[k, axes[1]] = spoke[0] * program.arc_sweep / size
+        tangent[k, n] = _rise(program, start)[rows] / size
+    parts = (length > _NOWHERE) | (program.kind > Kind.ARC)  # what joins or separates
+    leaving, arriving, is_feed = leaving[parts], arriving[parts], is_feed[parts]
+    joint = is_feed[:-1] & is_feed[1:]
+    before, after = arriving[:-1][joint], leaving[1:][joint]
+    # atan2 of the half angle's sine and cosine: exact at 0 and at 180 degrees, and lengths cancel
+    theta = 2.0 * np.arctan2(np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1))
+    return {limit: int((np.rad2deg(theta) > limit).sum()) for limit in CORNER_DEGREES}
+
+
+def _count_events(program: Program) -> dict[str, int]:
+    """Events by letter (S, T) or code (M3, G97), without making an object of each."""
+    table = program.events
+    pairs = np.column_stack([table.letter, table.value]) if hasattr(table, "letter") else np.empty((0, 2))
+    counts: dict[str, int] = {}
+    for (letter, value), count in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
+        name = chr(int(letter))
+        name += plain(float(value)) if name in "GM" else ""
+        counts[name] = counts.get(name, 0) + int(count)
+    return counts

@@ -1,0 +1,242 @@
+"""From bytes to words, as RS274NGC splits a program: a letter and a number, spaces without meaning.
+
+    line    = [/] word* [comments]        word = letter number        number = [+|-] digits [. digits]
+    comment = ( anything but a parenthesis )   or   ; to the end of the line
+
+A word takes 13 bytes: letter, value and place in the source. Columns and texts come from the source when a message needs them.
+What cannot be read becomes a word too, with the letter `FAULT` and a code as its value, and the rest of its line is left out:
+nothing disappears silently, and the lines after it are still read.
+
+Numbers are rounded correctly, so a coordinate is the same double as float(text): the digits form an integer below 2^53 and the
+point a power of ten up to 1e22, both exact, and one division of exact numbers rounds once. Longer numbers are marked NaN by the
+compiled loop and read by Python.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numba import njit
+
+from planner.arrays import Array, FloatArray
+
+# The longest source line [bytes]. RS274NGC stops at 255; programs with long comments exist, a line beyond this is not a program's.
+LINE_MAX = 4096
+FAULT = 0
+
+
+class Unreadable(IntEnum):
+    """The codes of words with the letter `FAULT`."""
+
+    CHARACTER = 1  # a character that starts no word
+    NUMBER = 2  # a letter without a number
+    COMMENT_OPEN = 3  # "(" without ")"
+    COMMENT_NESTED = 4  # "(" inside a comment
+    LONG = 5  # a line longer than LINE_MAX
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Words:
+    """W words on R rows; a row is a source line with at least one word.
+
+    letter : (W,) upper case letter code, b"%"[0], or `FAULT`
+    value  : (W,) number, as written (no unit applied)
+    at     : (W,) byte offset of the letter in `data`
+    line   : (R,) 1-based source line
+    first  : (R+1,) index of a row's first word; row r holds words first[r] ... first[r+1]-1
+    data   : the source
+    """
+
+    letter: Array
+    value: FloatArray
+    at: Array
+    line: Array
+    first: Array
+    data: bytes
+
+    def column(self, word: int) -> int:
+        """1-based column of a word, in characters."""
+        return len(self._line_before(word).decode("utf-8", "replace")) + 1
+
+    def text(self, word: int) -> str:
+        """The word as it is written, up to the next word, comment or end of line; one character of what is unreadable."""
+        at = int(self.at[word])
+        if self.letter[word] == FAULT and self.value[word] != Unreadable.NUMBER:
+            return self.data[at : at + 4].decode("utf-8", "replace")[:1]
+        found = _WORD.match(self.data, at)
+        return found.group().decode("ascii").strip() if found else ""
+
+    def _line_before(self, word: int) -> bytes:
+        at = int(self.at[word])
+        start = self.data.rfind(b"\n", 0, at) + 1
+        start = max(
+            start, self.data.rfind(b"\r", start, at) + 1
+        )  # not from 0: a file without "\r" would be searched each time
+        return self.data[start:at].removeprefix(_BOM)
+
+
+_BOM = b"\xef\xbb\xbf"
+_WORD = re.compile(rb"[A-Za-z%][ \t]*[-+]?[\d \t]*\.?[\d \t]*")
+
+
+def split_words(data: bytes, *, block_delete: bool) -> Words:
+    """Split a program into words; with `block_delete` lines that start with "/" are left out."""
+    source = np.frombuffer(data, dtype=np.uint8)
+    capacity, lines = _count(source)
+    letter = np.empty(capacity, dtype=np.uint8)
+    value = np.empty(capacity)
+    at = np.empty(capacity, dtype=np.int64 if len(data) > np.iinfo(np.int32).max else np.int32)
+    line = np.empty(lines, dtype=np.int32)
+    first = np.empty(lines + 1, dtype=np.int64)
+    start = len(_BOM) if data.startswith(_BOM) else 0
+    words, rows = _split(source, start, block_delete, letter, value, at, line, first)
+    value = value[:words]
+    for word in np.flatnonzero(np.isnan(value)):
+        found = _WORD.match(data, at[word])
+        assert found is not None
+        value[word] = float(re.sub(rb"[ \t]", b"", found.group()[1:]))
+    return Words(
+        letter=letter[:words],
+        value=value,
+        at=at[:words],
+        line=line[:rows],
+        first=first[: rows + 1],
+        data=data,
+    )
+
+
+_NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
+_OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
+_LETTER_O = 79
+_CHARACTER, _NUMBER, _COMMENT_OPEN, _COMMENT_NESTED, _LONG = (int(code) for code in Unreadable)
+_POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
+_MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
+
+
+@njit(cache=True)
+def _count(source):  # pragma: no cover - compiled
+    """Upper bounds of the number of words and of lines."""
+    letters, lines = 0, 1
+    for c in source:
+        if 97 <= c <= 122 or 65 <= c <= 90 or c == _PERCENT:
+            letters += 1
+        elif c == _NEWLINE or c == _RETURN:
+            lines += 1
+    return letters + lines, lines  # a line has at most one word that is not a letter's: its fault
+
+
+@njit(cache=True)
+def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: no cover - compiled
+    end = len(source)
+    words, rows, line_number = 0, 0, 0
+    while i < end:
+        line_number += 1
+        line_start, row_first, blank, reading = i, words, True, True
+        while i < end and source[i] != _NEWLINE and source[i] != _RETURN:
+            c = source[i]
+            if not reading or c == _SPACE or c == _TAB or c == _DOS_END:
+                i += 1
+                continue
+            if c == _SLASH and blank:
+                reading = not block_delete
+                blank = False
+                i += 1
+                continue
+            blank = False
+            if c == _SEMICOLON:
+                reading = False
+                continue
+            if c == _OPEN:
+                fault, close = _COMMENT_OPEN, i + 1
+                while close < end and source[close] != _NEWLINE and source[close] != _RETURN:
+                    if source[close] == _CLOSE:
+                        fault = 0
+                        break
+                    if source[close] == _OPEN:
+                        fault = _COMMENT_NESTED
+                        break
+                    close += 1
+                if fault == 0:
+                    i = close + 1
+                    continue
+                if fault == _COMMENT_NESTED:
+                    i = close
+                letter[words], value[words], at[words] = FAULT, fault, i
+                words += 1
+                reading = False
+                continue
+            if 97 <= c <= 122:
+                c -= 32
+            if c == _PERCENT:
+                letter[words], value[words], at[words] = c, 0.0, i
+                words += 1
+                i += 1
+                continue
+            if not 65 <= c <= 90:
+                letter[words], value[words], at[words] = FAULT, _CHARACTER, i
+                words += 1
+                reading = False
+                continue
+
+            if c == _LETTER_O:  # names and expressions may follow: the line cannot be split into words
+                letter[words], value[words], at[words] = c, 0.0, i
+                words += 1
+                reading = False
+                continue
+
+            # a letter: its number follows, perhaps with spaces inside
+            place, negative, signed, mantissa, digits, decimals, point, exact = (
+                i,
+                False,
+                False,
+                0,
+                0,
+                0,
+                False,
+                True,
+            )
+            i += 1
+            while i < end:
+                d = source[i]
+                if 48 <= d <= 57:
+                    if mantissa > _MANTISSA_MAX:
+                        exact = False
+                    else:
+                        mantissa = mantissa * 10 + (d - _ZERO)
+                    digits += 1
+                    if point:
+                        decimals += 1
+                elif d == _POINT and not point:
+                    point = True
+                elif (d == _PLUS or d == _MINUS) and not (signed or point or digits):
+                    signed = True
+                    negative = d == _MINUS
+                elif d != _SPACE and d != _TAB:
+                    break
+                i += 1
+            at[words] = place
+            if digits == 0:
+                letter[words], value[words] = FAULT, _NUMBER
+                reading = False
+            else:
+                letter[words] = c
+                if exact and decimals <= 22:
+                    number = mantissa / _POWERS_OF_TEN[decimals]
+                    value[words] = -number if negative else number
+                else:
+                    value[words] = np.nan
+            words += 1
+        if i - line_start > LINE_MAX:
+            words = row_first
+            letter[words], value[words], at[words] = FAULT, _LONG, line_start
+            words += 1
+        if words > row_first:
+            line[rows], first[rows] = line_number, row_first
+            rows += 1
+        if i < end:
+            i += 2 if source[i] == _RETURN and i + 1 < end and source[i + 1] == _NEWLINE else 1
+    first[rows] = words
+    return words, rows

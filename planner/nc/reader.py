@@ -1,0 +1,76 @@
+"""Reading an NC program: text to `Program`, or an `InputError` that names file, line, column, the word and what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from planner.errors import InputError
+from planner.machine import Machine
+from planner.nc.dialects import recognise
+from planner.nc.faults import Fault, require_none
+from planner.nc.interpreter import Interpreter
+from planner.nc.lexer import split_words
+from planner.nc.program import Program
+
+
+def read_program(path: str | Path, machine: Machine | None = None, *, block_delete: bool = True) -> Program:
+    """Read an NC program from a file.
+
+    machine      : gives tool lengths, G28/G30 positions, work offsets and the first path control; None for zeros and blending
+    block_delete : leave out the lines that start with "/"
+
+    Raises InputError for a file that cannot be read and for the first construct that is not supported or not valid.
+    """
+    return parse_program(load(path), machine, source=str(path), block_delete=block_delete)
+
+
+def parse_program(
+    text: bytes | str, machine: Machine | None = None, *, source: str = "<text>", block_delete: bool = True
+) -> Program:
+    """Read an NC program given as text; like `read_program`."""
+    interpreter, faults = interpret(text, machine, source=source, block_delete=block_delete)
+    require_none(faults, source)
+    return interpreter.program()
+
+
+def interpret(
+    text: bytes | str, machine: Machine | None, *, source: str, block_delete: bool
+) -> tuple[Interpreter, list[Fault]]:
+    """Run a program to its end past everything that is not supported; the faults in the order of the lines.
+
+    A program in another language is one fault, and none of it is run. Raises InputError for an empty or binary text.
+    """
+    data = text.encode("utf-8", "replace") if isinstance(text, str) else text
+    _check_text(data, source)
+    foreign = recognise(data)
+    words = split_words(b"" if foreign else data, block_delete=block_delete)
+    if not foreign and not len(words.line):
+        raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
+    interpreter = Interpreter(words, machine, source)
+    interpreter.run()
+    return interpreter, [foreign] if foreign else interpreter.faults
+
+
+def load(path: str | Path) -> bytes:
+    """The bytes of a program file. Raises InputError if there is no such file or it cannot be read."""
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError as fault:
+        raise InputError("program file not found", source=str(path)) from fault
+    except IsADirectoryError as fault:
+        raise InputError("this is a directory; give the program file", source=str(path)) from fault
+    except (OSError, ValueError) as fault:
+        raise InputError(f"program file cannot be read: {fault}", source=str(path)) from fault
+
+
+def _check_text(data: bytes, source: str) -> None:
+    nul = data.find(b"\0")
+    if nul >= 0:
+        line = data.count(b"\n", 0, nul) + 1
+        column = nul - data.rfind(b"\n", 0, nul)
+        what = (
+            "UTF-16 text; save it as UTF-8"
+            if data[:2] in (b"\xff\xfe", b"\xfe\xff")
+            else "a binary file; give a text file"
+        )
+        raise InputError(f"NUL byte found: this looks like {what}", source=source, line=line, column=column)

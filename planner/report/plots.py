@@ -1,7 +1,7 @@
 """Pictures of a plan: the tool path coloured by feed, and the profiles over time against their limits.
 
-Made for paper: vector-like line widths at 200 dpi, units on every axis, colours that colour-blind readers tell
-apart (viridis; Okabe and Ito, "Color universal design", 2008). A job of an hour has millions of samples and a
+Made for paper: fine lines at 200 dpi, units on every axis, colours that colour-blind readers tell apart
+(viridis; Okabe and Ito, "Color universal design", 2008). A job of an hour has millions of samples and a
 picture some 1500 columns: the tool path keeps one point per pixel it passes, a profile the least and the
 largest value of each column, so that no peak is lost.
 """
@@ -30,11 +30,13 @@ if TYPE_CHECKING:
 COLUMNS = 1500  # about the width of a profile in pixels
 PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are no more
+FAR = 4.0  # peaks beyond this multiple of the limit are drawn on a scale that is logarithmic beyond the limit
 FLAT = 0.12  # third extent over the largest below which a path is shown from the side it is thinnest on
 BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8c8c8c"
 # Okabe and Ito without black (limits) and grey (others)
 BANDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442")
 OTHERS = "#d0d0d0"
+DASHED = (0, (3, 2))
 STYLE: dict[str, Any] = {
     "font.size": 8.5,
     "axes.titlesize": 9,
@@ -77,7 +79,7 @@ def toolpath_figure(plan: Plan) -> Figure:
     keep = _one_per_pixel(motion[:, shown])
     points, feed = motion[keep][:, shown], trajectory.feed[keep]
     rapid = plan.program.kind[trajectory.block[keep]] == Kind.RAPID
-    figure = Figure(figsize=(6.3, 5.2))
+    figure = Figure(figsize=(6.3, 5.2), layout="constrained" if view is not None else None)
     axes = figure.add_subplot(projection=None if view is not None else "3d")
     ends = np.stack([points[:-1], points[1:]], axis=1)
     moving = ~rapid[1:] & ~rapid[:-1]
@@ -86,14 +88,14 @@ def toolpath_figure(plan: Plan) -> Figure:
     grey: Any = {"color": "#b5b5b5", "linewidth": 0.5, "zorder": 1}
     axes.plot(*programmed.T, **grey)
     if (~moving).any():
-        axes.add_collection(make(ends[~moving], colors=GREY, linewidths=0.6, linestyles=(0, (3, 2)), zorder=2))
+        axes.add_collection(make(ends[~moving], colors=GREY, linewidths=0.6, linestyles=DASHED, zorder=2))
     line = make(ends[moving], cmap="viridis", linewidths=1.5, zorder=3)
     line.set_array(0.5 * (feed[:-1] + feed[1:])[moving])
     if moving.any():
         line.set_clim(0.0, float(feed[1:][moving].max()))
     axes.add_collection(line)
-    start: Any = {"marker": "o", "markersize": 5, "markerfacecolor": "white", "zorder": 5}
-    end: Any = {"marker": "s", "markersize": 4.5, "markerfacecolor": "black", "zorder": 5}
+    start: Any = {"marker": "o", "markersize": 7, "markerfacecolor": "white", "zorder": 5}
+    end: Any = {"marker": "s", "markersize": 4, "markerfacecolor": "black", "zorder": 5}
     axes.plot(*points[:1].T, color="black", linestyle="", **start)
     axes.plot(*points[-1:].T, color="black", linestyle="", **end)
     handles = [
@@ -102,15 +104,16 @@ def toolpath_figure(plan: Plan) -> Figure:
         Line2D([], [], color="#b5b5b5", linewidth=0.8, label="programmed"),
     ]
     if (~moving).any():
-        handles.append(Line2D([], [], color=GREY, linewidth=0.8, linestyle=(0, (3, 2)), label="rapid"))
+        handles.append(Line2D([], [], color=GREY, linewidth=0.8, linestyle=DASHED, label="rapid"))
+    legend: Any = {"handles": handles, "ncols": len(handles), "columnspacing": 1.6}
     if view is not None:
         _flat_axes(axes, [names[k] for k in shown], _unseen(names, motion, shown))
+        figure.legend(loc="outside upper center", **legend)
+        bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.02)
     else:
         _solid_axes(axes, names, motion)
-    figure.legend(
-        handles=handles, loc="lower center", bbox_to_anchor=(0.45, 0.94), ncols=len(handles), columnspacing=1.6
-    )
-    bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.03 if view is not None else 0.1)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.99), **legend)
+        bar = figure.colorbar(line, ax=axes, shrink=0.62, aspect=24, pad=0.07)
     bar.set_label("feed [mm/s]")
     bar.outline.set_linewidth(0.5)  # type: ignore[operator]
     return figure
@@ -186,7 +189,7 @@ def _solid_axes(axes: Any, names: list[str], motion: FloatArray) -> None:
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_zlim(low[2], high[2])
-    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.12)
+    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.25)
     for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), names, high - low, strict=True):
         axis.set_pane_color((1, 1, 1, 0))
         axis._axinfo["grid"].update(color="#e4e4e4", linewidth=0.5)
@@ -194,18 +197,19 @@ def _solid_axes(axes: Any, names: list[str], motion: FloatArray) -> None:
             matplotlib.ticker.MaxNLocator(max(2, min(6, round(6 * size / (high - low).max()))))
         )
         axis.set_label_text(f"{name} [mm]")
+    axes.tick_params(pad=-1)
 
 
 # ------------------------------------------------------------------------------------------ profiles
 
 
 def profiles_figure(plan: Plan) -> Figure:
-    """Feed with the limiting constraint under it, then acceleration and jerk of each axis with their limits."""
+    """Feed over the limiting constraint, then acceleration and jerk of each moving axis with their limits."""
     trajectory = plan.trajectory
     assert trajectory is not None
-    axes_count = len(trajectory.axes)
+    moving = [k for k in range(len(trajectory.axes)) if np.ptp(trajectory.position[:, k]) > 0]
     band = plan.grid is not None and len(plan.grid.t) > 1
-    heights = [2.4, *([0.28] if band else []), *([1.0] * 2 * axes_count)]
+    heights = [2.4, *([0.28] if band else []), *([1.0] * 2 * len(moving))]
     figure = Figure(figsize=(6.8, 0.55 + 0.85 * sum(heights)), layout="constrained")
     figure.get_layout_engine().set(h_pad=0.03, hspace=0.02)  # type: ignore[union-attr]
     rows = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
@@ -229,7 +233,8 @@ def profiles_figure(plan: Plan) -> Figure:
     for quantity, symbol, order in (("acceleration", "a", 2), ("jerk", "j", 3)):
         values = getattr(trajectory, quantity)
         limits = plan.machine.limits(quantity, trajectory.axes)  # type: ignore[arg-type]
-        for k, axis in enumerate(trajectory.axes):
+        for k in moving:
+            axis = trajectory.axes[k]
             rotary = axis not in LINEAR_AXES
             per = 1.0 / RAD_PER_DEG if rotary else 1e-3
             panel = next(row)
@@ -250,7 +255,7 @@ def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
     programmed = plan.program.feed[np.clip(trajectory.block, 0, None)]
     finite = np.isfinite(programmed)
     if finite.any():
-        edges = np.flatnonzero(np.diff(programmed) != 0)
+        edges = np.flatnonzero(programmed[1:] != programmed[:-1])
         if len(edges) < COLUMNS:  # a feed for each block says nothing at this size
             panel.plot(
                 t, np.where(finite, programmed, np.nan), color="black", linestyle=(0, (4, 3)), linewidth=0.7
@@ -265,9 +270,10 @@ def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
 
 
 def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
-    """A strip whose colour names the limiting constraint; returns the legend's entries, the most frequent first."""
+    """A strip whose colour names the limiting constraint; returns the legend, the most frequent first."""
     grid = plan.grid
-    assert grid is not None and plan.trajectory is not None
+    assert grid is not None
+    assert plan.trajectory is not None
     t = np.asarray(grid.t, dtype=float)
     duration = np.maximum(np.diff(t), 0.0)
     active = np.asarray(grid.active)[:-1]
@@ -298,7 +304,7 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
 
 
 def _majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
-    """For each of COLUMNS columns over [0, end], the kind (of intervals t[i], t[i+1]) that fills most of it."""
+    """For each of COLUMNS columns over [0, end], the kind (of intervals from t[i]) that fills most of it."""
     cuts = np.union1d(t, np.linspace(0.0, end, COLUMNS + 1))
     middle = 0.5 * (cuts[1:] + cuts[:-1])
     of = kind[np.clip(np.searchsorted(t, middle, side="right") - 1, 0, len(kind) - 1)]
@@ -315,15 +321,21 @@ def _profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> Non
     starts = np.linspace(0, len(t), COLUMNS + 1).astype(int)[:-1]
     low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
     # each column reaches its neighbour, so that the band has no gaps where the curve is steep
-    low[1:], high[1:] = np.minimum(low[1:], values[starts[1:] - 1]), np.maximum(high[1:], values[starts[1:] - 1])
+    before = values[starts[1:] - 1]
+    low[1:], high[1:] = np.minimum(low[1:], before), np.maximum(high[1:], before)
     panel.fill_between(t[starts], low, high, color=colour, linewidth=0.5)
 
 
 def _limit_lines(panel: Axes, values: FloatArray, limit: float, note: str) -> None:
-    peak = max(float(np.abs(values).max()), 1e-9)
-    reach = 1.18 * (limit if not note else max(peak, limit))
-    if peak < 0.02 * limit:  # an axis that hardly moves: show that it is far from its limit
-        reach = 1.18 * limit
+    peak = float(np.abs(values).max())
+    far = peak > FAR * limit  # a linear scale would show the peak only
+    if far:
+        panel.set_yscale("symlog", linthresh=limit, linscale=0.8)
+        decade = 10.0 ** np.floor(np.log10(peak))
+        panel.set_yticks([-decade, -limit, 0.0, limit, decade])
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.minorticks_off()
+    reach = max(peak, limit) * ((4.0 if far else 1.45) if note else 1.18)
     panel.set_ylim(-reach, reach)
     panel.axhline(0.0, color="#cccccc", linewidth=0.5, zorder=0)
     for side in (limit, -limit):

@@ -30,12 +30,14 @@ if TYPE_CHECKING:
 COLUMNS = 1500  # about the width of a profile in pixels
 PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are no more
+DENSE = 60_000  # points from which on thick lines would hide each other
 FAR = 4.0  # peaks beyond this multiple of the limit are drawn on a scale that is logarithmic beyond the limit
 FLAT = 0.12  # third extent over the largest below which a path is shown from the side it is thinnest on
-BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8c8c8c"
+BLUE, VERMILION, GREY, LIGHT = "#0072B2", "#D55E00", "#8c8c8c", "#b5b5b5"
 # Okabe and Ito without black (limits) and grey (others)
 BANDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442")
 OTHERS = "#d0d0d0"
+SHARE_MIN = 0.005  # constraints that limit a smaller share of the time are shown together
 DASHED = (0, (3, 2))
 STYLE: dict[str, Any] = {
     "font.size": 8.5,
@@ -79,17 +81,15 @@ def toolpath_figure(plan: Plan) -> Figure:
     keep = _one_per_pixel(motion[:, shown])
     points, feed = motion[keep][:, shown], trajectory.feed[keep]
     rapid = plan.program.kind[trajectory.block[keep]] == Kind.RAPID
-    figure = Figure(figsize=(6.3, 5.2), layout="constrained" if view is not None else None)
-    axes = figure.add_subplot(projection=None if view is not None else "3d")
+    figure, axes = _canvas(np.ptp(points, axis=0), flat=view is not None)
     ends = np.stack([points[:-1], points[1:]], axis=1)
-    moving = ~rapid[1:] & ~rapid[:-1]
+    moving = ~rapid[1:]
     make = LineCollection if view is not None else Line3DCollection
-    programmed = _programmed(plan, linear)[:, shown]
-    grey: Any = {"color": "#b5b5b5", "linewidth": 0.5, "zorder": 1}
-    axes.plot(*programmed.T, **grey)
-    if (~moving).any():
-        axes.add_collection(make(ends[~moving], colors=GREY, linewidths=0.6, linestyles=DASHED, zorder=2))
-    line = make(ends[moving], cmap="viridis", linewidths=1.5, zorder=3)
+    axes.plot(*_programmed(plan, linear)[:, shown].T, color=LIGHT, linewidth=0.5, zorder=1)
+    if rapid.any():
+        broken = np.where((rapid | np.append(rapid[1:], False))[:, None], points, np.nan)
+        axes.plot(*broken.T, color=GREY, linewidth=0.6, linestyle=DASHED, zorder=2)
+    line = make(ends[moving], cmap="viridis", linewidths=1.5 if len(keep) < DENSE else 0.5, zorder=3)
     line.set_array(0.5 * (feed[:-1] + feed[1:])[moving])
     if moving.any():
         line.set_clim(0.0, float(feed[1:][moving].max()))
@@ -101,9 +101,9 @@ def toolpath_figure(plan: Plan) -> Figure:
     handles = [
         Line2D([], [], color="black", linestyle="", label="start", **start),
         Line2D([], [], color="black", linestyle="", label="end", **end),
-        Line2D([], [], color="#b5b5b5", linewidth=0.8, label="programmed"),
+        Line2D([], [], color=LIGHT, linewidth=0.8, label="programmed"),
     ]
-    if (~moving).any():
+    if rapid.any():
         handles.append(Line2D([], [], color=GREY, linewidth=0.8, linestyle=DASHED, label="rapid"))
     legend: Any = {"handles": handles, "ncols": len(handles), "columnspacing": 1.6}
     if view is not None:
@@ -112,11 +112,21 @@ def toolpath_figure(plan: Plan) -> Figure:
         bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.02)
     else:
         _solid_axes(axes, names, motion)
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.99), **legend)
-        bar = figure.colorbar(line, ax=axes, shrink=0.62, aspect=24, pad=0.07)
+        figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
+        bar = figure.colorbar(line, cax=figure.add_axes((0.98, 0.22, 0.02, 0.5)))
     bar.set_label("feed [mm/s]")
     bar.outline.set_linewidth(0.5)  # type: ignore[operator]
     return figure
+
+
+def _canvas(extent: FloatArray, *, flat: bool) -> tuple[Figure, Any]:
+    """A figure of about the path's proportions."""
+    if not flat:
+        figure = Figure(figsize=(6.6, 5.4))
+        return figure, figure.add_axes((0.0, 0.0, 0.88, 0.96), projection="3d", computed_zorder=False)
+    across, up = extent / max(float(extent.max()), 1e-9)
+    figure = Figure(figsize=(1.5 + max(5.0 * across, 2.4), 1.1 + max(5.0 * up, 2.0)), layout="constrained")
+    return figure, figure.add_subplot()
 
 
 def _flat_view(extent: FloatArray) -> list[int] | None:
@@ -189,7 +199,7 @@ def _solid_axes(axes: Any, names: list[str], motion: FloatArray) -> None:
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_zlim(low[2], high[2])
-    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.25)
+    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.08)
     for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), names, high - low, strict=True):
         axis.set_pane_color((1, 1, 1, 0))
         axis._axinfo["grid"].update(color="#e4e4e4", linewidth=0.5)
@@ -258,7 +268,12 @@ def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
         edges = np.flatnonzero(programmed[1:] != programmed[:-1])
         if len(edges) < COLUMNS:  # a feed for each block says nothing at this size
             panel.plot(
-                t, np.where(finite, programmed, np.nan), color="black", linestyle=(0, (4, 3)), linewidth=0.7
+                t,
+                np.where(finite, programmed, np.nan),
+                color="black",
+                linestyle=(0, (4, 3)),
+                linewidth=0.7,
+                zorder=1,
             )
     _profile(panel, t, trajectory.feed, BLUE)
     panel.set_ylim(0.0, 1.08 * max(float(trajectory.feed.max()), 1e-9))
@@ -279,7 +294,7 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     active = np.asarray(grid.active)[:-1]
     share = np.bincount(active, weights=duration, minlength=len(grid.active_names))
     ranked = [int(k) for k in np.argsort(-share, kind="stable") if share[k] > 0]
-    shown = ranked if len(ranked) <= len(BANDS) else ranked[: len(BANDS) - 1]
+    shown = [k for k in ranked if share[k] >= SHARE_MIN * share.sum()][: len(BANDS)]
     colour_of = np.full(len(share), len(shown))
     colour_of[shown] = np.arange(len(shown))
     winner = _majority(t, colour_of[active], len(shown) + 1, plan.trajectory.cycle_time)
@@ -298,7 +313,7 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     if len(shown) < len(ranked):
         entries.append(("others", float(sum(share[k] for k in ranked[len(shown) :])), OTHERS))
     return [
-        Patch(color=colour, label=f"{_words(name)} ({100 * time / total:.0f} %)")
+        Patch(color=colour, label=f"{_words(name)} ({_percent(time / total)})")
         for name, time, colour in entries
     ]
 
@@ -330,9 +345,10 @@ def _limit_lines(panel: Axes, values: FloatArray, limit: float, note: str) -> No
     peak = float(np.abs(values).max())
     far = peak > FAR * limit  # a linear scale would show the peak only
     if far:
-        panel.set_yscale("symlog", linthresh=limit, linscale=0.8)
+        panel.set_yscale("symlog", linthresh=limit, linscale=0.4 + 0.6 * np.log10(peak / limit))
         decade = 10.0 ** np.floor(np.log10(peak))
-        panel.set_yticks([-decade, -limit, 0.0, limit, decade])
+        named = [0.0, decade] if decade < 10.0 * limit else [0.0, limit, decade]
+        panel.set_yticks([-value for value in named[:0:-1]] + named)
         panel.yaxis.set_major_formatter("{x:g}")
         panel.minorticks_off()
     reach = max(peak, limit) * ((4.0 if far else 1.45) if note else 1.18)
@@ -358,6 +374,10 @@ def _time_unit(seconds: float) -> tuple[float, str]:
     if seconds < 0.5:
         return 1e3, "ms"
     return (1.0 / 60.0, "min") if seconds > 300.0 else (1.0, "s")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= SHARE_MIN else "< 1 %"
 
 
 def _words(name: str) -> str:

@@ -9,6 +9,12 @@ length h, fastest x and largest u that the limits allow there)
 (the second term comes from the product of two linear functions). An interval is halved until max_k e_k / a_k is below
 `RESOLUTION`; what remains is kept per interval as `margin`, and the constraints are tightened by it, so that they hold between
 grid points and not only at them. Straight stretches need one interval: there g is exactly linear.
+
+Limits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
+is convex there, so a line through two caps would cut the corner; the end with the larger curvature keeps its cap and the other
+end gets a slightly larger *effective* curvature, such that the line meets X/kappa_mid in the middle:
+
+    1/kappa_low = min(1/kappa_low, 2/kappa_mid - 1/kappa_high);     both ends kappa_mid where that is the largest.
 """
 
 from __future__ import annotations
@@ -60,6 +66,7 @@ class PathSamples:
     w0, w1    : (P,) parameter range of that interval on its element
     segment   : (P,) toolpath segment of that interval
     margin    : (P,) interpolation error of that interval, share of the acceleration limits [-]
+    kappa_left, kappa_right : (P,) effective curvature in the intervals to the left and to the right [1/mm]
     """
 
     path: SmoothPath
@@ -78,12 +85,14 @@ class PathSamples:
     w1: FloatArray
     segment: Array
     margin: FloatArray
+    kappa_left: FloatArray
+    kappa_right: FloatArray
 
     def __post_init__(self) -> None:
         points, axes = np.shape(self.position)
         freeze(self, "piece", np.int64, (None,))
         freeze(self, "stop", np.int64, (len(self.piece),))
-        for name in ("s", "w0", "w1", "margin"):
+        for name in ("s", "w0", "w1", "margin", "kappa_left", "kappa_right"):
             freeze(self, name, np.float64, (points,))
         for name in ("position", "d1", "d2_left", "d2_right", "d3_left", "d3_right"):
             freeze(self, name, np.float64, (points, axes))
@@ -112,7 +121,8 @@ def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTI
     table = element_table(path)
     velocity, acceleration = machine.limits("velocity", axes), machine.limits("acceleration", axes)
     element, w0, w1, segment, last = _grid(
-        table,
+        table.legs,
+        table.corners,
         path.legs.first,
         path.legs.offset,
         path.d,
@@ -126,8 +136,22 @@ def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTI
     ends = np.flatnonzero(last)  # the points that close a piece
     piece = np.concatenate([[0], ends + 1])
     stop = np.flatnonzero(path.joint == Joint.STOP)
-    columns = _evaluate(table, element, w0, w1, segment, last, path.toolpath.feed, velocity, acceleration)
-    names = ("s", "position", "d1", "d2_left", "d2_right", "d3_left", "d3_right", "margin")
+    feed = path.toolpath.feed
+    columns = _evaluate(
+        table.legs, table.corners, element, w0, w1, segment, last, feed, velocity, acceleration
+    )
+    names = (
+        "s",
+        "position",
+        "d1",
+        "d2_left",
+        "d2_right",
+        "d3_left",
+        "d3_right",
+        "margin",
+        "kappa_left",
+        "kappa_right",
+    )
     return PathSamples(
         path=path,
         table=table,
@@ -148,7 +172,7 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
     """
     table = samples.table
     element = samples.element[interval]
-    if (element < 0).any() or (table.curves.arc[np.maximum(element, 0)] >= 0).any():
+    if (element < 0).any() or table.legs["round"][np.maximum(element, 0)].any():
         raise ValueError("insert_points: only straight intervals can be split")
     after = interval + 1
     ds = s - samples.s[interval]
@@ -179,6 +203,8 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
         w1=w1,
         segment=put(samples.segment, samples.segment[interval]),
         margin=put(samples.margin, samples.margin[interval]),
+        kappa_left=put(samples.kappa_left, 0.0),
+        kappa_right=put(samples.kappa_right, 0.0),
     )
 
 
@@ -201,13 +227,14 @@ def _corner_breaks(path: SmoothPath) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _interval_error(left, mid, right, x, u, h, acceleration):
-    """max_k e_k / a_k of the module's text, from arc-length derivatives (4, A) at both ends and the middle."""
+def _interval_error(points, x, u, h, acceleration):
+    """max_k e_k / a_k of the module's text, from arc-length derivatives (3, 4, A) at left end, middle and right end."""
     worst = 0.0
-    for k in range(left.shape[1]):
-        curve = x * abs(mid[2, k] - 0.5 * (left[2, k] + right[2, k]))
-        product = 0.5 * u * h * abs(right[2, k] - left[2, k])
-        turn = u * abs(mid[1, k] - 0.5 * (left[1, k] + right[1, k]))
+    for k in range(points.shape[2]):
+        left, mid, right = points[0, 2, k], points[1, 2, k], points[2, 2, k]
+        curve = x * abs(mid - 0.5 * (left + right))
+        product = 0.5 * u * h * abs(right - left)
+        turn = u * abs(points[1, 1, k] - 0.5 * (points[0, 1, k] + points[2, 1, k]))
         worst = max(worst, (curve + product + turn) / acceleration[k])
     return worst
 
@@ -233,24 +260,25 @@ def _fastest(point, feed, velocity, acceleration):
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(table, element, wa, wb, feed, velocity, acceleration, work, left, mid, right):
-    """Evaluate an interval at both ends and the middle; returns its arc length and interpolation error."""
+def _measure(legs, corners, element, wa, wb, feed, velocity, acceleration, work, points):
+    """Evaluate an interval at left end, middle and right end into points (3, 4, A); returns its interpolation error."""
     w_ref = 0.5 * (wa + wb)
-    element_point(table, element, wa, w_ref, work, left)
-    element_point(table, element, wb, w_ref, work, right)
-    element_point(table, element, w_ref, w_ref, work, mid)
-    to_arc_length(left)
-    to_arc_length(right)
-    h = to_arc_length(mid) * (wb - wa)
-    x, u = _fastest(mid, feed, velocity, acceleration)
-    x_left, _ = _fastest(left, feed, velocity, acceleration)
-    x_right, _ = _fastest(right, feed, velocity, acceleration)
-    x = min(x, max(x_left, x_right))
-    return h, _interval_error(left, mid, right, x, u, h, acceleration)
+    x_ends = 0.0
+    x, u, speed = 0.0, 0.0, 0.0
+    for j in range(3):
+        w = wa if j == 0 else (w_ref if j == 1 else wb)
+        element_point(legs, corners, element, w, w_ref, work, points[j])
+        speed_here = to_arc_length(points[j])
+        x_here, u_here = _fastest(points[j], feed, velocity, acceleration)
+        if j == 1:
+            x, u, speed = x_here, u_here, speed_here
+        else:
+            x_ends = max(x_ends, x_here)
+    return _interval_error(points, min(x, x_ends), u, speed * (wb - wa), acceleration)
 
 
 @njit(cache=True, error_model="numpy")
-def _subdivide(table, element, wa, wb, feed, velocity, acceleration, resolution, work, points, out):
+def _subdivide(legs, corners, element, wa, wb, feed, velocity, acceleration, resolution, work, points, out):
     """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number."""
     stack = np.empty(HALVINGS_MAX + 1)
     stack[0] = wb
@@ -259,9 +287,7 @@ def _subdivide(table, element, wa, wb, feed, velocity, acceleration, resolution,
     left = wa
     while depth > 0:
         right = stack[depth - 1]
-        _, error = _measure(
-            table, element, left, right, feed, velocity, acceleration, work, points[0], points[1], points[2]
-        )
+        error = _measure(legs, corners, element, left, right, feed, velocity, acceleration, work, points)
         if error > resolution and depth <= HALVINGS_MAX and count + depth < len(out):
             stack[depth] = 0.5 * (left + right)
             depth += 1
@@ -274,12 +300,12 @@ def _subdivide(table, element, wa, wb, feed, velocity, acceleration, resolution,
 
 
 @njit(cache=True, error_model="numpy")
-def _corner_parameter(table, k, z):
+def _corner_parameter(corners, k, z):
     """w of corner k whose matched point lies z [mm] after the vertex, Y(w) - X(w) = z (corners/blend.py)."""
     wa, wb = 0.0, 1.0
     for _ in range(60):
         w = 0.5 * (wa + wb)
-        X, Y = shape_at(table.shape, table.params[k], w, w)
+        X, Y = shape_at(corners[k], w, w)
         if Y[0] - X[0] < z:
             wa = w
         else:
@@ -297,24 +323,23 @@ def _grown(array, needed):
 
 
 @njit(cache=True, error_model="numpy")
-def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration, resolution):
+def _grid(legs, corners, first, offset, d, is_stop, breaks, feed, velocity, acceleration, resolution):
     """Intervals of the whole path in order; a closing row (w0 = w1) where a piece ends.
 
     Returns element, w0, w1, segment (P,) and `last` (P,), True on closing rows.
     """
-    legs = len(first) - 1
     axes = len(velocity)
     work = np.empty((2, 4, axes))
     points = np.empty((3, 4, axes))
     ends = np.empty(1 << 14)
-    size = 8 * legs + 64
+    size = 8 * len(legs) + 64
     element, segment = np.empty(size, np.int64), np.empty(size, np.int64)
     w0, w1 = np.empty(size), np.empty(size)
     last = np.empty(size, np.bool_)
     n = 0
-    for leg in range(legs):
-        length = table.curves.length[leg]
-        row = table.curves.arc[leg]
+    for leg in range(len(legs)):
+        length = legs[leg].length
+        curved = legs[leg].round
         # The leg's free part, then the corner behind it: spans (curve, wa, wb, seg) cut at the block boundaries.
         for half in range(3):  # 0: free part, 1: corner before its apex, 2: after it
             k = leg + 1
@@ -326,7 +351,7 @@ def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration
             owner = k if half == 2 else leg
             for seg in range(first[owner], first[owner + 1]):
                 begin = offset[seg]
-                end = offset[seg + 1] if seg + 1 < first[owner + 1] else table.curves.length[owner]
+                end = offset[seg + 1] if seg + 1 < first[owner + 1] else legs[owner].length
                 if half == 0:
                     wa, wb = max(begin, d[leg]), min(end, length - d[k])
                     if wb - wa <= FREE_PART_MIN * length:
@@ -335,18 +360,18 @@ def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration
                 elif half == 1:
                     if end <= length - d[k]:
                         continue
-                    wa = _corner_parameter(table, k, begin - length) if begin > length - d[k] else 0.0
-                    wb = _corner_parameter(table, k, end - length) if seg + 1 < first[owner + 1] else 0.5
+                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d[k] else 0.0
+                    wb = _corner_parameter(corners, k, end - length) if seg + 1 < first[owner + 1] else 0.5
                     curve = ~k
                 else:
                     if begin >= d[k]:
                         break
-                    wa = _corner_parameter(table, k, begin) if seg > first[owner] else 0.5
-                    wb = _corner_parameter(table, k, end) if end < d[k] else 1.0
+                    wa = _corner_parameter(corners, k, begin) if seg > first[owner] else 0.5
+                    wb = _corner_parameter(corners, k, end) if end < d[k] else 1.0
                     curve = ~k
                 parts = 1
-                if half == 0 and row >= 0:
-                    parts = int(np.ceil(abs(table.curves.rate[row]) * (wb - wa) / ARC_STEP))
+                if half == 0 and curved:
+                    parts = int(np.ceil(abs(legs[leg].rate) * (wb - wa) / ARC_STEP))
                 cut = 0
                 left = wa
                 while left < wb:
@@ -362,14 +387,18 @@ def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration
                             right = min(wb, breaks[k, cut])
                     count = 1
                     ends[0] = right
-                    if half > 0 or row >= 0:
+                    if half > 0 or curved:
                         count = _subdivide(
-                            table, curve, left, right, feed[seg], velocity, acceleration, resolution,
+                            legs, corners, curve, left, right, feed[seg], velocity, acceleration, resolution,
                             work, points, ends,
                         )  # fmt: skip
                     if n + count + 1 > len(w0):
                         element, segment = _grown(element, n + count + 1), _grown(segment, n + count + 1)
-                        w0, w1, last = _grown(w0, n + count + 1), _grown(w1, n + count + 1), _grown(last, n + count + 1)
+                        w0, w1, last = (
+                            _grown(w0, n + count + 1),
+                            _grown(w1, n + count + 1),
+                            _grown(last, n + count + 1),
+                        )
                     for c in range(count):
                         element[n], segment[n], last[n] = curve, seg, False
                         w0[n], w1[n] = left, ends[c]
@@ -386,35 +415,58 @@ def _grid(table, first, offset, d, is_stop, breaks, feed, velocity, acceleration
 
 
 @njit(cache=True, error_model="numpy")
-def _evaluate(table, element, w0, w1, segment, last, feed, velocity, acceleration):
+def _effective_curvature(points):
+    """Effective curvatures of an interval's two ends (module text) from its points (3, 4, A)."""
+    kappa = np.empty(3)
+    for j in range(3):
+        total = 0.0
+        for k in range(points.shape[2]):
+            total += points[j, 2, k] * points[j, 2, k]
+        kappa[j] = np.sqrt(total)
+    left, mid, right = kappa
+    if mid >= max(left, right):
+        return mid, mid
+    if mid > 0.0:
+        low = 1.0 / (2.0 / mid - 1.0 / max(left, right))
+        if left < right:
+            left = max(left, low)
+        else:
+            right = max(right, low)
+    return left, right
+
+
+@njit(cache=True, error_model="numpy")
+def _evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acceleration):
     """Arc length, position, derivatives and margins at all points; see `PathSamples`."""
     points, axes = len(w0), len(velocity)
     s = np.zeros(points)
     position, d1 = np.empty((points, axes)), np.empty((points, axes))
     d2_left, d2_right = np.empty((points, axes)), np.empty((points, axes))
     d3_left, d3_right = np.empty((points, axes)), np.empty((points, axes))
-    margin = np.zeros(points)
+    margin, kappa_left, kappa_right = np.zeros(points), np.zeros(points), np.zeros(points)
     work = np.empty((2, 4, axes))
-    left, mid, right = np.empty((4, axes)), np.empty((4, axes)), np.empty((4, axes))
+    ends = np.empty((3, 4, axes))
+    left, right = ends[0], ends[2]
     fresh = True  # the point starts a piece: nothing to its left
     for i in range(points):
         if last[i]:
-            d2_right[i], d3_right[i] = d2_left[i], d3_left[i]
+            d2_right[i], d3_right[i], kappa_right[i] = d2_left[i], d3_left[i], kappa_left[i]
             if i + 1 < points:
                 s[i + 1] = s[i]
             fresh = True
             continue
-        h, error = _measure(
-            table, element[i], w0[i], w1[i], feed[segment[i]], velocity, acceleration, work, left, mid, right
+        error = _measure(
+            legs, corners, element[i], w0[i], w1[i], feed[segment[i]], velocity, acceleration, work, ends
         )
-        w_ref = 0.5 * (w0[i] + w1[i])
-        s[i + 1] = s[i] + element_length(table, element[i], w0[i], w1[i], w_ref, work, mid)
         margin[i] = MARGIN_SAFETY * error
+        kappa_right[i], kappa_left[i + 1] = _effective_curvature(ends)
         if fresh:
             position[i], d1[i] = left[0], left[1]
-            d2_left[i], d3_left[i] = left[2], left[3]
+            d2_left[i], d3_left[i], kappa_left[i] = left[2], left[3], kappa_right[i]
             fresh = False
         d2_right[i], d3_right[i] = left[2], left[3]
         position[i + 1], d1[i + 1] = right[0], right[1]
         d2_left[i + 1], d3_left[i + 1] = right[2], right[3]
-    return s, position, d1, d2_left, d2_right, d3_left, d3_right, margin
+        w_ref = 0.5 * (w0[i] + w1[i])
+        s[i + 1] = s[i] + element_length(legs, corners, element[i], w0[i], w1[i], w_ref, left)
+    return s, position, d1, d2_left, d2_right, d3_left, d3_right, margin, kappa_left, kappa_right

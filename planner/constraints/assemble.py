@@ -23,7 +23,6 @@ def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
     """
     axes = samples.path.toolpath.axes
     collected = _Collector(len(samples))
-    interval_max = interval_feed_sq_max(samples, machine)
     left, right = interval_sides(samples)
     feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])
     collected.tighten("feed", np.minimum(feed_sq[left], feed_sq[right]))
@@ -31,15 +30,12 @@ def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
     for k, letter in enumerate(axes):
         collected.tighten(f"velocity.{letter}", np.where(axis == k, per_axis, np.inf))
     budget = _remaining_budget(samples, machine)
-    for side, d2 in ((left, samples.d2_left), (right, samples.d2_right)):
-        kappa = np.linalg.norm(d2, axis=1)
-        keep = 1.0 - samples.margin[side]
+    for side, kappa in ((left, samples.kappa_left), (right, samples.kappa_right)):
         for name, bound in _curvature_bounds(kappa, budget[side], machine):
-            collected.tighten(name, bound * keep)
+            collected.tighten(name, bound)
     jump, axis = bounds.curvature_jump(*_jumps(samples), machine.limits("acceleration", axes))
     for k, letter in enumerate(axes):
         collected.tighten(f"curvature_jump.{letter}", np.where(axis == k, jump, np.inf))
-    assert (collected.feed_sq_max <= np.maximum(interval_max[left], interval_max[right]) * (1 + 1e-12)).all()
     pieces = len(samples.piece) - 1
     return FeedrateProblem(
         piece=samples.piece,
@@ -89,7 +85,9 @@ def _remaining_budget(samples: PathSamples, machine: Machine) -> FloatArray:
     return np.where(corner, path.tol[joint] - path.tol_ap[joint], whole)
 
 
-def _curvature_bounds(kappa: FloatArray, budget: FloatArray, machine: Machine) -> list[tuple[str, FloatArray]]:
+def _curvature_bounds(
+    kappa: FloatArray, budget: FloatArray, machine: Machine
+) -> list[tuple[str, FloatArray]]:
     """The bounds that depend on curvature; chord and filter errors share the budget in proportion (PAPERS D)."""
     rate = error_rate(machine)
     found = []

@@ -48,6 +48,12 @@ class Shape(IntEnum):
     FIR = 1  # (V, T1, T2, Tk): feed [mm/s], filter lengths and overlap time [s]
 
 
+SHAPE_BEZIER = int(Shape.BEZIER)  # numba reads plain integers
+
+# What the kernels know of a corner: its shape and the shape's parameters.
+CORNER_DTYPE = np.dtype([("shape", np.int64), ("params", np.float64, (4,))])
+
+
 def middle_from_tolerance(tol: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
     """Largest m with E(m) <= tol [mm]; `curvature` is kappa1 + kappa2 [1/mm]. Infinite where nothing bends."""
     with np.errstate(divide="ignore"):
@@ -123,26 +129,28 @@ def _fir_shape(V, T1, T2, Tk, w, w_ref):
 
 
 @njit(cache=True, error_model="numpy")
-def shape_at(shape, params, w, w_ref):
-    """Retreat X and advance Y at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
+def shape_at(corner, w, w_ref):
+    """Retreat X and advance Y of a corner record at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
 
     w_ref : a parameter inside the interval that is meant; it chooses the branch where two pieces meet
     """
-    if shape == 0:
-        return _bezier_shape(params[0], params[1], params[2], w, w_ref)
-    return _fir_shape(params[0], params[1], params[2], params[3], w, w_ref)
+    p = corner.params
+    if corner.shape == SHAPE_BEZIER:
+        return _bezier_shape(p[0], p[1], p[2], w, w_ref)
+    return _fir_shape(p[0], p[1], p[2], p[3], w, w_ref)
 
 
 @njit(cache=True, error_model="numpy")
-def corner_point(table, k, shape, params, w, w_ref, work1, work2, out):
+def corner_point(legs, corners, k, w, w_ref, work1, work2, out):
     """Point and three w-derivatives of corner k (between legs k-1 and k), into out (4, A)."""
-    X, Y = shape_at(shape, params[k], w, w_ref)
-    leg_point(table, k - 1, table.length[k - 1] - X[0], work1)
-    leg_point(table, k, Y[0], work2)
+    X, Y = shape_at(corners[k], w, w_ref)
+    leg_point(legs, k - 1, legs[k - 1].length - X[0], work1)
+    leg_point(legs, k, Y[0], work2)
+    vertex = legs[k].start
     for a in range(out.shape[1]):
         p1, p2, p3 = work1[1, a], work1[2, a], work1[3, a]
         q1, q2, q3 = work2[1, a], work2[2, a], work2[3, a]
-        out[0, a] = work1[0, a] + work2[0, a] - table.start[k, a]
+        out[0, a] = work1[0, a] + work2[0, a] - vertex[a]
         out[1, a] = -X[1] * p1 + Y[1] * q1
         out[2, a] = -X[2] * p1 + X[1] * X[1] * p2 + Y[2] * q1 + Y[1] * Y[1] * q2
         out[3, a] = (

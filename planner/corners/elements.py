@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from planner.arrays import FloatArray
-from planner.corners.blend import corner_point
+from planner.arrays import Array
+from planner.corners.blend import CORNER_DTYPE, corner_point, shape_at
 from planner.corners.smooth import SmoothPath
-from planner.geometry.legs import CurveTable, leg_point
+from planner.geometry.legs import leg_point, leg_tangent
 
 # Four-point Gauss-Legendre rule on [0, 1].
 _ROOT_INNER, _ROOT_OUTER = (np.sqrt(3 / 7 + sign * 2 / 7 * np.sqrt(6 / 5)) for sign in (-1, 1))
@@ -30,25 +30,26 @@ GAUSS_WEIGHTS = np.array([_HALF_OUTER, _HALF_INNER, _HALF_INNER, _HALF_OUTER])
 
 
 class ElementTable(NamedTuple):
-    """What the kernels need of a smooth path."""
+    """What the kernels need of a smooth path with R legs."""
 
-    curves: CurveTable
-    shape: int
-    params: FloatArray  # (R+1, 4)
+    legs: Array  # (R,) records, geometry/legs.py
+    corners: Array  # (R+1,) records, corners/blend.py
 
 
 def element_table(path: SmoothPath) -> ElementTable:
     """The kernels' view of `path`."""
-    return ElementTable(path.legs.table, int(path.corner.shape), path.params)
+    corners = np.zeros(len(path.params), CORNER_DTYPE)
+    corners["shape"], corners["params"] = int(path.corner.shape), path.params
+    return ElementTable(path.legs.table, corners)
 
 
 @njit(cache=True, error_model="numpy")
-def element_point(table, element, w, w_ref, work, out):
+def element_point(legs, corners, element, w, w_ref, work, out):
     """Point and three w-derivatives of an element at w, into out (4, A); work is (2, 4, A) scratch."""
     if element >= 0:
-        leg_point(table.curves, element, w, out)
+        leg_point(legs, element, w, out)
     else:
-        corner_point(table.curves, ~element, table.shape, table.params, w, w_ref, work[0], work[1], out)
+        corner_point(legs, corners, ~element, w, w_ref, work[0], work[1], out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -78,15 +79,30 @@ def to_arc_length(out):
 
 
 @njit(cache=True, error_model="numpy")
-def element_length(table, element, w0, w1, w_ref, work, out):
-    """Arc length of an element between w0 and w1 [mm]."""
-    if element >= 0 and table.curves.arc[element] < 0:
+def _element_speed(legs, corners, element, w, w_ref, out):
+    """|dB/dw| at w; out (4, A) is scratch."""
+    if element >= 0:
+        leg_tangent(legs, element, w, out[0])
+    else:
+        k = ~element
+        X, Y = shape_at(corners[k], w, w_ref)
+        leg_tangent(legs, k - 1, legs[k - 1].length - X[0], out[0])
+        leg_tangent(legs, k, Y[0], out[1])
+        for a in range(out.shape[1]):
+            out[0, a] = Y[1] * out[1, a] - X[1] * out[0, a]
+    speed_sq = 0.0
+    for a in range(out.shape[1]):
+        speed_sq += out[0, a] * out[0, a]
+    return np.sqrt(speed_sq)
+
+
+@njit(cache=True, error_model="numpy")
+def element_length(legs, corners, element, w0, w1, w_ref, out):
+    """Arc length of an element between w0 and w1 [mm]; out (4, A) is scratch."""
+    if element >= 0 and not legs[element].round:
         return w1 - w0
     total = 0.0
     for g in range(4):
-        element_point(table, element, w0 + (w1 - w0) * GAUSS_NODES[g], w_ref, work, out)
-        speed_sq = 0.0
-        for k in range(out.shape[1]):
-            speed_sq += out[1, k] * out[1, k]
-        total += GAUSS_WEIGHTS[g] * np.sqrt(speed_sq)
+        w = w0 + (w1 - w0) * GAUSS_NODES[g]
+        total += GAUSS_WEIGHTS[g] * _element_speed(legs, corners, element, w, w_ref, out)
     return total * (w1 - w0)

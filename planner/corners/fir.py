@@ -43,7 +43,9 @@ class FirCorner:
             if not 0 < value < np.inf:
                 raise InputError(f"FIR corner: {name} = {value}; it must be positive and finite")
         if self.T2 > self.T1:
-            raise InputError(f"FIR corner: T2 = {self.T2} s is longer than T1 = {self.T1} s; give the longer one as T1")
+            raise InputError(
+                f"FIR corner: T2 = {self.T2} s is longer than T1 = {self.T1} s; give the longer one as T1"
+            )
 
     @classmethod
     def from_machine(cls, machine: Machine, axes: tuple[str, ...]) -> FirCorner:

@@ -91,7 +91,9 @@ def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> 
     feed = np.minimum(_finite_feed(toolpath, machine, before), _finite_feed(toolpath, machine, after))
 
     limits = machine.limits("acceleration", toolpath.axes)
-    reachable = normal_acceleration_of_axes(limits, toolpath.tangent_end[before], toolpath.tangent_start[after])
+    reachable = normal_acceleration_of_axes(
+        limits, toolpath.tangent_end[before], toolpath.tangent_start[after]
+    )
     if machine.normal_acceleration is not None:
         reachable = np.minimum(reachable, machine.normal_acceleration)
     rate = error_rate(machine)

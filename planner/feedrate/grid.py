@@ -50,6 +50,4 @@ def _straight(samples: PathSamples) -> Array:
     """Indices of the intervals on straight legs."""
     interval = samples.intervals
     element = samples.element[interval]
-    arc = samples.table.curves.arc
-    return interval[(element >= 0) & (arc[np.maximum(element, 0)] < 0)]
-
+    return interval[(element >= 0) & ~samples.table.legs["round"][np.maximum(element, 0)]]

@@ -144,7 +144,9 @@ def _solve(piece, s, d1, d2_left, d2_right, limit, margin, x_max, x_start, x_end
         x[first] = min(x_start[g], reach[first])
         for i in range(first, last):
             h = s[i + 1] - s[i]
-            low, _, high, _ = _interval(i, x[i], h, d1, d2_left, d2_right, limit, 1.0 - margin[i], reach[i + 1])
+            low, _, high, _ = _interval(
+                i, x[i], h, d1, d2_left, d2_right, limit, 1.0 - margin[i], reach[i + 1]
+            )
             u[i] = max(high, low)  # equal up to rounding where the set is a point
             x[i + 1] = min(max(x[i] + 2.0 * h * u[i], 0.0), reach[i + 1])
             u[i] = (x[i + 1] - x[i]) / (2.0 * h)

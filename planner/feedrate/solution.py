@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from planner.arrays import Array, FloatArray, freeze
-from planner.errors import NotSolvedError
 from planner.constraints.problem import FeedrateProblem
+from planner.errors import NotSolvedError
 
 
 class Status(Enum):

@@ -3,13 +3,13 @@
 A leg is a maximal run of collinear lines, or one arc. Collinear lines are joined because where a CAM system cut a straight line
 into blocks must not change the motion: a corner may reach back over several short blocks of the same line.
 
-`CurveTable` is what the numba kernels see: plain arrays, one row per leg or arc.
+The kernels see one numpy record per leg (`leg_dtype`): a single array argument costs numba nothing to pass on, whereas a tuple
+of ten arrays costs ten reference counts per call, measured at 0.25 us against 0.01 us.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,13 +25,13 @@ class Legs:
     first  : (R+1,) leg r holds the segments first[r] : first[r+1]; also the toolpath's joint index at the leg's start
     offset : (M,) place of each segment's start on its leg [mm]
     length : (R,) range of the leg's parameter x [mm]
-    table  : the same geometry for the kernels
+    table  : (R,) records of `leg_dtype`, the same geometry for the kernels
     """
 
     first: Array
     offset: FloatArray
     length: FloatArray
-    table: CurveTable
+    table: Array
 
     def __post_init__(self) -> None:
         legs = len(self.length)
@@ -43,19 +43,11 @@ class Legs:
         return len(self.length)
 
 
-class CurveTable(NamedTuple):
-    """Geometry of R legs over A axes; K arcs (formulas: geometry/toolpath.py)."""
-
-    arc: Array  # (R,) row of the arc, or -1: a straight leg
-    length: FloatArray  # (R,)
-    start: FloatArray  # (R, A)
-    direction: FloatArray  # (R, A) unit vector of straight legs
-    center: FloatArray  # (K, A) ...
-    e1: FloatArray
-    e2: FloatArray
-    drift: FloatArray
-    radius: FloatArray  # (K,)
-    rate: FloatArray
+def leg_dtype(axes: int) -> np.dtype:
+    """Record of one leg over `axes` axes; formulas and meaning of the fields: geometry/toolpath.py."""
+    vectors = ("start", "direction", "center", "e1", "e2", "drift")
+    scalars = [("round", np.bool_), ("length", np.float64), ("radius", np.float64), ("rate", np.float64)]
+    return np.dtype([*scalars, *((name, np.float64, (axes,)) for name in vectors)])
 
 
 def legs_of(toolpath: Toolpath) -> Legs:
@@ -70,34 +62,46 @@ def legs_of(toolpath: Toolpath) -> Legs:
     arc = toolpath.arc[first[:-1]]
     chord = np.linalg.norm(end - start, axis=1)
     length = np.where(arc < 0, chord, toolpath.length[first[:-1]])
-    direction = np.zeros_like(start)
-    np.divide(end - start, chord[:, None], out=direction, where=(arc < 0)[:, None])
-    arcs = toolpath.arcs
-    table = CurveTable(
-        arc, length, start, direction, arcs.center, arcs.e1, arcs.e2, arcs.drift, arcs.radius, arcs.rate
-    )
+    table = np.zeros(len(length), leg_dtype(len(toolpath.axes)))
+    table["length"], table["start"], table["round"] = length, start, arc >= 0
+    table["direction"][arc < 0] = ((end - start) / chord[:, None])[arc < 0]
+    for name in ("center", "e1", "e2", "drift", "radius", "rate"):
+        table[name][arc >= 0] = getattr(toolpath.arcs, name)[arc[arc >= 0]]
     return Legs(first=first, offset=offset, length=length, table=table)
 
 
 @njit(cache=True, error_model="numpy")
-def leg_point(table, leg, x, out):
+def leg_point(legs, leg, x, out):
     """Point and first three x-derivatives of a leg at x, into out (4, A)."""
+    data = legs[leg]
     axes = out.shape[1]
-    row = table.arc[leg]
-    if row < 0:
+    if not data.round:
         for k in range(axes):
-            out[0, k] = table.start[leg, k] + x * table.direction[leg, k]
-            out[1, k] = table.direction[leg, k]
+            out[0, k] = data.start[k] + x * data.direction[k]
+            out[1, k] = data.direction[k]
             out[2, k] = 0.0
             out[3, k] = 0.0
         return
-    rate = table.rate[row]
-    radius = table.radius[row]
+    rate, radius = data.rate, data.radius
     cos, sin = np.cos(rate * x), np.sin(rate * x)
     for k in range(axes):
-        radial = radius * (cos * table.e1[row, k] + sin * table.e2[row, k])
-        across = radius * (cos * table.e2[row, k] - sin * table.e1[row, k])
-        out[0, k] = table.center[row, k] + radial + table.drift[row, k] * x
-        out[1, k] = rate * across + table.drift[row, k]
+        radial = radius * (cos * data.e1[k] + sin * data.e2[k])
+        across = radius * (cos * data.e2[k] - sin * data.e1[k])
+        out[0, k] = data.center[k] + radial + data.drift[k] * x
+        out[1, k] = rate * across + data.drift[k]
         out[2, k] = -rate * rate * radial
         out[3, k] = -rate * rate * rate * across
+
+
+@njit(cache=True, error_model="numpy")
+def leg_tangent(legs, leg, x, out):
+    """First x-derivative of a leg at x, into out (A,)."""
+    data = legs[leg]
+    if not data.round:
+        for k in range(len(out)):
+            out[k] = data.direction[k]
+        return
+    across = data.radius * data.rate
+    cos, sin = across * np.cos(data.rate * x), across * np.sin(data.rate * x)
+    for k in range(len(out)):
+        out[k] = cos * data.e2[k] - sin * data.e1[k] + data.drift[k]

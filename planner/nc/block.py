@@ -52,6 +52,10 @@ class Block:
         """Index of the first word with one of the letters."""
         return min(self.at[letter] for letter in letters if letter in self.at)
 
+    def motion_word(self) -> int:
+        """Index of the word that makes the block move: its motion code, else its first coordinate."""
+        return self.at["motion"] if "motion" in self.at else self.first_of("XYZIJKR")
+
 
 def read_block(words: Words, row: int, report: Report) -> Block | None:
     """Read a row of words. Faults go to `report(word, message)`; None if the row cannot be read as a
@@ -120,7 +124,7 @@ def _add_code(block: Block, letter: str, value: float, word: int, report: Report
 def _check_used(block: Block, report: Report) -> None:
     """Report words that no code of the line uses. I J K and R may belong to an arc code in force: the
     interpreter looks."""
-    one_shot, motion = block.g.get("one-shot"), block.g.get("motion")
+    one_shot, motion = block.g.get("one-shot"), block.g.get("motion", block.g.get("cycle end"))
     path, arc = block.g.get("path control"), motion in (20, 30)
     used = {
         "P": arc or motion is None or one_shot == 40 or path == 640,

@@ -26,7 +26,7 @@ class Refusal:
 
 
 G_GROUP: dict[int, str] = {
-    **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
+    **dict.fromkeys((0, 10, 20, 30), "motion"),
     **dict.fromkeys((40, 280, 300, 530, 920, 921, 922, 923), "one-shot"),
     **dict.fromkeys((170, 180, 190), "plane"),
     **dict.fromkeys((200, 210), "units"),
@@ -40,6 +40,7 @@ G_GROUP: dict[int, str] = {
     970: "spindle mode",
     **dict.fromkeys((980, 990), "retract mode"),
     80: "lathe diameter mode",
+    800: "cycle end",  # a motion code on its line beats it
 }
 
 # Codes that change nothing here and are kept as events: spindle speed in rpm, retract modes of canned cycles,
@@ -147,7 +148,7 @@ CHARACTERS: dict[str, str] = {
     "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
     "[": "expressions are not supported; write the number out",
     "<": "named parameters are not supported; write the number out",
-    "$": "commands to the control ($H, $J ...) are not supported; remove the line if nothing moves, else write the move as G0 or G1",
+    "$": "commands to the control ($H, $J ...) are not supported; remove the line if nothing moves, else write G0 or G1",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     "@": "polar coordinates are not supported; write x and y",

@@ -15,7 +15,7 @@ import numpy as np
 from planner.arrays import Array, FloatArray
 from planner.machine import Machine
 from planner.nc.arcs import IN_PLANE
-from planner.nc.events import plain
+from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
 from planner.nc.program import Kind, Program
 from planner.nc.reader import interpret, load
@@ -187,7 +187,8 @@ def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: A
 def _count_events(program: Program) -> dict[str, int]:
     """Events by letter (S, T) or code (M3, G97), without making an object of each."""
     table = program.events
-    pairs = np.column_stack([table.letter, table.value]) if hasattr(table, "letter") else np.empty((0, 2))
+    assert isinstance(table, EventTable)
+    pairs = np.column_stack([table.letter, table.value])
     counts: dict[str, int] = {}
     for (letter, value), count in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
         name = chr(int(letter))

@@ -14,29 +14,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.machine import LINEAR_AXES, Machine
-from planner.nc import codes
-from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_from_radius, closes
+from planner.machine import Machine
+from planner.nc import codes, moves
 from planner.nc.block import Block, read_block
 from planner.nc.faults import Fault
 from planner.nc.lexer import Words
+from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 from planner.units import SECONDS_PER_MINUTE
 
-_INTEGER_ROUNDING = {"T": 1e-4, "H": 1e-4, "P": 1e-3}  # what RS274NGC rounds away
 _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
 _ROWS_AT_ONCE = 2  # blocks that one line can give beyond one per line (G28 through an intermediate point, a dwell, M6, M0)
 
 
-class _LineFault(Exception):
-    """The line cannot be executed further; carries the word and the message."""
-
-    def __init__(self, word: int, message: str):
-        self.word, self.message = word, message
+_WHY_NO_MOTION = {
+    NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
+    REFUSED_MOTION: "an axis word under a motion code that is not supported",
+}
 
 
 class Interpreter:
@@ -82,7 +79,7 @@ class Interpreter:
     def _execute_or_report(self, block: Block) -> bool:
         try:
             return self._execute(block)
-        except _LineFault as fault:
+        except WordFault as fault:
             self.report(fault.word, fault.message)
             return block.m.get("stopping") in (20, 300)
 
@@ -110,7 +107,7 @@ class Interpreter:
             return
         feed = block.value["F"]
         if not feed > 0:
-            raise _LineFault(
+            raise WordFault(
                 block.at["F"],
                 "a feed must be positive; write the feed of the moves that follow, such as F1000",
             )
@@ -126,12 +123,12 @@ class Interpreter:
         state, store, line = self.state, self.store, block.line
         if "S" in block.value:
             if block.value["S"] < 0:
-                raise _LineFault(
+                raise WordFault(
                     block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
                 )
             store.add_event("S", block.value["S"], line)
         if "T" in block.value:
-            state.tool_selected = self._integer(block, "T", 0)
+            state.tool_selected = integer(block, "T", 0)
             store.add_event("T", state.tool_selected, line)
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
@@ -147,7 +144,7 @@ class Interpreter:
         seconds = block.value.get("P")
         if seconds is None or seconds < 0:
             word = block.at["one-shot"] if seconds is None else block.at["P"]
-            raise _LineFault(
+            raise WordFault(
                 word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5"
             )
         self.store.add_dwell(seconds, block.line, self.state)
@@ -173,7 +170,7 @@ class Interpreter:
         self.setup.apply_offsets(state)
 
     def _tool_length(self, block: Block) -> float:
-        tool = self._integer(block, "H", 0) if "H" in block.value else self.state.tool_loaded
+        tool = integer(block, "H", 0) if "H" in block.value else self.state.tool_loaded
         if tool not in self.setup.tools and tool != 0:
             self.note(f"tool {tool} has no length in the machine file: 0")
         return self.setup.tools.get(tool, 0.0)
@@ -184,7 +181,7 @@ class Interpreter:
         if "P" in block.value and block.g["path control"] == 640:
             tolerance = block.value["P"]
             if tolerance < 0:
-                raise _LineFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
+                raise WordFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
             if tolerance > 0:
                 state.tolerance = tolerance * state.unit
             else:
@@ -200,8 +197,8 @@ class Interpreter:
             return
         covets_axes = code in (280, 300, 920)
         motion = block.g.get("motion")
-        if covets_axes and motion is not None and (motion != 800 or block.has("XYZ")):
-            raise _LineFault(
+        if covets_axes and motion is not None:
+            raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
             )
@@ -217,7 +214,7 @@ class Interpreter:
             self.note(f"{name} has no position in the machine file: machine zero")
         home = self.setup.positions.get(code, np.zeros(3))
         if block.has("XYZ"):
-            state.position[:] = self._target(block)
+            state.position[:] = moves.target(self.state, block)
             self.store.add(Kind.RAPID, block.line, state)
         for axis, letter in enumerate("XYZ"):
             if letter in block.value or not block.has("XYZ"):
@@ -229,7 +226,7 @@ class Interpreter:
         state = self.state
         if code == 920:
             if not block.has("XYZ"):
-                raise _LineFault(
+                raise WordFault(
                     block.at["one-shot"],
                     "G92 needs at least one of X, Y and Z: the coordinates to give to this place",
                 )
@@ -245,132 +242,31 @@ class Interpreter:
         self.setup.apply_offsets(state)
 
     def _motion(self, block: Block) -> None:
-        state, code, one_shot = self.state, block.g.get("motion"), block.g.get("one-shot")
-        if code is not None:
-            state.motion = code // 10 if code != 800 else NO_MOTION
+        state, one_shot = self.state, block.g.get("one-shot")
+        if "motion" in block.g:
+            state.motion = block.g["motion"] // 10
+        elif "cycle end" in block.g:
+            state.motion = NO_MOTION
         if one_shot in (280, 300, 920):
             return
         if one_shot == 530:
-            self._check_machine_coordinates(block)
-        self._check_arc_words(block)
-        if not block.has("XYZ") and not (state.motion in (2, 3) and (code is not None or block.has("IJKR"))):
+            moves.check_machine_coordinates(state, block)
+        if state.motion not in (2, 3):
+            moves.check_no_arc_words(state, block)
+        if not moves.is_move(state, block):
             return
         if state.motion < 0:
-            found = (
-                "G80 is"
-                if code == 800
-                else "a motion code that is not supported is"
-                if state.motion == REFUSED_MOTION
-                else "no motion code is"
-            )
-            raise _LineFault(
-                block.first_of("XYZ"),
-                f"an axis word while {found} in force; write G0, G1, G2 or G3 before it",
-            )
+            raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
         if state.motion > 0 and not state.feed > 0:
-            word = block.at.get("motion", block.first_of("XYZIJKR") if block.has("XYZIJKR") else 0)
-            raise _LineFault(
-                word, f"G{state.motion} moves without a feed; write an F word on this line or before it"
-            )
+            found = f"G{state.motion} moves without a feed; write an F word on this line or before it"
+            raise WordFault(block.motion_word(), found)
+        target = moves.target(state, block)
         if state.motion < 2:
-            state.position[:] = self._target(block)
-            self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
-        else:
-            self._arc(block)
-
-    def _check_machine_coordinates(self, block: Block) -> None:
-        if self.state.motion not in (0, 1) or not ("motion" in block.g or block.has("XYZ")):
-            raise _LineFault(block.at["one-shot"], "G53 goes with G0 or G1 only; write G53 G0 or G53 G1")
-        if not self.state.absolute:
-            raise _LineFault(
-                block.at["one-shot"], "G53 goes with absolute coordinates only; write G90 before it"
-            )
-
-    def _check_arc_words(self, block: Block) -> None:
-        """I J K R, and a P that no G4 or G64 uses, need an arc."""
-        if self.state.motion in (2, 3):
-            return
-        taken = block.g.get("one-shot") == 40 or block.g.get("path control") == 640
-        for letter in "IJKR" if taken else "IJKRP":
-            if letter in block.value and self.state.motion != REFUSED_MOTION:
-                raise _LineFault(
-                    block.at[letter],
-                    f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it",
-                )
-
-    def _target(self, block: Block) -> FloatArray:
-        """Where the block's axis words lead, in machine coordinates."""
-        state = self.state
-        target = state.position.copy()
-        for axis, letter in enumerate("XYZ"):
-            if letter in block.value:
-                length = block.value[letter] * state.unit
-                if block.g.get("one-shot") == 530:
-                    target[axis] = length
-                else:
-                    target[axis] = length + (state.offset[axis] if state.absolute else target[axis])
-        return target
-
-    def _arc(self, block: Block) -> None:
-        state, target = self.state, self._target(block)
-        word = block.at.get("motion", block.first_of("XYZIJKR") if block.has("XYZIJKR") else 0)
-        try:
-            arc = self._solve_arc(block, target)
-        except ArcError as fault:
             state.position[:] = target
-            raise _LineFault(word, str(fault)) from fault
-        state.position[:] = target
-        self.store.add_arc(arc, block.line, state)
-
-    def _solve_arc(self, block: Block, target: FloatArray) -> Arc:
-        state = self.state
-        a, b = IN_PLANE[state.normal]
-        outside = "IJK"[state.normal]
-        turns = self._integer(block, "P", 1) if "P" in block.value and block.g.get("one-shot") != 40 else 1
-        if outside in block.value:
-            raise ArcError(
-                f"{outside} in the {AXES[a]} {AXES[b]} plane; write the plane (G17, G18 or G19) that the centre lies in"
-            )
-        shape = {"normal": state.normal, "clockwise": state.motion == 2, "turns": turns, "unit": state.unit}
-        if "R" in block.value:
-            if block.has("IJK"):
-                raise ArcError("R and I J K on one line both define the centre; write one of them")
-            if not block.has("XYZ"[a] + "XYZ"[b]):
-                raise ArcError(f"an arc with R needs an end point: {AXES[a]} or {AXES[b]} in this plane")
-            return arc_from_radius(state.position, target, block.value["R"] * state.unit, **shape)
-        if not block.has("IJK"):
-            raise ArcError(f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R")
-        centre = self._centre(block, absolute=state.absolute_centre)
+            self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
+            return
         try:
-            return arc_from_centre(state.position, target, centre, **shape)
-        except ArcError as fault:
-            other = self._centre(block, absolute=not state.absolute_centre)
-            if (
-                block.has("IJK"[a])
-                and block.has("IJK"[b])
-                and closes(state.position, target, other, normal=state.normal, unit=state.unit)
-            ):
-                way = "incremental: write G91.1" if state.absolute_centre else "absolute: write G90.1"
-                raise ArcError(f"{fault}; the arc would close if its centre were {way} before it") from fault
-            raise ArcError(f"{fault}; correct the centre or the end point") from fault
-
-    def _centre(self, block: Block, *, absolute: bool) -> FloatArray:
-        state, centre = self.state, self.state.position.copy()
-        for axis in IN_PLANE[state.normal]:
-            letter = "IJK"[axis]
-            if letter in block.value:
-                length = block.value[letter] * state.unit
-                centre[axis] = length + (state.offset[axis] if absolute else centre[axis])
-            elif absolute and state.absolute_centre:
-                raise ArcError(f"{letter} is missing; with absolute centres (G90.1) both are needed")
-        return centre
-
-    def _integer(self, block: Block, letter: str, least: int) -> int:
-        value = block.value[letter]
-        whole = round(value)
-        if abs(value - whole) > _INTEGER_ROUNDING[letter] or whole < least:
-            raise _LineFault(block.at[letter], f"{letter} must be a whole number, {least} or more")
-        return whole
-
-
-assert tuple(AXES) == LINEAR_AXES
+            arc = moves.arc(state, block, target)
+        finally:
+            state.position[:] = target
+        self.store.add_arc(arc, block.line, state)

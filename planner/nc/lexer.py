@@ -72,9 +72,6 @@ class Words:
     def _line_before(self, word: int) -> bytes:
         at = int(self.at[word])
         start = self.data.rfind(b"\n", 0, at) + 1
-        start = max(
-            start, self.data.rfind(b"\r", start, at) + 1
-        )  # not from 0: a file without "\r" would be searched each time
         return self.data[start:at].removeprefix(_BOM)
 
 
@@ -84,6 +81,8 @@ _WORD = re.compile(rb"[A-Za-z%][ \t]*[-+]?[\d \t]*\.?[\d \t]*")
 
 def split_words(data: bytes, *, block_delete: bool) -> Words:
     """Split a program into words; with `block_delete` lines that start with "/" are left out."""
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")  # lines of an old Macintosh; elsewhere a return is a blank
     source = np.frombuffer(data, dtype=np.uint8)
     capacity, lines = _count(source)
     letter = np.empty(capacity, dtype=np.uint8)
@@ -123,7 +122,7 @@ def _count(source):  # pragma: no cover - compiled
     for c in source:
         if 97 <= c <= 122 or 65 <= c <= 90 or c == _PERCENT:
             letters += 1
-        elif c == _NEWLINE or c == _RETURN:
+        elif c == _NEWLINE:
             lines += 1
     return letters + lines, lines  # a line has at most one word that is not a letter's: its fault
 
@@ -135,9 +134,9 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
     while i < end:
         line_number += 1
         line_start, row_first, blank, reading = i, words, True, True
-        while i < end and source[i] != _NEWLINE and source[i] != _RETURN:
+        while i < end and source[i] != _NEWLINE:
             c = source[i]
-            if not reading or c == _SPACE or c == _TAB or c == _DOS_END:
+            if not reading or c in (_SPACE, _TAB, _RETURN, _DOS_END):
                 i += 1
                 continue
             if c == _SLASH and blank:
@@ -151,7 +150,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 continue
             if c == _OPEN:
                 fault, close = _COMMENT_OPEN, i + 1
-                while close < end and source[close] != _NEWLINE and source[close] != _RETURN:
+                while close < end and source[close] != _NEWLINE:
                     if source[close] == _CLOSE:
                         fault = 0
                         break
@@ -211,7 +210,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                         decimals += 1
                 elif d == _POINT and not point:
                     point = True
-                elif (d == _PLUS or d == _MINUS) and not (signed or point or digits):
+                elif d in (_PLUS, _MINUS) and not (signed or point or digits):
                     signed = True
                     negative = d == _MINUS
                 elif d != _SPACE and d != _TAB:
@@ -236,7 +235,6 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
         if words > row_first:
             line[rows], first[rows] = line_number, row_first
             rows += 1
-        if i < end:
-            i += 2 if source[i] == _RETURN and i + 1 < end and source[i + 1] == _NEWLINE else 1
+        i += 1
     first[rows] = words
     return words, rows

@@ -143,7 +143,7 @@ def plan(
     """Plan, sample and verify the motion of a program."""
     if plot and output is None:
         raise InputError("--plot writes its pictures into the output directory: give one with -o DIR")
-    from planner.methods import plan_program
+    from planner import plan as plan_program
     from planner.report.export import summary, write_plan
 
     with _Progress() as progress:

@@ -79,7 +79,7 @@ def _exchangeable(directory: Path) -> bool:
     here = Path.cwd()
     if sys.platform != "linux" or directory.is_mount() or here == directory or directory in here.parents:
         return False
-    return all(entry.is_symlink() or entry.is_file() for entry in os.scandir(directory))
+    return all(entry.is_symlink() or entry.is_file() for entry in list(os.scandir(directory)))
 
 
 def _take_place(new: Path, directory: Path, previous: Collection[str]) -> bool:
@@ -90,7 +90,7 @@ def _take_place(new: Path, directory: Path, previous: Collection[str]) -> bool:
             _sync(new)
             new.rename(directory)
         else:
-            for entry in os.scandir(directory):
+            for entry in list(os.scandir(directory)):
                 if entry.name not in ours:
                     os.link(entry.path, new / entry.name, follow_symlinks=False)
             shutil.copystat(directory, new)
@@ -100,7 +100,7 @@ def _take_place(new: Path, directory: Path, previous: Collection[str]) -> bool:
         return False
     _sync(directory.parent)
     if new.exists():  # now the old directory: what others put there since it was linked moves on
-        for entry in os.scandir(new):
+        for entry in list(os.scandir(new)):
             home = directory / entry.name
             if entry.name not in ours and not (home.exists() and entry.inode() == home.lstat().st_ino):
                 os.replace(entry.path, home)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import json
 import math
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -228,20 +229,15 @@ def _assemble(source: str, given: dict[str, Array]) -> tuple[Trajectory, tuple[s
             levels.append(np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64))
     position, velocity, acceleration, jerk = levels
     linear = [k for k, axis in enumerate(axes) if axis in LINEAR_AXES]
-    filled = {
-        "s": np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position[:, linear], axis=0), axis=1))),
-        "feed": np.linalg.norm(velocity[:, linear], axis=1),
-        "line": np.zeros(len(t)),
-        "block": np.full(len(t), -1.0),
+    fill: dict[str, Callable[[], Array]] = {
+        "s": lambda: np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position[:, linear], axis=0), axis=1))),
+        "feed": lambda: np.linalg.norm(velocity[:, linear], axis=1),
+        "line": lambda: np.zeros(len(t)),
+        "block": lambda: np.full(len(t), -1),
     }
-    said = {
-        "s": "taken from the positions",
-        "feed": "taken from the velocity",
-        "line": "unknown",
-        "block": "unknown",
-    }
-    notes += [f"{name} {said[name]} (no column {name})" for name in filled if name not in columns]
-    rest = {name: columns.get(name, column) for name, column in filled.items()}
+    said = {"s": "length of the polyline", "feed": "speed of the axes", "line": "unknown", "block": "unknown"}
+    notes += [f"{name}: {said[name]} (no column {name})" for name in fill if name not in columns]
+    rest = {name: columns[name] if name in columns else make() for name, make in fill.items()}
     trajectory = Trajectory(
         axes=axes,
         dt=float(np.median(np.diff(t))),

@@ -1,0 +1,120 @@
+"""A plan made by hand: each line from rest to rest on a quintic, so that the files can be tested without a planner."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from planner.geometry.build import toolpath_from_program
+from planner.machine import load_machine
+from planner.nc.reader import parse_program
+from planner.trajectory import Trajectory
+
+SQUARE = "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n"
+
+
+def trajectory_along(toolpath: Any, *, dt: float = 1e-3, time: float = 0.2) -> Trajectory:
+    """Quintic motions of `time` seconds along each (straight) segment."""
+    per = round(time / dt)
+    u = np.arange(1, per + 1) / per
+    shape = np.stack(
+        [
+            u**3 * (10 - 15 * u + 6 * u**2),
+            30 * u**2 * (1 - u) ** 2 / time,
+            60 * u * (1 - u) * (1 - 2 * u) / time**2,
+            (60 - 360 * u + 360 * u**2) / time**3,
+        ]
+    )
+    step = toolpath.end - toolpath.start
+    levels = [np.einsum("t,ma->mta", row, step).reshape(-1, step.shape[1]) for row in shape]
+    levels[0] += np.repeat(toolpath.start, per, axis=0)
+    first = [toolpath.start[:1], *(np.zeros_like(toolpath.start[:1]) for _ in range(3))]
+    position, velocity, acceleration, jerk = (np.vstack(pair) for pair in zip(first, levels, strict=True))
+    return Trajectory(
+        axes=toolpath.axes,
+        dt=dt,
+        t=np.arange(len(position)) * dt,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        s=np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))),
+        feed=np.linalg.norm(velocity, axis=1),
+        block=np.append(toolpath.block[0], np.repeat(toolpath.block, per)),
+        line=np.append(toolpath.line[0], np.repeat(toolpath.line, per)),
+    )
+
+
+def make_verdict(*, passed: bool = True) -> Any:
+    def check(ratio: float, limited: bool = True) -> Any:
+        return SimpleNamespace(ratio=ratio, value=1.0, limit=1.0, limited=limited, line=3)
+
+    return SimpleNamespace(
+        passed=passed,
+        limits={
+            "velocity.x": check(0.5),
+            "velocity.y": check(1.0000004),
+            "acceleration.x": check(0.75),
+            "jerk.x": check(3.5, limited=False),
+        },
+        contour_error_mm=0.0123,
+        vertex_error_mm=0.02,
+        end_error_mm=0.0,
+        faults=()
+        if passed
+        else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),
+        summary=lambda: {
+            "passed": passed,
+            "limits": {"velocity.x": 0.5, "velocity.y": 1.0000004, "acceleration.x": 0.75, "jerk.x": 3.5},
+            "contour_error_mm": 0.0123,
+            "vertex_error_mm": 0.02,
+            "end_error_mm": 0.0,
+        },
+    )
+
+
+def make_corners() -> Any:
+    return SimpleNamespace(
+        line=np.array([3, 4, 5]),
+        theta=np.full(3, np.pi / 2),
+        d_in=np.full(3, 0.1),
+        d_out=np.full(3, 0.1),
+        tol_ap=np.full(3, 0.013),
+        kappa_max=np.full(3, 12.0),
+        feed_closed_form=np.full(3, 14.0),
+        feed_planned=np.array([14.0, 13.0, 7.0]),
+        limited_by=np.array(["normal_acceleration", "acceleration.x", "feed"]),
+        worst_ratio=lambda: 1.0,
+    )
+
+
+def make_plan(text: str = SQUARE, *, machine: str = "mill", passed: bool = True, solved: bool = True) -> Any:
+    limits = load_machine(machine)
+    program = parse_program(text, limits, source="square.ngc")
+    toolpath = toolpath_from_program(program, limits)
+    trajectory = trajectory_along(toolpath) if solved else None
+    t = np.linspace(0.0, trajectory.cycle_time, 40) if trajectory is not None else np.zeros(2)
+    return SimpleNamespace(
+        method="toppra",
+        corner="bezier",
+        solver="Reachability()",
+        program=program,
+        machine=limits,
+        toolpath=toolpath,
+        corners=make_corners(),
+        status=SimpleNamespace(name="OPTIMAL" if solved else "INFEASIBLE"),
+        sentence="solved" if solved else "no feed satisfies all limits; loosen the tolerance",
+        trajectory=trajectory,
+        verdict=make_verdict(passed=passed) if solved else None,
+        stop_time=1.25,
+        grid_points=40,
+        grid=SimpleNamespace(
+            t=t, s=t, feed=t, active=np.arange(40) % 3, active_names=("feed", "velocity.x", "acceleration.y")
+        )
+        if solved
+        else None,
+        timings={"read": 0.01, "solve": 0.02},
+        solved=solved,
+    )

@@ -1,0 +1,93 @@
+"""The files of a plan: complete, of one run, and JSON that any parser reads."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hand_made import SQUARE, make_plan
+
+from planner.errors import InputError
+from planner.machine import machine_from_dict
+from planner.nc.info import describe
+from planner.nc.reader import parse_program
+from planner.report.export import info_summary, summary, write_plan
+from planner.report.trajectory_file import FORMATS, read_trajectory
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_files_belong_together(tmp_path: Path, file_format: str) -> None:
+    plan = make_plan()
+    names = write_plan(plan, tmp_path / "out", file_format=file_format)  # type: ignore[arg-type]
+    written = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert names == written["files"] == sorted(file.name for file in (tmp_path / "out").iterdir())
+    read = read_trajectory(tmp_path / "out" / f"trajectory.{file_format}")
+    assert read.metadata["run_id"] == written["run_id"]
+    assert read.metadata["tolerance_mm"] == 0.02
+    assert read.metadata["not_limited"] == ["jerk.x"]
+    assert machine_from_dict(read.metadata["machine"]) == plan.machine
+    assert np.array_equal(read.trajectory.jerk, plan.trajectory.jerk)
+
+
+def test_another_format_replaces_the_first(tmp_path: Path) -> None:
+    write_plan(make_plan(), tmp_path / "out", file_format="csv")
+    (tmp_path / "out" / "mine.txt").write_text("mine")
+    write_plan(make_plan(), tmp_path / "out", file_format="npz")
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
+        "mine.txt",
+        "summary.json",
+        "trajectory.npz",
+    ]
+
+
+def test_a_foreign_summary_is_no_list_of_ours(tmp_path: Path) -> None:
+    """Names that would lead out of the directory are not followed."""
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "summary.json").write_text(json.dumps({"files": ["../victim", 3]}))
+    write_plan(make_plan(), tmp_path / "out")
+    assert (tmp_path / "victim").read_text() == "mine"
+
+
+def test_summary_has_the_contract_s_keys() -> None:
+    said = json.loads(json.dumps(summary(make_plan()), allow_nan=False))
+    assert said["cycle_time_s"] == pytest.approx(0.8)
+    assert said["status"] == "OPTIMAL"
+    assert said["verdict"]["passed"] is True
+    assert said["verdict"]["limits"]["velocity.x"] == 0.5
+    assert set(said["verdict"]) >= {"contour_error_mm", "vertex_error_mm", "end_error_mm"}
+    assert said["corners"] == {"count": 3, "worst_speed_ratio": 1.0}
+    assert set(said) >= {"method", "corner", "blocks", "grid_points", "timings_s", "versions"}
+    assert set(said["versions"]) >= {"planner", "python", "numpy"}
+
+
+def test_summary_of_an_unsolved_plan() -> None:
+    plan = make_plan(solved=False)
+    plan.stop_time = float("nan")
+    said = json.loads(json.dumps(summary(plan), allow_nan=False))
+    assert said["cycle_time_s"] is None
+    assert said["verdict"] is None
+    assert said["stop_time_s"] is None
+    assert "loosen" in said["sentence"]
+
+
+def test_an_unsolved_plan_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no trajectory"):
+        write_plan(make_plan(solved=False), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_unwritable_directory(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written") as fault:
+        write_plan(make_plan(), tmp_path / "file" / "out")
+    assert fault.value.source == str(tmp_path / "file" / "out")
+    with pytest.raises(InputError, match="is a file, not a directory"):
+        write_plan(make_plan(), tmp_path / "file")
+
+
+def test_info_is_json() -> None:
+    said = info_summary(describe(parse_program(SQUARE), lines=7))
+    assert json.loads(json.dumps(said, allow_nan=False))["blocks"]["line"] == 4

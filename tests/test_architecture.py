@@ -1,0 +1,119 @@
+"""Imports go from later stages to earlier ones only, and heavy packages load only where they are used."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent / "planner"
+
+# Earlier stages first. A module is in the layer with the longest matching name; modules of one layer may import each other.
+LAYERS = (
+    "planner",
+    "planner.units",
+    "planner.errors",
+    "planner.arrays",
+    "planner.machine",
+    "planner.nc",
+    "planner.geometry",
+    "planner.corners",
+    "planner.path",
+    "planner.constraints",
+    "planner.feedrate",
+    "planner.trajectory",
+    "planner.timing",
+    "planner.verify",
+    "planner.plan",
+    "planner.methods",
+    "planner.report",
+    "planner.cli",
+)
+# The judge sees the path, the machine and the samples, and no code of those it judges.
+VERIFY_MAY_IMPORT = {"units", "errors", "arrays", "machine", "geometry.toolpath", "trajectory", "verify"}
+HEAVY = {"casadi", "matplotlib", "toppra", "numba", "scipy", "pyarrow", "ruckig"}
+
+
+def modules() -> dict[str, Path]:
+    found = {}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        parts = ("planner", *file.relative_to(PACKAGE).with_suffix("").parts)
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    return found
+
+
+MODULES = modules()
+
+
+def imports(file: Path) -> set[str]:
+    """Names of the package's modules that a file imports at run time; annotations do not count."""
+    names = set()
+    for node in ast.walk(_without_type_checking(ast.parse(file.read_text(encoding="utf-8")))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names |= {
+                f"{node.module}.{alias.name}" if f"{node.module}.{alias.name}" in MODULES else node.module
+                for alias in node.names
+            }
+        elif isinstance(node, ast.ImportFrom):
+            raise AssertionError(f"{file}: relative import; write the full name")
+    return {name for name in names if name.split(".")[0] == "planner"}
+
+
+def _without_type_checking(tree: ast.Module) -> ast.Module:
+    tree.body = [
+        node
+        for node in tree.body
+        if not (isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"))
+    ]
+    return tree
+
+
+def layer(module: str) -> int:
+    while module not in LAYERS:
+        assert "." in module, f"{module} is in no layer: add it to LAYERS"
+        module = module.rpartition(".")[0]
+    return LAYERS.index(module)
+
+
+@pytest.mark.parametrize("module", sorted(set(MODULES) - {"planner"}))
+def test_imports_go_to_earlier_layers(module: str) -> None:
+    assert layer(module) > 0, f"{module} is in no layer: add it to LAYERS"
+    later = {name for name in imports(MODULES[module]) if layer(name) > layer(module)}
+    assert not later, f"{module} imports later stages: {later}"
+
+
+def test_the_verifier_is_independent() -> None:
+    for module, file in MODULES.items():
+        if module.startswith("planner.verify"):
+            for name in imports(file):
+                short = name.removeprefix("planner.")
+                assert short in VERIFY_MAY_IMPORT or short.startswith("verify."), f"{module} imports {name}"
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import planner",
+        "from planner.cli import app; app(['--help'], standalone_mode=False)",
+        "from planner.cli import app; app(['plan', '--help'], standalone_mode=False)",
+        "from planner.cli import app; app(['machine', 'init', '--help'], standalone_mode=False)",
+    ],
+)
+def test_help_and_import_load_nothing_heavy(code: str) -> None:
+    code += "\nimport sys\nprint('loaded:', *sorted(name for name in sys.modules if '.' not in name))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.rpartition("loaded:")[2].split())
+    assert "planner" in loaded
+    assert not loaded & HEAVY
+
+
+def test_readme_names_files_that_exist() -> None:
+    readme = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+    for name in ("planner/examples/bracket.ngc",):
+        assert name in readme
+        assert (PACKAGE.parent / name).is_file()

@@ -17,6 +17,7 @@ from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
 NUMBER_MAX = 1e9
+CODE_MAX = 1e4  # larger G and M numbers are all unknown
 _CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
 _MOTION_LETTERS = "XYZ"
 _ARC_LETTERS = "IJKR"
@@ -34,6 +35,8 @@ class Block:
     at      : index of the word by letter or modal group, for messages
     ended   : the line is a "%"
     foreign : a code that is not supported uses the line's words; no move is read from it
+    refused_motion : such a code is a motion code and stays in force
+    partial : some words were reported and left out; others may have belonged to them
     """
 
     line: int
@@ -44,6 +47,7 @@ class Block:
     ended: bool = False
     foreign: bool = False
     refused_motion: bool = False
+    partial: bool = False
 
     def has(self, letters: str) -> bool:
         return any(letter in self.value for letter in letters)
@@ -62,7 +66,6 @@ def read_block(words: Words, row: int, report: Report) -> Block | None:
     whole."""
     block = Block(line=int(words.line[row]))
     first, last = int(words.first[row]), int(words.first[row + 1])
-    tolerated = 0  # words reported and left out
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])
         if code == FAULT:
@@ -79,10 +82,10 @@ def read_block(words: Words, row: int, report: Report) -> Block | None:
                 report(word, "a line number comes first on its line, once")
                 return None
         elif letter in "GM":
-            tolerated += _add_code(block, letter, value, word, report)
+            block.partial |= _add_code(block, letter, value, word, report)
         elif letter in codes.LETTERS_REFUSED:
             report(word, str(codes.LETTERS_REFUSED[letter]))
-            tolerated += 1
+            block.partial = True
         elif letter in block.value:
             report(word, f"a second {letter} word on this line; write one")
             return None
@@ -91,14 +94,14 @@ def read_block(words: Words, row: int, report: Report) -> Block | None:
             return None
         else:
             block.value[letter], block.at[letter] = value, word
-    if not tolerated:
+    if not block.partial:
         _check_used(block, report)
     return block
 
 
 def _add_code(block: Block, letter: str, value: float, word: int, report: Report) -> bool:
     """Put a G or M code into its group; True if it was reported instead."""
-    code = round(value * 10.0)
+    code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
     known, refused = (codes.G_GROUP, codes.G_REFUSED) if letter == "G" else (codes.M_GROUP, codes.M_REFUSED)
     exact = abs(value * 10.0 - code) <= 10.0 * _CODE_ROUNDING
     if not exact or code not in known:

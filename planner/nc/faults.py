@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 from planner.errors import InputError
+from planner.nc.lexer import Words
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,27 @@ class Fault:
 
     def __str__(self) -> str:
         return f"{self.word}: {self.message}" if self.word else self.message
+
+
+class FaultList(Sequence[Fault]):
+    """Faults by word; a `Fault` is made when it is looked at (a rotary program has 220,000)."""
+
+    def __init__(self, words: Words, found: list[tuple[int, str]]):
+        self._words, self._found = words, found
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    @overload
+    def __getitem__(self, index: int) -> Fault: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Fault]: ...
+    def __getitem__(self, index: int | slice) -> Fault | Sequence[Fault]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        word, message = self._found[index]
+        line = int(self._words.line[self._words.row(word)])
+        return Fault(line, self._words.column(word), self._words.text(word), message)
 
 
 def require_none(faults: Sequence[Fault], source: str) -> None:

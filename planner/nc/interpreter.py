@@ -17,7 +17,7 @@ import numpy as np
 from planner.machine import Machine
 from planner.nc import codes, moves
 from planner.nc.block import Block, read_block
-from planner.nc.faults import Fault
+from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
@@ -37,14 +37,14 @@ _WHY_NO_MOTION = {
 
 
 class Interpreter:
-    """Runs the words of one program. After `run`: `program()`, `faults`, `notes`."""
+    """Runs the words of one program. After `run`: `program()`, `faults()`, `notes`."""
 
     def __init__(self, words: Words, machine: Machine | None, source: str):
         self.words, self.source = words, source
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
-        self.store = Store(len(words.line))
-        self.faults: list[Fault] = []
+        self.store = Store(len(words.line), len(words.letter))
+        self._reports: list[tuple[int, str]] = []
         self.notes: dict[str, None] = {}  # ordered, each once
 
     def program(self) -> Program:
@@ -70,8 +70,14 @@ class Interpreter:
             self.note(f"the program ends on line {end}; what follows from line {after} on is not read")
 
     def report(self, word: int, message: str) -> None:
-        line = int(self.words.line[np.searchsorted(self.words.first, word, side="right") - 1])
-        self.faults.append(Fault(line, self.words.column(word), self.words.text(word), message))
+        self._reports.append((word, message))
+
+    def faults(self) -> FaultList:
+        """All faults in the order of the program."""
+        refused = self.store.refused_word[: self.store.refusals]
+        letters = self.words.letter[refused]
+        found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
+        return FaultList(self.words, sorted(found + self._reports))
 
     def note(self, text: str) -> None:
         self.notes[text] = None

@@ -57,6 +57,10 @@ class Words:
     first: Array
     data: bytes
 
+    def row(self, word: int) -> int:
+        """The row that holds a word."""
+        return int(np.searchsorted(self.first, word, side="right")) - 1
+
     def column(self, word: int) -> int:
         """1-based column of a word, in characters."""
         return len(self._line_before(word).decode("utf-8", "replace")) + 1

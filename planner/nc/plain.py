@@ -1,4 +1,5 @@
-"""The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words and nothing else. Everything else stops it.
+"""The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused whatever stands beside them
+(rotary axes, extruders). Everything else stops it.
 
 This is what programs are long with (249,000 of 249,132 lines of a relief, 110,000 S words of a laser engraving). It follows the
 same rules as the interpreter: feed first, then S, then the straight move; whatever is not certainly right is left to the
@@ -11,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from planner.nc.block import NUMBER_MAX
+from planner.nc.codes import LETTERS_REFUSED
 from planner.nc.lexer import Words
 from planner.nc.program import Kind
 from planner.nc.state import State
@@ -18,17 +20,20 @@ from planner.nc.store import Store
 from planner.units import SECONDS_PER_MINUTE
 
 _F, _G, _N, _S, _X, _Z = 70, 71, 78, 83, 88, 90
+_REFUSED = np.zeros(256, dtype=np.bool_)
+_REFUSED[[ord(letter) for letter in LETTERS_REFUSED if letter != "O"]] = True
 _RAPID, _LINE = int(Kind.RAPID), int(Kind.LINE)
 
 
 def run_plain(words: Words, row: int, state: State, store: Store) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
-    row, store.blocks, store.events, state.motion, state.feed = _run(
+    row, store.blocks, store.events, store.refusals, state.motion, state.feed = _run(
         words.letter, words.value, words.line, words.first, row, len(words.line),
         state.motion, state.absolute, state.unit, state.feed, int(state.path_control), state.tolerance,
         state.position, state.offset,
         store.kind, store.end, store.feed, store.line, store.path_control, store.tolerance, store.blocks,
         store.event_block, store.event_line, store.event_letter, store.event_value, store.events,
+        _REFUSED, store.refused_word, store.refusals,
     )  # fmt: skip
     return row
 
@@ -40,11 +45,13 @@ def _run(
     position, offset,
     block_kind, block_end, block_feed, block_line, block_path_control, block_tolerance, blocks,
     event_block, event_line, event_letter, event_value, events,
+    is_refused, refused_word, refusals,
 ):  # fmt: skip  # pragma: no cover - compiled
     given = np.empty(3)
     while row < rows:
         code, new_feed, speed, moves, is_plain = -1, -1.0, -1.0, False, True
         given[:] = np.nan
+        refused = refusals
         for word in range(first[row], first[row + 1]):
             c, v = letter[word], value[word]
             if _X <= c <= _Z and np.isnan(given[c - _X]) and abs(v) <= NUMBER_MAX:
@@ -56,6 +63,9 @@ def _run(
                 new_feed = v
             elif c == _S and speed < 0 and 0 <= v <= NUMBER_MAX:
                 speed = v
+            elif is_refused[c]:
+                refused_word[refused] = word
+                refused += 1
             elif c != _N or word > first[row]:
                 is_plain = False
                 break
@@ -67,7 +77,7 @@ def _run(
         if not is_plain or (moves and (code < 0 or code > 1 or (code == 1 and new_feed == 0.0))):
             break
 
-        motion, feed = code, new_feed
+        motion, feed, refusals = code, new_feed, refused
         if speed >= 0:
             event_block[events], event_line[events] = blocks, line[row]
             event_letter[events], event_value[events] = _S, speed
@@ -85,4 +95,4 @@ def _run(
             block_tolerance[blocks] = tolerance
             blocks += 1
         row += 1
-    return row, blocks, events, motion, feed
+    return row, blocks, events, refusals, motion, feed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from planner.errors import InputError
@@ -35,7 +36,7 @@ def parse_program(
 
 def interpret(
     text: bytes | str, machine: Machine | None, *, source: str, block_delete: bool
-) -> tuple[Interpreter, list[Fault]]:
+) -> tuple[Interpreter, Sequence[Fault]]:
     """Run a program to its end past everything that is not supported; the faults in the order of the lines.
 
     A program in another language is one fault, and none of it is run. Raises InputError for an empty or binary text.
@@ -48,7 +49,7 @@ def interpret(
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     interpreter = Interpreter(words, machine, source)
     interpreter.run()
-    return interpreter, [foreign] if foreign else interpreter.faults
+    return interpreter, [foreign] if foreign else interpreter.faults()
 
 
 def load(path: str | Path) -> bytes:

@@ -17,12 +17,13 @@ from planner.nc.state import State
 class Store:
     """Blocks and events so far. The arrays have room to spare; `blocks` and `events` say how much is used.
 
-    The compiled loop over plain rows writes into the arrays directly and sets the two counts.
+    The compiled loop over plain rows writes into the arrays directly and sets the counts.
     """
 
-    def __init__(self, rows: int):
+    def __init__(self, rows: int, words: int):
         self.blocks = 0
         self.events = 0
+        self.refusals = 0
         self.kind = np.empty(rows, dtype=np.uint8)
         self.end = np.empty((rows, 3))
         self.feed = np.empty(rows)
@@ -33,6 +34,7 @@ class Store:
         self.event_line = np.empty(rows, dtype=np.int32)
         self.event_letter = np.empty(rows, dtype=np.uint8)
         self.event_value = np.empty(rows)
+        self.refused_word = np.empty(words, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
 

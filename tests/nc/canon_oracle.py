@@ -3,9 +3,9 @@
 
     canon_oracle.py CANON_FOLDER JOBS.json OUT.npz
 
-CANON_FOLDER holds `lcnc_canon.py`. A job is {"path", "parameters": {number: inch}, "tools": {number: length [inch]}}. OUT gets per job k
-the arrays k.move (M, 11) and k.error (a text, empty if the program was read to its end). Columns of a move: kind (0 rapid, 1 feed,
-2 arc, 3 dwell), line, end x y z, feed [mm/min] or seconds, centre x y z, normal axis.
+CANON_FOLDER holds `lcnc_canon.py`. A job is {"path", "parameters": {number: inch}, "tools": {number: length [inch]}}. OUT gets per
+job k the arrays k.move (M, 11) and k.error (a text, empty if the program was read to its end).
+Columns of a move: kind (0 rapid, 1 feed, 2 arc, 3 dwell), line, end x y z, feed [mm/min] or seconds, centre x y z, normal axis.
 
 The module `gcode` differs from the standalone `rs274` where this matters: it looks tools up in a table shared with a running
 LinuxCNC (lcnc_canon makes one, numbers 1 to 99) and asks `get_tool` for their lengths; parameters are lengths in inches; and a
@@ -32,7 +32,6 @@ def main(folder, jobs_file, out_file):
         """Adds the tool offset, and keeps moves as rows of numbers."""
 
         tool = (0.0,) * 9
-        lengths: dict = {}
 
         def get_tool(self, index):  # number, x y z a b c u v w offsets, diameter, angles, orientation
             return (index, 0.0, 0.0, self.lengths.get(str(index), 0.0), *(0.0,) * 9, 0)

@@ -169,8 +169,9 @@ def offsets_in_inches() -> dict:
 def random_program(rng: np.random.Generator) -> str:
     """A program of valid lines. Arcs in every form close by construction.
 
-    A program has either inches or tool lengths: when units change, the module `gcode` takes a tool length in force for as many of
-    the new units (G30 and G53 then end elsewhere), and under G20 it takes the millimetres of G43 for inches. Here a length is a length.
+    A program has either inches or tool lengths: when units change, the module `gcode` takes a tool length in force for as
+    many of the new units (G30 and G53 then end elsewhere), and under G20 it takes the millimetres of G43 for inches.
+    Here a length is a length.
     """
     lines = ["G0 X1 Y2 Z3", "F120"]
     absolute, inches = True, bool(rng.integers(2))

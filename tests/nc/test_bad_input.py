@@ -1,0 +1,164 @@
+"""Every refusal: line, column, the word found and what to do. Lines before the faulty one are valid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from planner.errors import InputError
+from planner.nc import codes
+from planner.nc.info import inspect_program
+from planner.nc.lexer import LINE_MAX
+from planner.nc.reader import parse_program, read_program
+
+# program, line, column, parts of the message
+REFUSED = [
+    # what cannot be split into words
+    ("G0 X#1", 1, 4, ["X", "parameters are not supported"]),
+    ("#1=5", 1, 1, ["#", "parameters"]),
+    ("G0 X[1+2]", 1, 4, ["X", "expressions are not supported"]),
+    ("G0 X1 [2]", 1, 7, ["[", "expressions"]),
+    ("G21\n$H", 2, 1, ["$", "commands to the control"]),
+    ("G0 X1\nG0 =5", 2, 4, ["=", "Siemens"]),
+    ("G0 X1 @2", 1, 7, ["@", "polar"]),
+    ("G0 X1 ^2", 1, 7, ["^", "polar"]),
+    ("G0 X1 <a>", 1, 7, ["<", "named parameters"]),
+    ('T"A"', 1, 1, ["T", "texts"]),
+    ("G0 /X1", 1, 4, ["/", "start of a line"]),
+    ("G0 X1 )", 1, 7, [")", "not opened"]),
+    ("G0 X1 ?", 1, 7, ["?", "starts no word"]),
+    ("G0 X1 \x07", 1, 7, ["character 7", "binary"]),
+    ("é\nG0 X1", 1, 1, ["é", "starts no word"]),
+    ("(é) é", 1, 5, ["é"]),
+    ("10 L X5", 1, 1, ["1", "without a letter"]),
+    ("G0 X1.2.3", 1, 8, [".", "without a letter"]),
+    ("G0 X--1", 1, 4, ["X", "without a number"]),
+    ("G0 X.", 1, 4, ["X", "without a number"]),
+    ("G0 X1 (a", 1, 7, ["(", "not closed"]),
+    ("G0 (a(b))", 1, 6, ["(", "inside a comment"]),
+    ("G0 X1\n" + "X" + "1" * LINE_MAX, 2, 1, [str(LINE_MAX), "longer"]),
+    ("X1" * 500_000, 1, 1, [str(LINE_MAX)]),
+    ("%1234\nG0 X1", 1, 1, ["%", "alone on its line"]),
+    # words
+    ("G0 X1 A30.5", 1, 7, ["A30.5", "rotary axis", "three-axis"]),
+    ("G0 X1 W2", 1, 7, ["W2", "linear axis"]),
+    ("G0 X1e3", 1, 6, ["e3", "exponent"]),
+    ("G0 X1 D2", 1, 7, ["D2", "cutter radius"]),
+    ("G0 X1 L2", 1, 7, ["L2", "repetition"]),
+    ("o100 call", 1, 1, ["subprogram"]),
+    ("G0 X1 X2", 1, 7, ["X2", "second X"]),
+    ("G0 N5 X1", 1, 4, ["N5", "comes first"]),
+    ("G0 X" + "9" * 301, 1, 4, ["too large", "1e+09"]),
+    ("G0 X1000000001", 1, 4, ["X1000000001", "too large"]),
+    ("G0 X1 P2", 1, 7, ["P2", "without G4, G64, G2 or G3"]),
+    ("G0\nX1 P2", 2, 4, ["P2", "without G4"]),
+    ("G0\nX1 I2", 2, 4, ["I2", "without G2 or G3"]),
+    ("G0 X1 Q2", 1, 7, ["Q2", "without G64"]),
+    ("G0 X1 H2", 1, 7, ["H2", "without G43"]),
+    ("T1.5", 1, 1, ["T1.5", "whole number, 0 or more"]),
+    ("T-1", 1, 1, ["T-1", "whole number"]),
+    ("G43 H1.5", 1, 5, ["H1.5", "whole number"]),
+    ("S-5", 1, 1, ["S-5", "negative"]),
+    ("G0 X1\nF0", 2, 1, ["F0", "positive"]),
+    ("F-3", 1, 1, ["F-3", "positive"]),
+    # codes
+    ("G0 G1 X1", 1, 4, ["G1", "G0 and G1", "motion"]),
+    ("G90 G91", 1, 5, ["G91", "same group"]),
+    ("M3 M5", 1, 4, ["M5", "M3 and M5", "spindle"]),
+    ("G1.55 X1", 1, 1, ["G1.55", "does not know"]),
+    ("G1.1 X1", 1, 1, ["G1.1", "does not know"]),
+    ("G" + "9" * 400, 1, 1, ["does not know"]),
+    ("M-3", 1, 1, ["M-3", "does not know"]),
+    ("M428", 1, 1, ["M428", "does not know"]),
+    ("M106 S3", 1, 1, ["M106", "each machine"]),
+    *[
+        (f"G21\nG{codes.number(code)}", 2, 1, [f"G{codes.number(code)}", refusal.what, refusal.remedy])
+        for code, refusal in codes.G_REFUSED.items()
+    ],
+    *[
+        (f"G21\nM{codes.number(code)}", 2, 1, [f"M{codes.number(code)}", refusal.what, refusal.remedy])
+        for code, refusal in codes.M_REFUSED.items()
+    ],
+    # what the state does not allow
+    ("X1", 1, 1, ["X1", "no motion code"]),
+    ("G0 X1\nG80\nX2", 3, 1, ["X2", "no motion code"]),
+    ("G1 X1", 1, 1, ["G1", "without a feed"]),
+    ("G1\nX1", 2, 1, ["X1", "without a feed"]),
+    ("G0 X1\nG2 X2 I0.5", 2, 1, ["G2", "without a feed"]),
+    ("G28 G0 X1", 1, 1, ["G28", "G28 and G0", "two lines"]),
+    ("G92 G1 F1 X1", 1, 1, ["G92", "two lines"]),
+    ("G92", 1, 1, ["G92", "at least one of X, Y and Z"]),
+    ("G53 G2 X1 Y1 R1 F10", 1, 1, ["G53", "G0 or G1 only"]),
+    ("G0\nG53", 2, 1, ["G53", "G0 or G1 only"]),
+    ("G91 G0 X1\nG53 X1", 2, 1, ["G53", "absolute"]),
+    ("G4", 1, 1, ["G4", "P word"]),
+    ("G4 P-1", 1, 4, ["P-1", "P word"]),
+    ("G64 P-1", 1, 5, ["P-1", "negative"]),
+    # arcs
+    ("F1\nG2 X1", 2, 1, ["G2", "needs a centre or a radius", "I and J"]),
+    ("F1 G18\nG2 X1", 2, 1, ["K and I"]),
+    ("F1\nG2 R1", 2, 1, ["end point", "x y plane"]),
+    ("F1\nG2 X1 I1 R1", 2, 1, ["R and I J K"]),
+    ("F1\nG2 X1 Y1 K1", 2, 1, ["K in the x y plane", "G18"]),
+    ("F1\nG2 X2 R0.9", 2, 1, ["radius 0.9 mm", "2 mm away", "at least 1 mm"]),
+    ("F1\nG2 X0 Y0 R1", 2, 1, ["must not end where it starts"]),
+    ("F1\nG2 X1 R0", 2, 1, ["radius 0 mm"]),
+    ("F1\nG2 X1 Y1 I0 J0", 2, 1, ["radius 0 mm at its start"]),
+    ("F1\nG2 X1 I1 P0", 2, 10, ["P0", "whole number, 1 or more"]),
+    ("F1 G90.1\nG2 X2 I1", 2, 1, ["J is missing", "G90.1"]),
+    ("F1\nG2 X20.5 I10", 2, 1, ["10 mm", "10.5 mm", "0.5 mm apart", "allowed are 0.0282843 mm", "correct"]),
+    ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
+    ("F1\nG90.1\nG0 X30\nG2 X50 I10 J0", 4, 1, ["if its centre were incremental: write G91.1"]),
+    # other languages, other files
+    ("0 BEGIN PGM 11 MM\n1 L X+5", 1, 3, ["BEGIN PGM", "Heidenhain"]),
+    ("G21\nN10 CYCLE800()\nG0 X1", 2, 5, ["CYCLE800(", "Siemens"]),
+    ("IN;SP1;PU0,0;PD5,5;", 1, 1, ["IN;", "HPGL"]),
+    ("", 1, 1, ["empty"]),
+    ("(nothing)\n\n; here", 1, 1, ["empty"]),
+    ("G0 X1\nG\0", 2, 2, ["NUL", "binary"]),
+    ("G0 X1".encode("utf-16"), 1, 4, ["NUL", "UTF-16"]),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "column", "parts"), REFUSED, ids=lambda v: str(v)[:30])
+def test_refused(text: str | bytes, line: int, column: int, parts: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_program(text, source="job.ngc")
+    fault = caught.value
+    assert (fault.source, fault.line, fault.column) == ("job.ngc", line, column)
+    for part in parts:
+        assert part in fault.message
+    assert str(fault).startswith(f"job.ngc:{line}:{column}: ")
+
+
+@pytest.mark.parametrize(("letter", "needs"), codes.LETTER_NEEDS.items())
+def test_words_that_nothing_uses_are_refused(letter: str, needs: str) -> None:
+    with pytest.raises(InputError, match=f"{letter} word without {needs}"):
+        parse_program(f"G21 {letter}1\nG0 X1" if letter in "QH" else f"G0 X1 {letter}1")
+
+
+def test_first_fault_is_named_and_the_others_counted() -> None:
+    with pytest.raises(InputError, match=r"^<text>:2:4: X: parameters .* \(2 more in this program"):
+        parse_program("G0 X1\nG0 X#1\nG0 A1\nG81 X1 Z2 R3")
+
+
+def test_faults_after_the_end_are_not_read() -> None:
+    program = parse_program("G0 X1\nM30\nG81 X1 A2 #3")
+    assert len(program) == 1
+    assert program.notes == ("the program ends on line 2; what follows from line 3 on is not read",)
+
+
+@pytest.mark.parametrize("read", [read_program, inspect_program])
+def test_files_that_cannot_be_read(read, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not found") as caught:
+        read(tmp_path / "absent.ngc")
+    assert caught.value.source == str(tmp_path / "absent.ngc")
+    with pytest.raises(InputError, match="directory"):
+        read(tmp_path)
+    with pytest.raises(InputError, match="cannot be read"):
+        read("\0")
+    binary = tmp_path / "program.bin"
+    binary.write_bytes(b"G0 X1\n\x00\x01")
+    with pytest.raises(InputError, match="binary"):
+        read(binary)

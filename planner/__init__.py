@@ -1,1 +1,63 @@
-"""Optimisation-based feedrate planning for CNC machines."""
+"""Optimisation-based feedrate planning for CNC machines.
+
+    plan                 read, round, solve, sample and verify a job: one call
+    Plan                 what it returns
+    Machine, load_machine
+    Program, read_program
+    Toolpath, Trajectory, Verdict
+    InputError, NotSolvedError
+
+Names and units: `planner.units`. Everything is imported on first use, so that `import planner` costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planner.errors import InputError, NotSolvedError
+    from planner.geometry.toolpath import Toolpath
+    from planner.machine import Machine, load_machine
+    from planner.methods.names import plan
+    from planner.methods.plan import Plan
+    from planner.nc.program import Program
+    from planner.nc.reader import read_program
+    from planner.trajectory import Trajectory
+    from planner.verify import Verdict
+
+_HOME = {
+    "plan": "planner.methods.names",
+    "Plan": "planner.methods.plan",
+    "Machine": "planner.machine",
+    "load_machine": "planner.machine",
+    "Program": "planner.nc.program",
+    "read_program": "planner.nc.reader",
+    "Toolpath": "planner.geometry.toolpath",
+    "Trajectory": "planner.trajectory",
+    "Verdict": "planner.verify",
+    "InputError": "planner.errors",
+    "NotSolvedError": "planner.errors",
+}
+
+__all__ = [
+    "InputError",
+    "Machine",
+    "NotSolvedError",
+    "Plan",
+    "Program",
+    "Toolpath",
+    "Trajectory",
+    "Verdict",
+    "load_machine",
+    "plan",
+    "read_program",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'planner' has no attribute '{name}'")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

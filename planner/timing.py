@@ -1,14 +1,15 @@
-"""From a speed profile along the path to samples in time: the solution itself, integrated exactly, with nothing smoothed on top.
+"""From a speed profile along the path to samples in time: the solution itself, integrated exactly, nothing smoothed on top.
 
-On the interval to the right of grid point i the acceleration u along the path is constant, hence
+The profile becomes a time law, s(t) in pieces of constant jerk (zero for second-order profiles, whose acceleration u along the
+path is constant on every grid interval):
 
-    t_{i+1} = t_i + 2 h / (feed_i + feed_{i+1}),      s(t) = s_i + feed_i tau + u tau^2/2,    tau = t - t_i,
+    t_{i+1} = t_i + 2 h / (feed_i + feed_{i+1}),      s(t) = s_i + feed_i tau + u tau^2/2 + jerk tau^3/6,    tau = t - t_i,
 
 and per axis, with r', r'', r''' at s(t):
 
     velocity      r' feed
     acceleration  r' u + r'' feed^2
-    jerk          3 r'' feed u + r''' feed^3            (inside an interval; u jumps at grid points)
+    jerk          r' jerk + 3 r'' feed u + r''' feed^3            (inside a piece of the law; at its ends u may jump)
 
 Samples lie at k dt and, last, at the end of the program, so the last period is usually shorter. Dwells hold the position.
 """
@@ -23,12 +24,12 @@ from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.constraints.problem import FeedrateProblem
-from planner.corners.elements import ElementTable, element_length, element_point, to_arc_length
+from planner.corners.elements import element_length, element_point, to_arc_length
 from planner.feedrate.solution import FeedrateSolution, interval_times
 from planner.path import PathSamples
 from planner.trajectory import Trajectory
 
-# Arc length is inverted to this share of the interval [-]: 1e-11 mm on a grid interval of 0.1 mm, below the rounding of coordinates.
+# Arc length is inverted to this share of the interval [-]: 1e-11 mm on 0.1 mm, below the rounding of coordinates.
 LENGTH_ROUNDING = 1e-10
 # Steps on s(w) at most; one is the rule where the interpolated inverse is not good enough by itself.
 REFINE_STEPS = 12
@@ -39,130 +40,155 @@ CHUNK = 100_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Motion:
-    """The planned motion as a function of time: P grid points with their times.
+class TimeLaw:
+    """s(t) in L pieces of constant jerk along the path; dwells are pieces without motion.
 
-    axes          : axis letters
-    table         : geometry of the elements
-    t             : (P,) time of each grid point [s]; a dwell lies between the two points of a full stop
-    s, feed, acc_s: (P,) arc length, ds/dt, and d2s/dt2 of the interval to the right
-    element, w0, w1 : (P,) geometry of that interval
-    position      : (P, A) at the grid points
-    block, line   : (P,) program block and source line of that interval
-    still         : (P,) True where no interval follows (end of a piece)
-    end_time      : [s], including a dwell at the end
+    t       : (L,) start of each piece [s], non-decreasing
+    s       : (L,) arc length there [mm]
+    feed    : (L,) ds/dt there
+    acc_s   : (L,) d2s/dt2 just after t
+    jerk_s  : (L,) d3s/dt3 on the piece
+    run     : (L,) which piece of the path, between full stops, it belongs to
+    end     : end of the last piece [s]
     """
 
-    axes: tuple[str, ...]
-    table: ElementTable
     t: FloatArray
     s: FloatArray
     feed: FloatArray
     acc_s: FloatArray
-    element: Array
-    w0: FloatArray
-    w1: FloatArray
-    position: FloatArray
-    block: Array
-    line: Array
-    still: Array
-    end_time: float
+    jerk_s: FloatArray
+    run: Array
+    end: float
 
     def __post_init__(self) -> None:
-        points = len(self.t)
-        for name in ("t", "s", "feed", "acc_s", "w0", "w1"):
-            freeze(self, name, np.float64, (points,))
-        freeze(self, "position", np.float64, (points, len(self.axes)))
-        for name in ("element", "block"):
-            freeze(self, name, np.int64, (points,))
-        freeze(self, "line", np.int32, (points,))
-        freeze(self, "still", np.bool_, (points,))
+        pieces = len(self.t)
+        for name in ("t", "s", "feed", "acc_s", "jerk_s"):
+            freeze(self, name, np.float64, (pieces,))
+        freeze(self, "run", np.int64, (pieces,))
 
 
-def motion_of(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> Motion:
-    """Put times to a solved problem. Raises NotSolvedError without a solution."""
-    times = interval_times(problem, solution.require().feed_sq)
-    toolpath = samples.path.toolpath
-    dwell = toolpath.dwell[samples.path.legs.first[samples.stop]]
-    wait = np.zeros(len(samples))
-    wait[samples.piece[:-1]] = dwell[:-1]  # before the first point of a piece
-    t = np.concatenate([[0.0], np.cumsum(times)[:-1]]) + np.cumsum(wait)
-    still = np.zeros(len(samples), dtype=bool)
-    still[samples.piece[1:] - 1] = True
-    return Motion(
-        axes=problem.axes,
-        table=samples.table,
-        t=t,
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion:
+    """A planned motion as a function of time: where the path goes, and when."""
+
+    samples: PathSamples
+    law: TimeLaw
+
+
+def second_order_law(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> TimeLaw:
+    """The time law of a solved problem, dwells included. Raises NotSolvedError without a solution."""
+    duration = interval_times(problem, solution.require().feed_sq)
+    dwell = _dwells(samples)
+    duration[samples.piece[1:] - 1] += dwell[1:]  # the last point of a piece stands still
+    return TimeLaw(
+        t=dwell[0] + np.concatenate([[0.0], np.cumsum(duration)[:-1]]),
         s=samples.s,
         feed=np.sqrt(solution.feed_sq),
         acc_s=solution.acc_s,
-        element=samples.element,
-        w0=samples.w0,
-        w1=samples.w1,
-        position=samples.position,
-        block=toolpath.block[samples.segment],
-        line=toolpath.line[samples.segment],
-        still=still,
-        end_time=float(t[-1] + dwell[-1]),
+        jerk_s=np.zeros(len(samples)),
+        run=np.repeat(np.arange(len(samples.piece) - 1), np.diff(samples.piece)),
+        end=float(dwell[0] + duration.sum()),
+    )
+
+
+def law_of_phases(samples: PathSamples, duration: FloatArray, jerk_s: FloatArray) -> TimeLaw:
+    """The time law of moves from rest to rest, one per piece of the path, dwells included.
+
+    duration : (G, F) durations of the F phases of each move [s]
+    jerk_s   : (G, F) jerk along the path in each phase [mm/s3]
+    """
+    moves, phases = duration.shape
+    dwell = _dwells(samples)
+    lasting = np.concatenate([duration, dwell[1:, None]], axis=1)
+    jerk = np.concatenate([jerk_s, np.zeros((moves, 1))], axis=1)
+    s, feed, acc = (np.zeros((moves, phases + 1)) for _ in range(3))
+    s[:, 0] = samples.s[samples.piece[:-1]]
+    for f in range(phases):
+        dt, j = duration[:, f], jerk_s[:, f]
+        s[:, f + 1] = s[:, f] + dt * (feed[:, f] + dt * (acc[:, f] / 2 + dt * j / 6))
+        feed[:, f + 1] = np.maximum(feed[:, f] + dt * (acc[:, f] + dt * j / 2), 0.0)
+        acc[:, f + 1] = acc[:, f] + dt * j
+    s[:, -1], feed[:, -1], acc[:, -1] = (
+        samples.s[samples.piece[1:] - 1],
+        0.0,
+        0.0,
+    )  # exact where rounding left a trace
+    return TimeLaw(
+        t=dwell[0] + np.concatenate([[0.0], np.cumsum(lasting)[:-1]]),
+        s=s.ravel(),
+        feed=feed.ravel(),
+        acc_s=acc.ravel(),
+        jerk_s=jerk.ravel(),
+        run=np.repeat(np.arange(moves), phases + 1),
+        end=float(dwell[0] + lasting.sum()),
     )
 
 
 def sample_motion(motion: Motion, dt: float) -> Trajectory:
     """The motion at the interpolation period dt [s], last partial period included."""
-    return _trajectory(motion, _sample_times(motion.end_time, dt), dt)
+    return _trajectory(motion, _sample_times(motion.law.end, dt), dt)
 
 
 def dense_motion(motion: Motion) -> Iterator[Trajectory]:
-    """The motion between the samples: just after every grid point, in the middle and just before the next, in chunks.
+    """The motion between the samples: just after the start of every piece of the law, in its middle, just before its end.
 
-    On an interval all speeds and accelerations are smooth and nearly linear, so that their extremes show there.
+    In chunks. On a piece all speeds and accelerations are smooth and nearly linear, so that their extremes show there.
     """
-    moving = np.flatnonzero(~motion.still)
-    begin, end = motion.t[moving], motion.t[moving + 1]
+    edges = np.append(motion.law.t, motion.law.end)
+    begin, end = edges[:-1], edges[1:]
     inside = np.stack([0.999 * begin + 0.001 * end, 0.5 * (begin + end), 0.001 * begin + 0.999 * end], axis=1)
-    times = np.concatenate([[0.0], inside.ravel(), [motion.end_time]])
+    times = np.concatenate([[0.0], inside.ravel(), [motion.law.end]])
     times = times[np.concatenate([[True], np.diff(times) > 0])]
+    longest = float(np.diff(times).max())
     for first in range(0, len(times), CHUNK):
-        yield _trajectory(motion, times[first : first + CHUNK + 1], float(np.diff(times).max()))
+        yield _trajectory(motion, times[first : first + CHUNK + 1], longest)
+
+
+def _dwells(samples: PathSamples) -> FloatArray:
+    """(G+1,) standstill before each piece and after the last [s]."""
+    return samples.path.toolpath.dwell[samples.path.legs.first[samples.stop]]
 
 
 def _sample_times(end: float, dt: float) -> FloatArray:
     """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
     count = int(np.floor(end / dt * (1 + 1e-12)))
     times = np.arange(count + 1) * dt
-    if end - times[-1] > 1e-6 * dt:
-        return np.append(times, end)
-    times[-1] = end
-    return times
+    if count and end - times[-1] <= 1e-6 * dt:
+        times[-1] = end
+        return times
+    return np.append(times, end)
 
 
 def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
-    position, velocity, acceleration, jerk, s, feed, point = _sample(
-        motion.table.legs,
-        motion.table.corners,
+    samples, law = motion.samples, motion.law
+    toolpath = samples.path.toolpath
+    *columns, point = _sample(
+        samples.table.legs,
+        samples.table.corners,
         times,
-        motion.t,
-        motion.s,
-        motion.feed,
-        motion.acc_s,
-        motion.element,
-        motion.w0,
-        motion.w1,
-        motion.position,
-        motion.still,
+        law.t,
+        law.s,
+        law.feed,
+        law.acc_s,
+        law.jerk_s,
+        law.run,
+        law.end,
+        samples.piece,
+        samples.s,
+        samples.element,
+        samples.w0,
+        samples.w1,
+        samples.position,
     )
+    names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
+    segment = samples.segment[point]
     return Trajectory(
-        axes=motion.axes,
+        axes=toolpath.axes,
         dt=dt,
         t=times,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        s=s,
-        feed=feed,
-        block=motion.block[point],
-        line=motion.line[point],
+        block=toolpath.block[segment],
+        line=toolpath.line[segment],
+        **dict(zip(names, columns, strict=True)),
     )
 
 
@@ -219,7 +245,9 @@ def _refine(legs, corners, element, w0, w1, w, ds, h, work, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(legs, corners, times, t, s, feed, acc_s, element, w0, w1, position, still):
+def _sample(
+    legs, corners, times, t, s_law, feed, acc_s, jerk_s, run, end, piece, s, element, w0, w1, position
+):  # fmt: skip
     """Positions and derivatives at ascending times (T,); also the grid point whose interval each lies in."""
     count, axes = len(times), position.shape[1]
     out_position, out_velocity = np.empty((count, axes)), np.empty((count, axes))
@@ -228,22 +256,31 @@ def _sample(legs, corners, times, t, s, feed, acc_s, element, w0, w1, position, 
     point = np.empty(count, np.int64)
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     inverse, inverse_of, exact = np.zeros(6), -1, False
-    i = max(np.searchsorted(t, times[0], side="right") - 1, 0)
+    m = max(np.searchsorted(t, times[0], side="right") - 1, 0)
+    i = 0
     for n in range(count):
-        while i + 1 < len(t) and t[i + 1] <= times[n]:
+        while m + 1 < len(t) and t[m + 1] <= times[n]:
+            m += 1
+        tau = max(times[n] - t[m], 0.0)
+        u, j = acc_s[m] + jerk_s[m] * tau, jerk_s[m]
+        v = max(feed[m] + tau * (acc_s[m] + 0.5 * jerk_s[m] * tau), 0.0)
+        s_here = s_law[m] + tau * (feed[m] + tau * (acc_s[m] / 2.0 + jerk_s[m] * tau / 6.0))
+        if m + 1 < len(t):
+            s_here = min(s_here, s_law[m + 1])
+        if times[n] >= end:
+            s_here, v, u, j = s[-1], 0.0, 0.0, 0.0
+        first, last = piece[run[m]], piece[run[m] + 1] - 2  # the intervals of this run
+        if i < first:
+            i = (
+                first
+                if s_here <= s[first + 1]
+                else first + np.searchsorted(s[first : last + 1], s_here, side="right") - 1
+            )
+        while i < last and s[i + 1] <= s_here:
             i += 1
         point[n] = i
-        if still[i] or times[n] < t[i]:  # a dwell, at the end of a piece or before the first
-            out_position[n] = position[i]
-            out_velocity[n] = 0.0
-            out_acceleration[n] = 0.0
-            out_jerk[n] = 0.0
-            out_s[n], out_feed[n] = s[i], 0.0
-            continue
-        tau = times[n] - t[i]
         h = s[i + 1] - s[i]
-        ds = min(max((feed[i] + 0.5 * acc_s[i] * tau) * tau, 0.0), h)
-        v, u = max(feed[i] + acc_s[i] * tau, 0.0), acc_s[i]
+        ds = min(max(s_here - s[i], 0.0), h)
         if inverse_of != i:
             exact = _invert(legs, corners, element[i], w0[i], w1[i], h, work, here, inverse)
             inverse_of = i
@@ -256,6 +293,6 @@ def _sample(legs, corners, times, t, s, feed, acc_s, element, w0, w1, position, 
             out_position[n, k] = here[0, k]
             out_velocity[n, k] = here[1, k] * v
             out_acceleration[n, k] = here[1, k] * u + here[2, k] * v * v
-            out_jerk[n, k] = 3.0 * here[2, k] * v * u + here[3, k] * v * v * v
+            out_jerk[n, k] = here[1, k] * j + 3.0 * here[2, k] * v * u + here[3, k] * v * v * v
         out_s[n], out_feed[n] = s[i] + ds, v
     return out_position, out_velocity, out_acceleration, out_jerk, out_s, out_feed, point

@@ -73,12 +73,7 @@ class FeedrateProblem:
         self._check()
 
     def _check(self) -> None:
-        for name in (
-            ("velocity", True),
-            ("acceleration", True),
-            ("jerk", True),
-            ("feed_sq_max", True),
-        ):
+        for name in ("velocity", "acceleration", "jerk", "feed_sq_max"):
             if not (getattr(self, name) > 0).all():
                 raise ValueError(f"FeedrateProblem.{name}: every value must be positive")
         step = np.diff(self.s)

@@ -1,0 +1,75 @@
+"""The methods by their names on the command line, and `plan`, the one call that does a whole job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from planner.errors import InputError
+from planner.machine import Machine, load_machine
+from planner.methods.plan import Plan
+from planner.methods.stages import Progress
+from planner.methods.stop import StopMethod
+from planner.methods.toppra import SOLVERS, ToppraMethod
+from planner.nc.program import Program
+from planner.nc.reader import read_program
+
+DEFAULT_MACHINE = "mill"
+METHODS = ("toppra", "stop")
+
+
+class Method(Protocol):
+    """A way to plan a job; its repr is its row label in every table."""
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program within a tolerance [mm] (None: the program's or the machine's)."""
+        ...
+
+
+def plan(
+    program: Program | str | Path,
+    machine: Machine | str | Path | None = None,
+    *,
+    method: str | Method = "toppra",
+    corner: str = "bezier",
+    solver: str = "reachability",
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+) -> Plan:
+    """Plan, sample and verify the motion of an NC program.
+
+    program   : a file, or a program read before
+    machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
+    method    : "toppra", "stop", or a method with settings of your own
+    corner    : "bezier" or "fir"; ignored by "stop"
+    solver    : "reachability" or "toppra"; ignored by "stop"
+    tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
+    progress  : called with the stage's name and the fraction done
+
+    Raises InputError naming file, line and column. A problem that could not be solved is the plan's status; `Plan.require`
+    turns it into an exception.
+    """
+    chosen = _method(method, corner, solver) if isinstance(method, str) else method
+    if not isinstance(machine, Machine):
+        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    if not isinstance(program, Program):
+        if progress is not None:
+            progress("read", 0.0)
+        program = read_program(program, machine)
+    return chosen.plan(program, machine, tolerance, progress)
+
+
+def _method(name: str, corner: str, solver: str) -> Method:
+    if solver not in SOLVERS:
+        raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
+    if name == "toppra":
+        return ToppraMethod(corner=corner, solver=solver)
+    if name == "stop":
+        return StopMethod()
+    raise InputError(f"no method '{name}'; there are {', '.join(METHODS)}")

@@ -1,0 +1,69 @@
+"""The record of a finished job: what was asked, what was found, and the verdict on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from planner.arrays import Array, FloatArray
+from planner.errors import NotSolvedError
+from planner.feedrate.solution import Status
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.methods.closed_form import CornerTable
+from planner.nc.program import Program
+from planner.trajectory import Trajectory
+from planner.verify import Verdict
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GridHistory:
+    """The profile at the solver's grid points: time (P,) [s], s (P,) [mm], feed (P,) [mm/s], and the constraint that is closest
+    to its limit there and on the interval behind, (P,) indices into `active_names`."""
+
+    t: FloatArray
+    s: FloatArray
+    feed: FloatArray
+    active: Array
+    active_names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Plan:
+    """A planned job.
+
+    method, corner, solver : what was used; corner is None where the method rounds no corners
+    status, sentence       : how it ended
+    trajectory, verdict    : None unless solved
+    corners                : each corner next to its closed-form speed, or None
+    grid                   : the profile at the grid points, or None
+    stop_time              : time if every block ran from rest to rest [s], dwells included
+    grid_points            : size of the problem that was solved
+    timings                : computing time per stage [s]
+    """
+
+    method: str
+    corner: str | None
+    solver: str
+    program: Program
+    machine: Machine
+    toolpath: Toolpath
+    status: Status
+    sentence: str
+    trajectory: Trajectory | None
+    verdict: Verdict | None
+    corners: CornerTable | None
+    grid: GridHistory | None
+    stop_time: float
+    grid_points: int
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def solved(self) -> bool:
+        """True if there is a trajectory."""
+        return self.trajectory is not None
+
+    def require(self) -> Plan:
+        """Return self, or raise NotSolvedError with the sentence."""
+        if not self.solved:
+            raise NotSolvedError(self.sentence)
+        return self

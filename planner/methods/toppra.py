@@ -1,0 +1,129 @@
+"""Method `toppra`: smoothed path, all second-order constraints, time-optimal by reachability analysis.
+
+The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.constraints.assemble import feedrate_problem
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.bezier import BezierCorner
+from planner.corners.fir import FirCorner
+from planner.corners.smooth import CornerShape, round_corners
+from planner.errors import InputError
+from planner.feedrate.grid import add_switching_points
+from planner.feedrate.reachability import Reachability
+from planner.feedrate.solution import (
+    FeedrateSolution,
+    FeedrateSolver,
+    active_names,
+    constraint_ratios,
+)
+from planner.feedrate.toppra_adapter import ToppraSolver
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.methods.closed_form import corner_table
+from planner.methods.plan import GridHistory, Plan
+from planner.methods.stages import Progress, Stages, deliver, stop_time
+from planner.nc.program import Program
+from planner.path import PathSamples, sample_path
+from planner.timing import Motion, TimeLaw, second_order_law
+
+CORNERS = ("bezier", "fir")
+SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToppraMethod:
+    """Second-order time-optimal planning on rounded corners.
+
+    corner : name of the corner shape, "bezier" or "fir", or a shape with settings of your own
+    solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
+    """
+
+    corner: str | CornerShape = "bezier"
+    solver: str | FeedrateSolver = "reachability"
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program. Raises InputError for what cannot be planned; an unsolved problem is the plan's status."""
+        stages = Stages(progress)
+        solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+            shape = corner_shape(self.corner, machine, toolpath)
+            path = round_corners(toolpath, machine, shape)
+            samples = sample_path(path, machine)
+        with stages.stage("solve"):
+            samples, problem, solution = _solve(samples, machine, solver)
+        trajectory = verdict = corners = grid = None
+        if solution.solved:
+            law = second_order_law(samples, problem, solution)
+            trajectory, verdict = deliver(
+                Motion(samples=samples, law=law), toolpath, machine, stages, not_limited=("jerk",)
+            )
+            with stages.stage("report"):
+                corners = corner_table(samples, problem, solution)
+                grid = _history(problem, solution, law)
+        return Plan(
+            method="toppra",
+            corner=shape.name,
+            solver=solution.solver,
+            program=program,
+            machine=machine,
+            toolpath=toolpath,
+            status=solution.status,
+            sentence=solution.sentence,
+            trajectory=trajectory,
+            verdict=verdict,
+            corners=corners,
+            grid=grid,
+            stop_time=stop_time(toolpath, machine),
+            grid_points=len(samples),
+            timings=stages.timings,
+        )
+
+
+def corner_shape(corner: str | CornerShape, machine: Machine, toolpath: Toolpath) -> CornerShape:
+    """The corner shape of that name with the machine's settings. Raises InputError for an unknown name."""
+    if corner == "bezier":
+        return BezierCorner()
+    if corner == "fir":
+        return FirCorner.from_machine(machine, toolpath.axes)
+    if isinstance(corner, str):
+        raise InputError(f"no corner shape '{corner}'; there are {', '.join(CORNERS)}")
+    return corner
+
+
+def _solve(
+    samples: PathSamples, machine: Machine, solver: FeedrateSolver
+) -> tuple[PathSamples, FeedrateProblem, FeedrateSolution]:
+    """Solve, add the points where the profile switches on straight stretches, and solve again."""
+    problem = feedrate_problem(samples, machine)
+    solution = solver.solve(problem)
+    if not solution.solved:
+        return samples, problem, solution
+    samples = add_switching_points(samples, problem, solution, machine)
+    problem = feedrate_problem(samples, machine)
+    return samples, problem, solver.solve(problem)
+
+
+def _history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) -> GridHistory:
+    _, active = constraint_ratios(problem, solution)
+    return GridHistory(
+        t=law.t,
+        s=problem.s,
+        feed=np.sqrt(solution.feed_sq),
+        active=active,
+        active_names=active_names(problem),
+    )

@@ -333,8 +333,13 @@ def _show(*tables: RenderableType) -> None:
     from rich.console import Console
 
     console: Console = Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH)
-    for table in tables:
-        console.print(table)
+    with (
+        console.capture() as captured
+    ):  # rich's own writing ends the process on a broken pipe, with exit code 1
+        for table in tables:
+            console.print(table)
+    sys.stdout.write(captured.get())
+    sys.stdout.flush()
 
 
 def main() -> None:

@@ -27,7 +27,6 @@ LAYERS = (
     "planner.trajectory",
     "planner.timing",
     "planner.verify",
-    "planner.plan",
     "planner.methods",
     "planner.report",
     "planner.cli",

@@ -27,7 +27,7 @@ from planner.report.trajectory_file import Format, units, write_trajectory
 
 if TYPE_CHECKING:
     from planner.nc.info import ProgramInfo
-    from planner.plan import Plan
+    from planner.methods.plan import Plan
     from planner.verify import Verdict
 
 SUMMARY = LAST

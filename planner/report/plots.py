@@ -25,7 +25,7 @@ from planner.machine import LINEAR_AXES, RAD_PER_DEG
 from planner.nc.program import Kind
 
 if TYPE_CHECKING:
-    from planner.plan import Plan
+    from planner.methods.plan import Plan
 
 COLUMNS = 1500  # about the width of a profile in pixels
 PIXELS = 900  # about the extent of a tool path in pixels

@@ -1,0 +1,322 @@
+"""The command line: exit codes, messages, and that nothing bad goes further than a message."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hand_made import SQUARE, make_plan, trajectory_along
+from typer.testing import CliRunner, Result
+
+import planner
+from planner.cli import app
+from planner.errors import InputError
+from planner.geometry.build import toolpath_from_program
+from planner.machine import builtin_machines, load_machine
+from planner.nc.reader import parse_program
+from planner.report.trajectory_file import write_trajectory
+
+TEMPLATE = Path(planner.__file__).parent / "templates" / "machine.toml"
+COMMAND = [sys.executable, "-c", "from planner.cli import main; main()"]
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Path:
+    path = tmp_path / "square.ngc"
+    path.write_text(SQUARE)
+    return path
+
+
+@pytest.fixture
+def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let `plan` answer with a plan made by hand, or raise."""
+
+    def answer(**how: Any) -> None:
+        def plan(*_: object, **__: object) -> Any:
+            if "raises" in how:
+                raise how["raises"]
+            return make_plan(**how)
+
+        monkeypatch.setattr(planner, "plan", plan, raising=False)
+
+    return answer
+
+
+# ------------------------------------------------------------------------------------------ plan
+
+
+def test_plan_writes_and_exits_0(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
+    planned()
+    result = run("plan", job, "-o", tmp_path / "out", "--plot", "--corners")
+    assert result.exit_code == 0, result.output
+    assert "cycle time" in result.stdout
+    assert "normal_acceleration" in result.stdout  # the corner table
+    files = {"profiles.png", "summary.json", "toolpath.png", "trajectory.parquet"}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == files
+    assert all(str(tmp_path / "out" / name) in result.stdout for name in files)
+
+
+def test_json_is_all_there_is_on_stdout(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
+    planned()
+    result = run("plan", job, "--json", "-o", tmp_path / "out")
+    assert json.loads(result.stdout)["cycle_time_s"] == pytest.approx(0.8)
+    assert result.stderr == ""
+
+
+def test_failed_verdict_exits_1_and_is_written(
+    planned: Callable[..., None], job: Path, tmp_path: Path
+) -> None:
+    planned(passed=False)
+    result = run("plan", job, "-o", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "FAILED" in result.stdout
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["verdict"]["passed"] is False
+
+
+def test_unsolved_exits_3_and_writes_nothing(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
+    planned(solved=False)
+    result = run("plan", job, "-o", tmp_path / "out")
+    assert result.exit_code == 3
+    assert result.stderr.startswith("not solved: no feed satisfies all limits; loosen the tolerance")
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_input_exits_2(planned: Callable[..., None], job: Path) -> None:
+    planned(raises=InputError("G41: cutter compensation", source="job.ngc", line=3, column=7))
+    result = run("plan", job)
+    assert result.exit_code == 2
+    assert result.stderr == "job.ngc:3:7: G41: cutter compensation\n"
+    assert result.stdout == ""
+
+
+def test_a_bug_exits_70_with_its_traceback(planned: Callable[..., None], job: Path) -> None:
+    planned(raises=ZeroDivisionError("oops"))
+    result = run("plan", job)
+    assert result.exit_code == 70
+    assert "Traceback" in result.stderr
+    assert "ZeroDivisionError: oops" in result.stderr
+    assert "Please report it" in result.stderr
+
+
+def test_interrupt_exits_130(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
+    planned(raises=KeyboardInterrupt())
+    result = run("plan", job, "-o", tmp_path / "out")
+    assert result.exit_code == 130
+    assert result.stderr == "interrupted\n"
+    assert not (tmp_path / "out").exists()
+
+
+def test_plot_needs_a_directory(job: Path) -> None:
+    result = run("plan", job, "--plot")
+    assert result.exit_code == 2
+    assert "-o DIR" in result.stderr
+
+
+def test_unwritable_output(planned: Callable[..., None], job: Path) -> None:
+    planned()
+    result = run("plan", job, "-o", job)
+    assert result.exit_code == 2
+    assert result.stderr == f"{job}: cannot be written: is a file, not a directory; what was there stays\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["plan"], ["plan", "x", "--method", "magic"], ["plan", "x", "--tolerance", "thin"], ["nonsense"]],
+)
+def test_usage_errors_exit_2(arguments: list[str]) -> None:
+    assert run(*arguments).exit_code == 2
+
+
+# ------------------------------------------------------------------------------------------ verify
+
+
+def test_verify_needs_a_trajectory_that_fits(job: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("t,x\n0,0\n1,1\n")
+    result = run("verify", tmp_path / "t.csv", job)
+    assert result.exit_code == 2
+    assert "column 'y' is missing" in result.stderr
+
+
+def test_verify_takes_the_recorded_machine(job: Path, tmp_path: Path) -> None:
+    pytest.importorskip("planner.verify")
+    machine = load_machine("router")
+    program = parse_program(SQUARE, machine)
+    path = tmp_path / "t.parquet"
+    write_trajectory(
+        path,
+        trajectory_along(toolpath_from_program(program, machine), time=1.5),
+        {"machine": machine.model_dump(mode="json", exclude_none=True), "tolerance_mm": 0.01},
+    )
+    result = run("verify", path, job, "--json")
+    assert result.exit_code == 0, result.output
+    said = json.loads(result.stdout)
+    assert said["machine"] == "router"
+    assert said["contour_error_mm"] < 1e-9
+    assert said["notes"] == []
+    assert run("verify", path, job, "-m", "mill").exit_code == 0
+    fast = tmp_path / "fast.csv"
+    write_trajectory(fast, trajectory_along(toolpath_from_program(program, machine), time=0.1))
+    result = run("verify", fast, job, "-m", "router")
+    assert result.exit_code == 1
+    assert "FAILED" in result.stdout
+
+
+# ------------------------------------------------------------------------------------------ info
+
+
+def test_info(job: Path, tmp_path: Path) -> None:
+    result = run("info", job)
+    assert result.exit_code == 0
+    assert "every construct is supported" in result.stdout
+    assert json.loads(run("info", job, "--json").stdout)["blocks"]["line"] == 4
+    (tmp_path / "bad.ngc").write_text("G21 G90\nG41 D1\nG1 X5 F100\nG81 X1 Z-3 R1\n")
+    result = run("info", tmp_path / "bad.ngc")
+    assert result.exit_code == 2
+    assert "2:1" in result.stdout
+    assert "4:1" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(None, "not found"), (b"", "empty"), (b"\x7fELF\x00\x01\x02\x00", "")],
+)
+def test_no_program_at_all(tmp_path: Path, content: bytes | None, said: str) -> None:
+    path = tmp_path / "job.ngc"
+    if content is not None:
+        path.write_bytes(content)
+    result = run("info", path)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"{path}:")
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+# ------------------------------------------------------------------------------------------ machine files
+
+
+def with_line(old: str, new: str) -> str:
+    text = TEMPLATE.read_text()
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "machine file not found"),
+        ("name = ", "not valid TOML"),
+        ("", "name: missing"),
+        (
+            with_line("[axes.y]\nvelocity = 500.0\nacceleration = 4000.0\njerk = 100000.0\n", ""),
+            "axis 'y' is missing",
+        ),
+        (with_line("velocity = 500.0", "velocity = 0.0"), "axes.x.velocity"),
+        (with_line("velocity = 500.0", "velocity = -1.0"), "axes.x.velocity"),
+        (with_line("velocity = 500.0", "velocity = nan"), "axes.x.velocity"),
+        (with_line("jerk = 100000.0", "jerk = inf"), "axes.x.jerk"),
+        (with_line("jerk = 100000.0", ""), "axes.x.jerk: missing"),
+        (with_line("tolerance = 0.02", "tolerance = 0"), "tolerance"),
+        (with_line("tolerance = 0.02", "tolerance = 'thin'"), "tolerance"),
+        (with_line("dt = 0.001", "dt = 0.001\nspeed = 3"), "speed: unknown key"),
+        (with_line("[axes.z]", "[axes.w]"), "axis 'w' is not known"),
+        (with_line('path_control = "blend"', 'path_control = "round"'), "path_control"),
+        (TEMPLATE.read_text() + "[positions.g99]\nx = 1\n", "'g99' is not known"),
+        (TEMPLATE.read_text() + "[tools]\nlong = 1\n", "not a tool number"),
+    ],
+)
+def test_bad_machine_files(job: Path, tmp_path: Path, content: str | None, said: str) -> None:
+    path = tmp_path / "machine.toml"
+    if content is not None:
+        path.write_text(content)
+    result = run("info", job, "-m", path)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"{path}: ")
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_machine_file_that_is_no_text(job: Path, tmp_path: Path) -> None:
+    (tmp_path / "machine.toml").write_bytes(b"\xff\xfe\x00\x00")
+    assert "cannot be read" in run("info", job, "-m", tmp_path / "machine.toml").stderr
+    assert "cannot be read" in run("info", job, "-m", tmp_path).stderr
+
+
+def test_list_and_show() -> None:
+    assert "mill" in builtin_machines()
+    listed = run("machine", "list")
+    assert listed.exit_code == 0
+    assert all(name in listed.stdout for name in builtin_machines())
+    assert run("machine", "show", "mill").stdout.startswith("# ")
+    missing = run("machine", "show", "lathe")
+    assert missing.exit_code == 2
+    assert "no built-in machine 'lathe'" in missing.stderr
+
+
+def test_init_writes_once(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    assert run("machine", "init", path).exit_code == 0
+    assert load_machine(path).name == "my-machine"
+    path.write_text("changed")
+    again = run("machine", "init", path)
+    assert again.exit_code == 2
+    assert "not overwritten" in again.stderr
+    assert path.read_text() == "changed"
+    assert run("machine", "init", tmp_path / "none" / "mine.toml").exit_code == 2
+
+
+def test_every_key_of_the_template_is_valid_and_every_key_is_in_it(tmp_path: Path) -> None:
+    """With all optional keys uncommented the file loads, and sets every field of the record."""
+    text = re.sub(r"^# (?=\[|[\w.]+ = )", "", TEMPLATE.read_text(), flags=re.MULTILINE)
+    # the optional keys of the top level stand before the first table, as TOML demands
+    (tmp_path / "full.toml").write_text(text)
+    machine = load_machine(tmp_path / "full.toml")
+    assert machine.model_fields_set == set(type(machine).model_fields)
+    assert machine.fir is not None
+    assert machine.fir.phase_lag_max == 30.0
+    assert "a" in machine.axes
+    assert machine.work_offsets["g55"]["x"] == 120.0
+
+
+# ------------------------------------------------------------------------------------------ as a process
+
+
+def test_broken_pipe_is_quiet(job: Path) -> None:
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    done = subprocess.run(
+        [*COMMAND, "info", str(job)], stdout=write_end, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(write_end)
+    assert done.stderr == ""
+    assert done.returncode == 141
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to send")
+def test_ctrl_c(tmp_path: Path) -> None:
+    pipe = tmp_path / "job.ngc"
+    os.mkfifo(pipe)  # the reader waits for a writer, so that the interrupt surely meets it at work
+    with (
+        subprocess.Popen(
+            [*COMMAND, "info", str(pipe)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as process,
+        pipe.open("w"),
+    ):
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert out == ""
+    assert err == "interrupted\n"

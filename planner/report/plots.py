@@ -9,7 +9,7 @@ largest value of each column, so that no peak is lost.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib
 import numpy as np
@@ -39,7 +39,7 @@ BANDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E
 OTHERS = "#d0d0d0"
 SHARE_MIN = 0.005  # constraints that limit a smaller share of the time are shown together
 DASHED = (0, (3, 2))
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.size": 8.5,
     "axes.titlesize": 9,
     "axes.labelsize": 8.5,
@@ -115,7 +115,8 @@ def toolpath_figure(plan: Plan) -> Figure:
         figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
         bar = figure.colorbar(line, cax=figure.add_axes((0.98, 0.22, 0.02, 0.5)))
     bar.set_label("feed [mm/s]")
-    bar.outline.set_linewidth(0.5)  # type: ignore[operator]
+    outline: Any = bar.outline
+    outline.set_linewidth(0.5)
     return figure
 
 
@@ -221,7 +222,8 @@ def profiles_figure(plan: Plan) -> Figure:
     band = plan.grid is not None and len(plan.grid.t) > 1
     heights = [2.4, *([0.28] if band else []), *([1.0] * 2 * len(moving))]
     figure = Figure(figsize=(6.8, 0.55 + 0.85 * sum(heights)), layout="constrained")
-    figure.get_layout_engine().set(h_pad=0.03, hspace=0.02)  # type: ignore[union-attr]
+    layout: Any = figure.get_layout_engine()
+    layout.set(h_pad=0.03, hspace=0.02)
     rows = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
     scale, unit = _time_unit(trajectory.cycle_time)
     t = trajectory.t * scale
@@ -240,9 +242,11 @@ def profiles_figure(plan: Plan) -> Figure:
         )
     free = _free_quantities(plan)
     row = iter(rows[2 if band else 1 :])
-    for quantity, symbol, order in (("acceleration", "a", 2), ("jerk", "j", 3)):
+    quantities: tuple[tuple[Literal["acceleration", "jerk"], str, str], ...]
+    quantities = (("acceleration", "a", "²"), ("jerk", "j", "³"))
+    for quantity, symbol, power in quantities:
         values = getattr(trajectory, quantity)
-        limits = plan.machine.limits(quantity, trajectory.axes)  # type: ignore[arg-type]
+        limits = plan.machine.limits(quantity, trajectory.axes)
         for k in moving:
             axis = trajectory.axes[k]
             rotary = axis not in LINEAR_AXES
@@ -250,7 +254,7 @@ def profiles_figure(plan: Plan) -> Figure:
             panel = next(row)
             _profile(panel, t, values[:, k] * per, BLUE)
             length = "°" if rotary else "m"
-            panel.set_ylabel(f"{symbol}$_{{\\rm {axis.upper()}}}$\n[{length}/s{'²' if order == 2 else '³'}]")
+            panel.set_ylabel(f"{symbol}$_{{\\rm {axis.upper()}}}$\n[{length}/s{power}]")
             note = "not limited by this method" if quantity in free or f"{quantity}.{axis}" in free else ""
             _limit_lines(panel, values[:, k] * per, limits[k] * per, note)
     rows[-1].set_xlabel(f"time [{unit}]")

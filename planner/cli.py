@@ -43,6 +43,13 @@ class Corner(StrEnum):
     fir = "fir"
 
 
+class Solver(StrEnum):
+    """Names of the solvers of the second-order problem."""
+
+    reachability = "reachability"
+    toppra = "toppra"
+
+
 class Format(StrEnum):
     """Formats of trajectory files."""
 
@@ -126,6 +133,9 @@ def plan(
     machine: MachineOption = None,
     method: Annotated[Method, typer.Option(help="how to plan")] = Method.toppra,
     corner: Annotated[Corner, typer.Option(help="shape of the rounded corners")] = Corner.bezier,
+    solver: Annotated[
+        Solver, typer.Option(help="of method toppra: our kernel, or the package toppra for comparison")
+    ] = Solver.reachability,
     tolerance: ToleranceOption = None,
     output: Annotated[
         Path | None,
@@ -152,6 +162,7 @@ def plan(
             machine or DEFAULT_MACHINE,
             method=method.value,
             corner=corner.value,
+            solver=solver.value,
             tolerance=tolerance,
             progress=progress,
         )
@@ -197,7 +208,9 @@ def verify(
     tolerance: ToleranceOption = None,
     not_limited: Annotated[
         list[str] | None,
-        typer.Option(metavar="LIMIT", help="report this limit without judging it (jerk); repeat for more"),
+        typer.Option(
+            metavar="QUANTITY", help="report without judging: jerk for a plan that does not limit it"
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -221,7 +234,14 @@ def verify(
     if not_limited is None:
         not_limited = read.metadata.get("not_limited", [])
     toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance)
-    verdict = judge(read.trajectory, toolpath, limits, not_limited=tuple(not_limited))
+    with _Progress() as progress:
+        verdict = judge(
+            read.trajectory,
+            toolpath,
+            limits,
+            not_limited=tuple(not_limited),
+            progress=lambda fraction: progress("verify", fraction),
+        )
     if as_json:
         typer.echo(
             json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2)

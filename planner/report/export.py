@@ -79,7 +79,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
             "verdict": verdict_summary(verdict) if verdict is not None else None,
             "corners": {
-                "count": len(corners.theta) if corners is not None else 0,
+                "count": len(corners.line) if corners is not None else 0,
                 "worst_speed_ratio": corners.worst_ratio()
                 if corners is not None and len(corners.theta)
                 else None,
@@ -94,17 +94,12 @@ def summary(plan: Plan) -> dict[str, Any]:
 
 def verdict_summary(verdict: Verdict) -> dict[str, Any]:
     """A verdict in numbers: worst ratio per limit, errors, faults."""
-    return _plain(
-        {
-            "passed": verdict.passed,
-            "limits": {name: check.ratio for name, check in verdict.limits.items()},
-            "not_limited": [name for name, check in verdict.limits.items() if not check.limited],
-            "contour_error_mm": verdict.contour_error_mm,
-            "vertex_error_mm": verdict.vertex_error_mm,
-            "end_error_mm": verdict.end_error_mm,
-            "faults": list(verdict.faults),
-        }
-    )
+    return _plain({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
+
+
+def _not_limited(verdict: Verdict) -> list[str]:
+    """Quantities that are reported only: "jerk" for jerk.x, jerk.y ..."""
+    return sorted({name.partition(".")[0] for name, check in verdict.limits.items() if not check.limited})
 
 
 def info_summary(info: ProgramInfo) -> dict[str, Any]:
@@ -118,9 +113,6 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
     """What a trajectory file says about itself; `planner verify` uses machine, tolerance, `not_limited`."""
     trajectory = plan.trajectory
     assert trajectory is not None
-    unlimited = (
-        [] if plan.verdict is None else [k for k, check in plan.verdict.limits.items() if not check.limited]
-    )
     return _plain(
         {
             "format": 1,
@@ -131,7 +123,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "corner": plan.corner,
             "dt_s": trajectory.dt,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
-            "not_limited": unlimited,
+            "not_limited": _not_limited(plan.verdict) if plan.verdict is not None else [],
             "units": units(trajectory.axes),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),
             "versions": versions(),

@@ -38,10 +38,10 @@ def plan_table(plan: Plan) -> Group:
             )
     if plan.verdict is not None:
         _add_verdict(table, plan.verdict)
-    if plan.corners is not None and len(plan.corners.theta):
+    if plan.corners is not None and len(plan.corners.line):
         table.add_row(
             "corners",
-            f"{len(plan.corners.theta):,}; fastest {_ratio(plan.corners.worst_ratio())} of eq. 19-20",
+            f"{len(plan.corners.line):,}; fastest {_ratio(plan.corners.worst_ratio())} of eq. 19-20",
         )
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
@@ -59,7 +59,7 @@ def verdict_table(verdict: Verdict, title: str) -> Group:
 def corner_table(plan: Plan) -> Table | None:
     """The corners that come closest to the speed of the closed form; None without corners."""
     corners = plan.corners
-    if corners is None or not len(corners.theta):
+    if corners is None or not len(corners.line):
         return None
     ratio = corners.feed_planned / corners.feed_closed_form
     worst = np.argsort(-ratio, kind="stable")[:CORNERS_SHOWN]

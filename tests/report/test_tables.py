@@ -47,7 +47,7 @@ def test_corners() -> None:
     assert "90.00" in said
     assert "normal_acceleration" in said
     plan = make_plan()
-    plan.corners.theta = np.zeros(0)
+    plan.corners.line = np.zeros(0)
     assert corner_table(plan) is None
 
 

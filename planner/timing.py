@@ -138,7 +138,7 @@ def dense_motion(motion: Motion) -> Iterator[Trajectory]:
     begin, end = edges[:-1], edges[1:]
     inside = np.stack([0.999 * begin + 0.001 * end, 0.5 * (begin + end), 0.001 * begin + 0.999 * end], axis=1)
     times = np.concatenate([[0.0], inside.ravel(), [motion.law.end]])
-    times = times[np.concatenate([[True], np.diff(times) > 0])]
+    times = np.unique(np.maximum.accumulate(times))  # pieces of no duration leave equal times
     longest = float(np.diff(times).max())
     for first in range(0, len(times), CHUNK):
         yield _trajectory(motion, times[first : first + CHUNK + 1], longest)

@@ -50,7 +50,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
                 raise how["raises"]
             return make_plan(**how)
 
-        monkeypatch.setattr(planner, "plan", plan, raising=False)
+        monkeypatch.setitem(vars(planner), "plan", plan)
 
     return answer
 

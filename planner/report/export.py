@@ -26,8 +26,8 @@ from planner.report.replace import LAST, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
 if TYPE_CHECKING:
-    from planner.nc.info import ProgramInfo
     from planner.methods.plan import Plan
+    from planner.nc.info import ProgramInfo
     from planner.verify import Verdict
 
 SUMMARY = LAST
@@ -81,7 +81,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "corners": {
                 "count": len(corners.line) if corners is not None else 0,
                 "worst_speed_ratio": corners.worst_ratio()
-                if corners is not None and len(corners.theta)
+                if corners is not None and len(corners.line)
                 else None,
             },
             "blocks": len(plan.program),

@@ -14,9 +14,9 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
+    from planner.methods.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
-    from planner.methods.plan import Plan
     from planner.verify import Verdict
 
 CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table

@@ -222,6 +222,7 @@ def verify(
     from planner.report.tables import verdict_table
     from planner.report.trajectory_file import read_trajectory
     from planner.verify import verify as judge
+    from planner.verify.judge import NOT_LIMITED_NAMES
 
     read = read_trajectory(trajectory)
     recorded = read.metadata.get("machine")
@@ -229,17 +230,22 @@ def verify(
         limits = machine_from_dict(recorded, source=f"{trajectory} (recorded machine)")
     else:
         limits = load_machine(machine or DEFAULT_MACHINE)
-    if tolerance is None:
-        tolerance = read.metadata.get("tolerance_mm")
-    if not_limited is None:
-        not_limited = read.metadata.get("not_limited", [])
+    recorded_tolerance = read.metadata.get("tolerance_mm")
+    if tolerance is None and isinstance(recorded_tolerance, float):
+        tolerance = recorded_tolerance
+    unjudged = tuple(read.metadata.get("not_limited", ()) if not_limited is None else not_limited)
+    for name in unjudged:
+        if name not in NOT_LIMITED_NAMES:
+            raise InputError(
+                f"--not-limited {name}: there is no such limit; {', '.join(NOT_LIMITED_NAMES)} are"
+            )
     toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance)
     with _Progress() as progress:
         verdict = judge(
             read.trajectory,
             toolpath,
             limits,
-            not_limited=tuple(not_limited),
+            not_limited=unjudged,
             progress=lambda fraction: progress("verify", fraction),
         )
     if as_json:

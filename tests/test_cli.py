@@ -151,7 +151,6 @@ def test_verify_needs_a_trajectory_that_fits(job: Path, tmp_path: Path) -> None:
 
 
 def test_verify_takes_the_recorded_machine(job: Path, tmp_path: Path) -> None:
-    pytest.importorskip("planner.verify")
     machine = load_machine("router")
     program = parse_program(SQUARE, machine)
     path = tmp_path / "t.parquet"
@@ -167,6 +166,9 @@ def test_verify_takes_the_recorded_machine(job: Path, tmp_path: Path) -> None:
     assert said["contour_error_mm"] < 1e-9
     assert said["notes"] == []
     assert run("verify", path, job, "-m", "mill").exit_code == 0
+    unknown = run("verify", path, job, "--not-limited", "yerk")
+    assert unknown.exit_code == 2
+    assert "jerk" in unknown.stderr
     fast = tmp_path / "fast.csv"
     write_trajectory(fast, trajectory_along(toolpath_from_program(program, machine), time=0.1))
     result = run("verify", fast, job, "-m", "router")

@@ -1,0 +1,290 @@
+"""From what the readings of a motion showed to checks and to faults in sentences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.machine import LINEAR_AXES, Machine
+from planner.verify import limits as rows
+from planner.verify.pieces import CONTOUR_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, Pieces
+from planner.verify.stream import Limits, Seen
+from planner.verify.verdict import LimitCheck
+
+QUANTITIES = ("velocity", "acceleration", "jerk")
+UNITS = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
+FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
+
+
+@dataclass(frozen=True)
+class Look:
+    """One reading of the motion: the delivered samples (note "") or the dense ones."""
+
+    seen: Seen
+    note: str
+
+    def noted(self, text: str) -> str:
+        return ", ".join(part for part in (text, self.note) if part)
+
+
+def measured(looks: list[Look], group: int) -> FloatArray:
+    """Largest ratio per axis (A,) of a group of rows, over all readings."""
+    axes = looks[0].seen.at.shape[1]
+    return np.array([look.seen.worst[group * axes : (group + 1) * axes, 0] for look in looks]).max(axis=0)
+
+
+# ---- limits and columns ----------------------------------------------------------------------------------------------
+
+
+def limit_checks(
+    looks: list[Look], toolpath: Toolpath, machine: Machine, pieces: Pieces, not_limited: tuple[str, ...]
+) -> dict[str, LimitCheck]:
+    """The worst of every limit, by name."""
+    axes = toolpath.axes
+    table = [
+        (f"{quantity}.{letter}", ("mm" if letter in LINEAR_AXES else "rad") + UNITS[quantity], row, limit)
+        for group, quantity in enumerate(QUANTITIES)
+        for row, (letter, limit) in enumerate(
+            zip(axes, machine.limits(quantity, axes), strict=True),  # type: ignore[arg-type]
+            start=group * len(axes),
+        )
+    ]
+    table.append(("feed", "mm/s", rows.GROUPS * len(axes) + rows.FEED, np.inf))
+    if machine.normal_acceleration is not None:
+        row = rows.GROUPS * len(axes) + rows.NORMAL
+        table.append(("normal_acceleration", "mm/s2", row, machine.normal_acceleration))
+    return {
+        name: _limit_check(name, unit, row, limit, looks, toolpath, pieces, not_limited)
+        for name, unit, row, limit in table
+    }
+
+
+def _limit_check(
+    name: str,
+    unit: str,
+    row: int,
+    limit: float,
+    looks: list[Look],
+    toolpath: Toolpath,
+    pieces: Pieces,
+    not_limited: tuple[str, ...],
+) -> LimitCheck:
+    look = max(looks, key=lambda each: each.seen.worst[row, 0])
+    ratio, value, limit_there, how = look.seen.worst[row]
+    text = "differences of position" if how == rows.DIFFERENCE else "column"
+    return LimitCheck(
+        name=name,
+        unit=unit,
+        ratio=float(ratio),
+        value=float(value),
+        limit=float(limit_there if ratio > 0 else limit),
+        time=float(look.seen.time[row]),
+        position=look.seen.at[row],
+        line=_line(toolpath, pieces, look.seen.piece[row]),
+        limited=name.split(".")[0] not in not_limited,
+        note=look.noted(text) if ratio > 0 else "",
+    )
+
+
+def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: Pieces) -> list[str]:
+    """Columns that do not belong to the positions (formulas in `limits`)."""
+    acceleration = np.maximum(1.0, measured(looks, rows.ACCELERATION)) * (1.0 + RATIO_ROUNDING)
+    jerk = np.maximum(1.0, measured(looks, rows.JERK)) * (1.0 + RATIO_ROUNDING)
+    tests = [("velocity", "the positions", rows.GAP_BY_ACCELERATION, acceleration)]
+    if limits.jerk_limited:
+        tests.append(("velocity", "the positions", rows.GAP_BY_JERK, jerk))
+        tests.append(("acceleration", "the velocity column", rows.GAP_OF_ACCELERATION, jerk))
+    said = []
+    for look in looks:
+        for column, against, group, bound in tests:
+            for axis, letter in enumerate(toolpath.axes):
+                row = group * len(toolpath.axes) + axis
+                if look.seen.worst[row, 0] > bound[axis]:
+                    where = f"t = {look.seen.time[row]:.6g} s, line {_line(toolpath, pieces, look.seen.piece[row])}"
+                    said.append(
+                        f"columns: {column}.{letter} does not agree with {against} at {where}: "
+                        + look.noted(f"{look.seen.worst[row, 0]:.6g} of the difference that the limits allow")
+                    )
+    return said
+
+
+def chord_error(looks: list[Look]) -> float:
+    """Largest bow over one delivered period [mm]."""
+    return float(looks[0].seen.worst[rows.GROUPS * looks[0].seen.at.shape[1] + rows.CHORD, 1])
+
+
+# ---- contour ---------------------------------------------------------------------------------------------------------
+
+
+def contour_error(looks: list[Look]) -> float:
+    """Largest distance of the motion from the path [mm]."""
+    return max(float(look.seen.match.worst[5]) for look in looks)
+
+
+def contour_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> LimitCheck:
+    """The motion's worst distance from the path, against the budget there."""
+    look = max(looks, key=lambda each: each.seen.match.worst[0])
+    ratio, distance, budget, time, piece, _ = look.seen.match.worst
+    if distance <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
+        ratio = min(ratio, 1.0)  # within the rounding of the matching, which is absolute too
+    return LimitCheck(
+        name="contour",
+        unit="mm",
+        ratio=float(ratio),
+        value=float(distance),
+        limit=float(budget) if budget > 0 else float(pieces.budget.min()),
+        time=float(time),
+        position=look.seen.match.worst_at,
+        line=_line(toolpath, pieces, int(piece)),
+        note=look.note,
+    )
+
+
+def vertex_error(looks: list[Look], pieces: Pieces) -> float:
+    """Largest distance of a programmed vertex from the motion [mm]."""
+    return max(float(_near(look, pieces)[pieces.real].max()) for look in looks)
+
+
+def vertex_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> LimitCheck:
+    """The vertex that the motion misses by most, against its budget."""
+    look = max(looks, key=lambda each: (_near(each, pieces) / pieces.vertex_budget).max())
+    near = _near(look, pieces)
+    i = int((near / pieces.vertex_budget).argmax())
+    budget = float(pieces.vertex_budget[i])
+    ratio = near[i] / budget
+    if near[i] <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
+        ratio = min(ratio, 1.0)
+    return LimitCheck(
+        name="vertex",
+        unit="mm",
+        ratio=float(ratio),
+        value=float(near[i]),
+        limit=budget,
+        time=float(look.seen.match.near_time[i]),
+        position=pieces.vertex[i],
+        line=_line(toolpath, pieces, i - 1),
+        note=look.note,
+    )
+
+
+def vertex_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[str]:
+    """Vertices that the motion misses by more than their budget, and arcs cut short."""
+    said = []
+    for look in looks:
+        near = _near(look, pieces)
+        missed = np.flatnonzero(near > pieces.vertex_budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING)
+        for i in missed[:FAULTS_OF_A_KIND]:
+            what = "end of the block" if pieces.real[i] else "a point of the arc"
+            where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, pieces.vertex[i], strict=True))
+            budget = pieces.vertex_budget[i]
+            said.append(
+                f"vertex: {what} of line {_line(toolpath, pieces, i - 1)} at {where}: "
+                + look.noted(
+                    f"missed by {near[i]:.7g} mm, {near[i] / budget:.6g} of the budget {budget:.6g} mm"
+                )
+                + f", t = {look.seen.match.near_time[i]:.6g} s"
+            )
+        if len(missed) > FAULTS_OF_A_KIND:
+            said.append(f"vertex: {len(missed)} vertices missed in all")
+    return said
+
+
+def end_error(looks: list[Look], toolpath: Toolpath) -> tuple[float, list[str]]:
+    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it."""
+    worst, said = 0.0, []
+    for look in looks:
+        for name, place, wanted, time, line in (
+            ("start", look.seen.first, toolpath.start[0], look.seen.t_first, toolpath.line[0]),
+            ("end", look.seen.last, toolpath.end[-1], look.seen.t_last, toolpath.line[-1]),
+        ):
+            distance = float(np.linalg.norm(place - wanted))
+            worst = max(worst, distance)
+            if distance > PLACE_ROUNDING:
+                text = f"{name}: the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
+                said.append(text + look.noted(f"{PLACE_ROUNDING:g} mm allowed, line {line}"))
+    return worst, said
+
+
+def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array, bool, list[str]]:
+    """Segments that are never visited, whether the rest is run in order, and what is wrong with it."""
+    lost = np.zeros(len(pieces.segment), dtype=np.bool_)
+    in_order, said = True, []
+    for look in looks:
+        match = look.seen.match
+        unreached = np.zeros_like(lost)
+        if not np.isfinite(match.low[-1]):
+            unreached[match.window[1] + 1 :] = True
+        here = np.unique(pieces.segment[match.lost | unreached])
+        lost |= match.lost | unreached
+        if len(here):
+            lines = list(dict.fromkeys(toolpath.line[here].tolist()))
+            shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + (
+                " ..." if len(lines) > FAULTS_OF_A_KIND else ""
+            )
+            said.append("order: " + look.noted(f"{len(here)} blocks are not run, line {shown}"))
+        if match.window[5]:
+            said.append(
+                "order: " + look.noted(f"{match.window[5]} samples far from where the program should be")
+            )
+        elif not np.isfinite(match.low[-1]) and not len(here):
+            said.append("order: " + look.noted("the motion ends before the program does"))
+        in_order = (
+            in_order and not match.window[3] and not match.window[5] and bool(np.isfinite(match.low[-1]))
+        )
+    return np.unique(pieces.segment[lost]), in_order, said
+
+
+def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[str]:
+    """Full stops that are run through, and dwells cut short."""
+    joint = np.flatnonzero(pieces.real)
+    said = []
+    for look in looks:
+        match = look.seen.match
+        stop_ratio = match.stop_ratio[joint]
+        visited = np.isfinite(stop_ratio)  # the others belong to blocks that are not run, which `order` names
+        through = np.flatnonzero(pieces.stop[joint] & visited & (stop_ratio > 1.0 + RATIO_ROUNDING))
+        resolution = 2.0 * look.seen.gap_max  # the periods in which a standstill begins and ends are not seen
+        # n periods are summed with one rounding each
+        short = toolpath.dwell - match.rest[joint] - resolution > RATIO_ROUNDING * (
+            toolpath.dwell + resolution
+        )
+        for i in through[:FAULTS_OF_A_KIND]:
+            ratio = look.noted(
+                f"{match.stop_ratio[joint[i]]:.6g} of the speed or distance that a sample next to it can have"
+            )
+            said.append(f"stop: no full stop at {_joint_name(toolpath, i)}: {ratio}")
+        for i in np.flatnonzero(short)[:FAULTS_OF_A_KIND]:
+            seen = look.noted(f"{match.rest[joint[i]]:.6g} s seen, {toolpath.dwell[i]:.6g} s programmed")
+            said.append(f"dwell: too short at {_joint_name(toolpath, i)}: {seen}")
+        for what, count in (("stop", len(through)), ("dwell", int(short.sum()))):
+            if count > FAULTS_OF_A_KIND:
+                said.append(f"{what}: {count} such places in all")
+    return said
+
+
+def _near(look: Look, pieces: Pieces) -> FloatArray:
+    """Distance of each vertex from the motion; from the motion's end where it never came that far [mm]."""
+    near = look.seen.match.near.copy()
+    unseen = np.isinf(near)
+    near[unseen] = np.linalg.norm(pieces.vertex[unseen] - look.seen.last, axis=1)
+    return near
+
+
+def _joint_name(toolpath: Toolpath, i: int) -> str:
+    where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, _joint_point(toolpath, i), strict=True))
+    return (
+        f"the start of line {toolpath.line[0]}, {where}"
+        if i == 0
+        else f"the end of line {toolpath.line[i - 1]}, {where}"
+    )
+
+
+def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
+    return toolpath.start[i] if i < len(toolpath) else toolpath.end[-1]
+
+
+def _line(toolpath: Toolpath, pieces: Pieces, piece: int) -> int:
+    return int(toolpath.line[pieces.segment[max(piece, 0)]])

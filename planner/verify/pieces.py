@@ -1,0 +1,232 @@
+"""The programmed path, laid out for the matching: pieces between vertices.
+
+A line is one piece. An arc or helix p(x) = center + radius (cos(rate x) e1 + sin(rate x) e2) + drift x is cut into pieces of at
+most `PIECE_ANGLE`, and the points between them are vertices like those of the program: the motion has to pass each of them
+in order, so that a full circle cannot be left out although its ends coincide.
+
+The nearest point of an arc piece solves g(x) = (p(x) - q) . p'(x) = 0. Without drift it lies at the polar angle of q; with
+drift Newton's method starts there. With E1 = e1.drift, E2 = e2.drift, DD = drift.drift, w = q - center, c = cos, s = sin:
+
+    g  = R r (s w1 - c w2) - w.drift + R (c E1 + s E2) + x (R r (c E2 - s E1) + DD)
+    g' = R r^2 (c w1 + s w2) + 2 R r (c E2 - s E1) + DD - x R r^2 (c E1 + s E2)
+
+The distance itself is taken from the vector p(x) - q, never from the expanded square, which loses half the digits; at the
+nearest point an error of x enters it only squared.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from planner.arrays import Array, FloatArray
+from planner.geometry.toolpath import Joint, Toolpath
+
+PIECE_ANGLE = (
+    np.pi / 8
+)  # largest turning of an arc piece [rad]: one of its points is passed every 22.5 degrees
+RATIO_ROUNDING = (
+    1e-6  # relative allowance on every limit: values computed in float64, files written with 7 digits
+)
+CONTOUR_ROUNDING = (
+    1e-8  # [mm] allowance on distances: rounding of coordinates up to 1e3 mm after 1e6 mm of path is 1e-10
+)
+PLACE_ROUNDING = 1e-6  # [mm] what "exactly at the point" means: the least digit that NC programs and trajectory files carry
+NEWTON_STEPS = 8  # quadratic from the polar angle; four suffice for a helix whose pitch equals its radius
+
+
+class Pieces(NamedTuple):
+    """N pieces over A axes, the N+1 vertices around them, and the data of the arcs.
+
+    vertex (N+1, A) [mm]; segment (N,) of the toolpath; real (N+1,) True at the program's own joints;
+    budget (N,), vertex_budget (N+1,) [mm]: allowed distance, without rounding; feed (N,) [mm/s];
+    stop (N+1,) full stop; arc (N,) row or -1; x0, x1 (N,) range of the arc's parameter [mm]; the rest as in `Arcs`
+    """
+
+    vertex: FloatArray
+    segment: Array
+    real: Array
+    budget: FloatArray
+    vertex_budget: FloatArray
+    feed: FloatArray
+    stop: Array
+    arc: Array
+    x0: FloatArray
+    x1: FloatArray
+    center: FloatArray
+    e1: FloatArray
+    e2: FloatArray
+    drift: FloatArray
+    radius: FloatArray
+    rate: FloatArray
+
+
+def pieces_of(toolpath: Toolpath) -> Pieces:
+    """Cut the toolpath into pieces. A segment's budget is the larger of its two joints'.
+
+    Raises ValueError if the toolpath contradicts itself: segments that do not meet, arcs that do not end where they say.
+    """
+    arcs, is_arc = toolpath.arcs, toolpath.arc >= 0
+    count = np.ones(len(toolpath), dtype=np.int64)
+    angle = np.abs(arcs.rate[toolpath.arc[is_arc]]) * toolpath.length[is_arc]
+    count[is_arc] = np.maximum(1, np.ceil(angle / PIECE_ANGLE - RATIO_ROUNDING)).astype(np.int64)
+    segment = np.repeat(np.arange(len(toolpath)), count)
+    first = np.cumsum(count) - count  # first piece of each segment
+    part = np.arange(len(segment)) - first[segment]
+    step = toolpath.length / count
+    x0, x1 = part * step[segment], (part + 1) * step[segment]
+    arc = toolpath.arc[segment]
+
+    vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])
+    on_arc = np.flatnonzero(arc >= 0)
+    vertex[on_arc] = _arc_points(toolpath, arc[on_arc], x0[on_arc])
+    _check_consistent(toolpath, vertex[first])
+    vertex[first] = toolpath.start
+    joint = np.append(first, len(segment))
+    real = np.zeros(len(segment) + 1, dtype=np.bool_)
+    real[joint] = True
+    budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
+    vertex_budget = np.append(budget, 0.0)
+    vertex_budget[joint] = toolpath.tolerance
+    stop = np.zeros(len(real), dtype=np.bool_)
+    stop[joint] = toolpath.joint == Joint.STOP
+    return Pieces(
+        vertex=vertex,
+        segment=segment,
+        real=real,
+        budget=budget,
+        vertex_budget=vertex_budget,
+        feed=toolpath.feed[segment],
+        stop=stop,
+        arc=np.ascontiguousarray(arc),
+        x0=x0,
+        x1=x1,
+        center=arcs.center.copy(),
+        e1=arcs.e1.copy(),
+        e2=arcs.e2.copy(),
+        drift=arcs.drift.copy(),
+        radius=arcs.radius.copy(),
+        rate=arcs.rate.copy(),
+    )
+
+
+def _arc_points(toolpath: Toolpath, row: Array, x: FloatArray) -> FloatArray:
+    arcs = toolpath.arcs
+    angle = arcs.rate[row] * x
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    circle = arcs.radius[row][:, None] * (cos * arcs.e1[row] + sin * arcs.e2[row])
+    return arcs.center[row] + circle + arcs.drift[row] * x[:, None]
+
+
+def _check_consistent(toolpath: Toolpath, computed_start: FloatArray) -> None:
+    rows = np.flatnonzero(toolpath.arc >= 0)
+    computed_end = toolpath.end.copy()
+    computed_end[rows] = _arc_points(toolpath, toolpath.arc[rows], toolpath.length[rows])
+    for what, gap in (
+        ("does not start where its arc does", computed_start - toolpath.start),
+        ("does not end where its arc does", computed_end - toolpath.end),
+        ("does not start where the one before ends", toolpath.start[1:] - toolpath.end[:-1]),
+    ):
+        distance = np.linalg.norm(gap, axis=1)
+        bad = np.flatnonzero(distance > PLACE_ROUNDING)
+        if len(bad):
+            k = int(bad[0]) + len(toolpath) - len(distance)
+            raise ValueError(
+                f"Toolpath: segment {k} (line {toolpath.line[k]}) {what}: {distance[bad[0]]:.3g} mm apart"
+            )
+
+
+@njit(cache=True)
+def reach(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
+    """Which part of piece i lies within `radius` of the point q (A,).
+
+    -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
+    Exact on lines; on arcs the distance is, and a and b are to second order about the nearest point.
+    """
+    if pieces.arc[i] >= 0:
+        return _reach_arc(pieces, i, q, radius)
+    return reach_line(pieces.vertex[i], pieces.vertex[i + 1], q, radius)
+
+
+@njit(cache=True)
+def reach_line(
+    start: FloatArray, end: FloatArray, q: FloatArray, radius: float
+) -> tuple[float, float, float]:
+    """`reach` on the straight piece from `start` to `end`, which may be a point."""
+    along, length_sq = 0.0, 0.0
+    for n in range(len(q)):
+        u = end[n] - start[n]
+        along += (q[n] - start[n]) * u
+        length_sq += u * u
+    x = along / length_sq if length_sq > 0.0 else 0.0
+    off_sq = 0.0  # square of the distance from the unbounded line
+    for n in range(len(q)):
+        off = q[n] - start[n] - x * (end[n] - start[n])
+        off_sq += off * off
+    beyond = x - min(max(x, 0.0), 1.0)
+    distance = math.sqrt(off_sq + beyond * beyond * length_sq)
+    if distance > radius:
+        return 1.0, 0.0, distance
+    if length_sq == 0.0:
+        return 0.0, 1.0, distance
+    half = math.sqrt(max(radius * radius - off_sq, 0.0) / length_sq)
+    # the nearest point belongs to the part whatever the rounding of `half`
+    nearest = x - beyond
+    return min(max(x - half, 0.0), nearest), max(min(x + half, 1.0), nearest), distance
+
+
+@njit(cache=True)
+def _reach_arc(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
+    k = pieces.arc[i]
+    center, e1, e2, drift = pieces.center[k], pieces.e1[k], pieces.e2[k], pieces.drift[k]
+    big, rate, x0, x1 = pieces.radius[k], pieces.rate[k], pieces.x0[i], pieces.x1[i]
+    w1, w2, wd, d1, d2, dd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(len(q)):
+        w = q[n] - center[n]
+        w1 += w * e1[n]
+        w2 += w * e2[n]
+        wd += w * drift[n]
+        d1 += e1[n] * drift[n]
+        d2 += e2[n] * drift[n]
+        dd += drift[n] * drift[n]
+
+    middle = 0.5 * (x0 + x1)
+    angle = math.atan2(w2 - d2 * middle, w1 - d1 * middle) - rate * middle
+    angle -= 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+    x = min(max(middle + angle / rate, x0), x1)
+    for _ in range(NEWTON_STEPS):
+        c, s = math.cos(rate * x), math.sin(rate * x)
+        turn = big * rate * (c * d2 - s * d1)
+        pull = big * (c * d1 + s * d2)
+        g = big * rate * (s * w1 - c * w2) - wd + pull + x * (turn + dd)
+        slope = big * rate * rate * (c * w1 + s * w2) + 2.0 * turn + dd - x * rate * rate * pull
+        if (
+            slope <= 0.0
+        ):  # q is beyond the centre: the nearest point of the piece is one of its ends, which x already is
+            break
+        better = min(max(x - g / slope, x0), x1)
+        moved = abs(better - x)
+        x = better
+        if moved <= 1e-13 * (x1 - x0):
+            break
+    c, s = math.cos(rate * x), math.sin(rate * x)
+    distance_sq, g, slope = 0.0, 0.0, 0.0
+    for n in range(len(q)):
+        off = center[n] + big * (c * e1[n] + s * e2[n]) + drift[n] * x - q[n]
+        d = big * rate * (c * e2[n] - s * e1[n]) + drift[n]
+        distance_sq += off * off
+        g += off * d
+        slope += d * d - off * big * rate * rate * (c * e1[n] + s * e2[n])
+    distance = math.sqrt(distance_sq)
+    if distance > radius:
+        return 1.0, 0.0, distance
+    if slope <= 0.0:
+        return 0.0, 1.0, distance
+    # distance^2 + 2 g D + slope D^2 = radius^2 about the nearest point
+    root = math.sqrt(g * g + slope * (radius * radius - distance_sq))
+    low, high = x + (-g - root) / slope, x + (-g + root) / slope
+    span = x1 - x0
+    return max(low - x0, 0.0) / span, min(high - x0, span) / span, distance

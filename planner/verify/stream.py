@@ -1,0 +1,136 @@
+"""A motion read in blocks of samples: limits and matching side by side, with little memory.
+
+The limits need to know the block of the path under each sample, so the matching of a block of samples goes first. Three
+samples are carried over from block to block, for the third differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.trajectory import Trajectory
+from planner.verify.limits import GROUPS, ROWS_ALONE, scan
+from planner.verify.matching import Match, follow, new_match
+from planner.verify.pieces import Pieces
+
+BLOCK_SAMPLES = 65_536  # read at a time: 8 MB for three axes
+CARRIED = 3  # samples before a block that its third differences need
+COLUMNS = ("t", "position", "velocity", "acceleration", "jerk")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What the motion is measured against: (3, A) velocity, acceleration, jerk; and the rest."""
+
+    per_axis: FloatArray
+    linear: Array
+    normal_acceleration: float
+    acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
+    jerk_limited: bool
+
+
+@dataclass(eq=False, kw_only=True)
+class Seen:
+    """What a motion showed: R = GROUPS A + ROWS_ALONE rows as in `limits`, and the state of the matching.
+
+    worst (R, 4); time (R,) [s]; at (R, A) [mm]; piece (R,)
+    """
+
+    worst: FloatArray
+    time: FloatArray
+    at: FloatArray
+    piece: Array
+    match: Match
+    samples: int = 0
+    first: FloatArray = field(default_factory=lambda: np.empty(0))  # (A,) first and last position
+    last: FloatArray = field(default_factory=lambda: np.empty(0))
+    t_first: float = np.nan
+    t_last: float = -np.inf
+    gap_max: float = 0.0  # longest period [s]
+
+
+def watch(
+    chunks: Iterable[Trajectory],
+    pieces: Pieces,
+    limits: Limits,
+    *,
+    middles: bool,
+    progress: Callable[[int], None],
+) -> Seen:
+    """Read all chunks, in order. Samples not later than those already read (overlap) are left out.
+
+    middles  : match the middle of every chord too
+    progress : called with the number of samples read so far
+    """
+    axes = pieces.vertex.shape[1]
+    rows = GROUPS * axes + ROWS_ALONE
+    seen = Seen(
+        worst=np.zeros((rows, 4)),
+        time=np.zeros(rows),
+        at=np.zeros((rows, axes)),
+        piece=np.zeros(rows, dtype=np.int64),
+        match=new_match(pieces),
+    )
+    carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
+    feed_max = np.empty(0)
+    travelled = 0.0
+    for chunk in chunks:
+        begin = int(np.searchsorted(chunk.t, seen.t_last, side="right"))
+        for low in range(begin, len(chunk), BLOCK_SAMPLES):
+            new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
+            data = [np.concatenate(pair) for pair in zip(carried, new, strict=True)]
+            feed_max = np.concatenate([feed_max, np.full(len(new[0]), np.inf)])
+            travelled = _block(seen, data, feed_max, pieces, limits, middles, travelled)
+            carried, feed_max = [column[-CARRIED:] for column in data], feed_max[-CARRIED:]
+            progress(seen.samples)
+    return seen
+
+
+def _block(
+    seen: Seen,
+    data: list[FloatArray],
+    feed_max: FloatArray,
+    pieces: Pieces,
+    limits: Limits,
+    middles: bool,
+    travelled: float,
+) -> float:
+    """Take in one block, the carried samples first; writes feed_max, returns the path length run so far."""
+    t, position, velocity, acceleration, jerk = data
+    skip = min(seen.samples, CARRIED)
+    if not skip:
+        seen.first, seen.t_first = position[0].copy(), float(t[0])
+    seen.last, seen.t_last = position[-1].copy(), float(t[-1])
+    seen.samples += len(t) - skip
+    periods = np.diff(t[max(skip - 1, 0) :])
+    seen.gap_max = max(seen.gap_max, float(periods.max(initial=0.0)))
+    piece = np.zeros(len(t), dtype=np.int64)
+    follow(pieces, seen.match, t, position, skip, middles, limits.acceleration_at_stop, piece, feed_max)
+    worst = np.zeros_like(seen.worst)
+    worst[:, 0] = seen.worst[:, 0]
+    sample = np.full(len(worst), -1, dtype=np.int64)
+    travelled = scan(
+        t,
+        position,
+        velocity,
+        acceleration,
+        jerk,
+        skip,
+        limits.per_axis,
+        limits.linear,
+        limits.normal_acceleration,
+        feed_max,
+        travelled,
+        worst,
+        sample,
+    )
+    new = np.flatnonzero(sample >= 0)
+    seen.worst[new] = worst[new]
+    seen.time[new] = t[sample[new]]
+    seen.at[new] = position[sample[new]]
+    seen.piece[new] = piece[sample[new]]
+    return travelled

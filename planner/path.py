@@ -39,7 +39,7 @@ from planner.machine import Machine
 
 # Interpolation error of the axis accelerations that the grid may have [share of the limit]; measured in benchmarks: the cycle
 # time is within 1e-3 of the one on a grid ten times finer.
-RESOLUTION = 5e-3
+RESOLUTION = 2e-3
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
 MARGIN_SAFETY = 1.25
 # Halvings of one interval at most; 2^-20 of a corner is below a nanometre.
@@ -318,7 +318,8 @@ def _grown(array, needed):
     if needed <= len(array):
         return array
     out = np.empty(max(2 * len(array), needed), array.dtype)
-    out[: len(array)] = array
+    for i in range(len(array)):  # a slice assignment costs 4 s of compilation for its error message
+        out[i] = array[i]
     return out
 
 
@@ -450,7 +451,9 @@ def _evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acc
     fresh = True  # the point starts a piece: nothing to its left
     for i in range(points):
         if last[i]:
-            d2_right[i], d3_right[i], kappa_right[i] = d2_left[i], d3_left[i], kappa_left[i]
+            kappa_right[i] = kappa_left[i]
+            for k in range(axes):
+                d2_right[i, k], d3_right[i, k] = d2_left[i, k], d3_left[i, k]
             if i + 1 < points:
                 s[i + 1] = s[i]
             fresh = True
@@ -461,12 +464,15 @@ def _evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acc
         margin[i] = MARGIN_SAFETY * error
         kappa_right[i], kappa_left[i + 1] = _effective_curvature(ends)
         if fresh:
-            position[i], d1[i] = left[0], left[1]
-            d2_left[i], d3_left[i], kappa_left[i] = left[2], left[3], kappa_right[i]
-            fresh = False
-        d2_right[i], d3_right[i] = left[2], left[3]
-        position[i + 1], d1[i + 1] = right[0], right[1]
-        d2_left[i + 1], d3_left[i + 1] = right[2], right[3]
+            kappa_left[i] = kappa_right[i]
+        for k in range(axes):
+            if fresh:
+                position[i, k], d1[i, k] = left[0, k], left[1, k]
+                d2_left[i, k], d3_left[i, k] = left[2, k], left[3, k]
+            d2_right[i, k], d3_right[i, k] = left[2, k], left[3, k]
+            position[i + 1, k], d1[i + 1, k] = right[0, k], right[1, k]
+            d2_left[i + 1, k], d3_left[i + 1, k] = right[2, k], right[3, k]
+        fresh = False
         w_ref = 0.5 * (w0[i] + w1[i])
         s[i + 1] = s[i] + element_length(legs, corners, element[i], w0[i], w1[i], w_ref, left)
     return s, position, d1, d2_left, d2_right, d3_left, d3_right, margin, kappa_left, kappa_right

@@ -245,6 +245,18 @@ def _refine(legs, corners, element, w0, w1, w, ds, h, work, out):
 
 
 @njit(cache=True, error_model="numpy")
+def _last_not_after(values, limit, first, last):
+    """Largest index in [first, last] whose ascending value is <= limit; `first` if there is none."""
+    while first < last:
+        middle = (first + last + 1) // 2
+        if values[middle] <= limit:
+            first = middle
+        else:
+            last = middle - 1
+    return first
+
+
+@njit(cache=True, error_model="numpy")
 def _sample(
     legs, corners, times, t, s_law, feed, acc_s, jerk_s, run, end, piece, s, element, w0, w1, position
 ):  # fmt: skip
@@ -256,7 +268,7 @@ def _sample(
     point = np.empty(count, np.int64)
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     inverse, inverse_of, exact = np.zeros(6), -1, False
-    m = max(np.searchsorted(t, times[0], side="right") - 1, 0)
+    m = _last_not_after(t, times[0], 0, len(t) - 1)
     i = 0
     for n in range(count):
         while m + 1 < len(t) and t[m + 1] <= times[n]:
@@ -271,11 +283,7 @@ def _sample(
             s_here, v, u, j = s[-1], 0.0, 0.0, 0.0
         first, last = piece[run[m]], piece[run[m] + 1] - 2  # the intervals of this run
         if i < first:
-            i = (
-                first
-                if s_here <= s[first + 1]
-                else first + np.searchsorted(s[first : last + 1], s_here, side="right") - 1
-            )
+            i = _last_not_after(s, s_here, first, last)
         while i < last and s[i + 1] <= s_here:
             i += 1
         point[n] = i

@@ -50,7 +50,8 @@ def _run(
     given = np.empty(3)
     while row < rows:
         code, new_feed, speed, moves, is_plain = -1, -1.0, -1.0, False, True
-        given[:] = np.nan
+        for axis in range(3):
+            given[axis] = np.nan
         refused = refusals
         for word in range(first[row], first[row + 1]):
             c, v = letter[word], value[word]
@@ -88,7 +89,8 @@ def _run(
                     step = given[axis] * unit
                     position[axis] = step + (offset[axis] if absolute else position[axis])
             block_kind[blocks] = _LINE if motion == 1 else _RAPID
-            block_end[blocks, :] = position
+            for axis in range(3):  # a slice assignment costs 3 s of compilation for its error message
+                block_end[blocks, axis] = position[axis]
             block_feed[blocks] = feed if motion == 1 else np.inf
             block_line[blocks] = line[row]
             block_path_control[blocks] = path_control

@@ -14,7 +14,8 @@ The columns must belong to the positions. With |acceleration| <= A over a period
 
     |dx/h - (v0 + v1)/2| <= min(A h / 4, J h^2 / 12),      |dv/h - (a0 + a1)/2| <= J h / 4
 
-A and J are the larger of the limit and of what was measured, so that a motion beyond a limit is not also called a liar.
+each up to a rounding of the columns of `RATIO_ROUNDING` times their limit. A and J are the larger of the limit and of what was
+measured, so that a motion beyond a limit is not also called a liar.
 Without a limit on jerk acceleration may jump within every period, and the acceleration column cannot be refuted; nor can the
 jerk column, which may jump anyhow.
 
@@ -30,6 +31,7 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray
+from planner.verify.pieces import RATIO_ROUNDING
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
 FEED_AT_REST = 1e-6  # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
@@ -77,7 +79,7 @@ def scan(
         np.zeros((axes, 4)),
         np.zeros((axes, 4)),
     )  # d0, d1, d2 at the sample before, and their rounding
-    ulp = ROUNDING_ULPS * 2.0**-52
+    ulp, resolution = ROUNDING_ULPS * 2.0**-52, RATIO_ROUNDING
     first = max(skip - 3, 0)
     for k in range(first, n):
         period = t[k] - t[k - 1] if k > first else np.inf
@@ -123,12 +125,13 @@ def scan(
             if k == first:
                 continue
             mean = 0.5 * (velocity[k, axis] + velocity[k - 1, axis])
-            gap = max(abs(difference[1] - mean) - error[1], 0.0) / period
+            gap = max(abs(difference[1] - mean) - error[1] - resolution * limits[0, axis], 0.0) / period
             _keep(worst, sample, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
             _keep(worst, sample, GAP_BY_JERK * axes + axis, gap / period, limits[2, axis] / 12.0, k, COLUMN)
             mean = 0.5 * (acceleration[k, axis] + acceleration[k - 1, axis])
             change = (velocity[k, axis] - velocity[k - 1, axis]) / period
-            gap = max(abs(change - mean) - error[1] / period, 0.0) / period
+            noise = resolution * (limits[0, axis] / period + limits[1, axis])
+            gap = max(abs(change - mean) - noise, 0.0) / period
             _keep(worst, sample, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
         if k < skip:
             continue

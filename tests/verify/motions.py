@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,17 +43,17 @@ class Moves:
         return self
 
     def line(self, *end, feed=50.0, control=PathControl.BLEND):
-        return self._add(Kind.LINE, (*end, 0.0)[:3], feed, control=control)
+        return self._add(Kind.LINE, (*end, 0.0, 0.0)[:3], feed, control=control)
 
     def rapid(self, *end):
-        return self._add(Kind.RAPID, (*end, 0.0)[:3], np.inf)
+        return self._add(Kind.RAPID, (*end, 0.0, 0.0)[:3], np.inf)
 
     def arc(self, center, sweep, feed=50.0, rise=0.0):
         center = np.array([*center, self.here[2]])
         r = self.here - center
         c, s = np.cos(sweep), np.sin(sweep)
         self.arcs.append((len(self.rows), center, sweep))
-        end = center + [c * r[0] - s * r[1], s * r[0] + c * r[1], rise]
+        end = center + np.array([c * r[0] - s * r[1], s * r[0] + c * r[1], rise])
         return self._add(Kind.ARC, np.round(end, 4), feed)
 
     def dwell(self, seconds):
@@ -93,33 +94,37 @@ def rest_to_rest(length: float, feed: float, acceleration: float, jerk: float = 
         peak = _s_curve_peak(length, feed, acceleration, jerk)
         rounding = min(acceleration / jerk, np.sqrt(peak / jerk))
         ramp = peak / (jerk * rounding)
-    steps = []  # (time, jump of acceleration) or (time, jump of jerk)
     duration = length / peak + ramp + rounding
     if rounding == 0.0:
-        steps = [(0.0, 1), (ramp, -1), (duration - ramp, -1), (duration, 1)]
         order, scale = 2, peak / ramp
+        knots = [(0.0, 1), (ramp, -1), (duration - ramp, -1)]
     else:
-        up = [(0.0, 1), (rounding, -1), (ramp, -1), (ramp + rounding, 1)]
-        steps = up + [(t + duration - ramp - rounding, -sign) for t, sign in up]
         order, scale = 3, peak / (ramp * rounding)
+        up = [(0.0, 1), (rounding, -1), (ramp, -1), (ramp + rounding, 1)]
+        knots = [*up, *((t + duration - ramp - rounding, -sign) for t, sign in up[:-1])]
+    times = np.array([when for when, _ in knots])
+    states = np.zeros((len(knots), 4))  # s and its derivatives at the beginning of each phase
+    for k, (when, sign) in enumerate(knots):
+        if k:
+            states[k] = _cubic(states[k - 1], when - times[k - 1])
+        states[k, order] += sign * scale
 
     def at(t):
-        out = [np.zeros_like(t) for _ in range(4)]
-        for when, sign in steps:
-            tau = np.maximum(t - when, 0.0)
-            on = t >= when
-            factor = 1.0
-            for derivative in range(order, -1, -1):
-                power = order - derivative
-                out[derivative] = out[derivative] + sign * scale * on * tau**power / factor
-                factor *= power + 1
+        phase = np.maximum(np.searchsorted(times, t, side="right") - 1, 0)
+        out = _cubic(states[phase].T, t - times[phase])
         past = t >= duration
-        for derivative in range(1, 4):
-            out[derivative][past] = 0.0
-        out[0][past] = length
+        out[1:, past] = 0.0
+        out[0, past] = length
         return out
 
     return duration, at
+
+
+def _cubic(state, tau):
+    s, v, a, j = state
+    return np.array(
+        [s + tau * (v + tau * (a / 2 + tau * j / 6)), v + tau * (a + tau * j / 2), a + tau * j, j + 0 * tau]
+    )
 
 
 def _s_curve_peak(length, feed, acceleration, jerk):
@@ -226,7 +231,7 @@ def changed(trajectory: Trajectory, **columns) -> Trajectory:
 def polyline(points, feed=50.0, acceleration=2000.0, jerk=np.inf) -> tuple[float, Motion]:
     """Rest to rest along every leg."""
     parts = []
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         length, curve = straight(a, b)
         parts.append(along(length, curve, rest_to_rest(length, feed, acceleration, jerk)))
     return chain(*parts)

@@ -55,7 +55,7 @@ def make_verdict(*, passed: bool = True) -> Any:
         passed=passed,
         limits={
             "velocity.x": check(0.5),
-            "velocity.y": check(1.0000004),
+            "velocity.y": check(1.0000014),
             "acceleration.x": check(0.75),
             "jerk.x": check(3.5, limited=False),
         },
@@ -67,7 +67,7 @@ def make_verdict(*, passed: bool = True) -> Any:
         else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),
         summary=lambda: {
             "passed": passed,
-            "limits": {"velocity.x": 0.5, "velocity.y": 1.0000004, "acceleration.x": 0.75, "jerk.x": 3.5},
+            "limits": {"velocity.x": 0.5, "velocity.y": 1.0000014, "acceleration.x": 0.75, "jerk.x": 3.5},
             "contour_error_mm": 0.0123,
             "vertex_error_mm": 0.02,
             "end_error_mm": 0.0,

@@ -113,7 +113,7 @@ def toolpath_figure(plan: Plan) -> Figure:
     else:
         _solid_axes(axes, names, motion)
         figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
-        bar = figure.colorbar(line, cax=figure.add_axes((0.98, 0.22, 0.02, 0.5)))
+        bar = figure.colorbar(line, cax=figure.add_axes((0.95, 0.22, 0.02, 0.5)))
     bar.set_label("feed [mm/s]")
     outline: Any = bar.outline
     outline.set_linewidth(0.5)
@@ -123,7 +123,7 @@ def toolpath_figure(plan: Plan) -> Figure:
 def _canvas(extent: FloatArray, *, flat: bool) -> tuple[Figure, Any]:
     """A figure of about the path's proportions."""
     if not flat:
-        figure = Figure(figsize=(6.6, 5.4))
+        figure = Figure(figsize=(6.4, 5.0))
         return figure, figure.add_axes((0.0, 0.0, 0.88, 0.96), projection="3d", computed_zorder=False)
     across, up = extent / max(float(extent.max()), 1e-9)
     figure = Figure(figsize=(1.5 + max(5.0 * across, 2.4), 1.1 + max(5.0 * up, 2.0)), layout="constrained")
@@ -255,8 +255,10 @@ def profiles_figure(plan: Plan) -> Figure:
             _profile(panel, t, values[:, k] * per, BLUE)
             length = "°" if rotary else "m"
             panel.set_ylabel(f"{symbol}$_{{\\rm {axis.upper()}}}$\n[{length}/s{power}]")
-            note = "not limited by this method" if quantity in free or f"{quantity}.{axis}" in free else ""
-            _limit_lines(panel, values[:, k] * per, limits[k] * per, note)
+            _limit_lines(panel, values[:, k] * per, limits[k] * per)
+            if k == moving[0] and quantity in free:
+                said = f"{quantity} is not limited by this method"
+                panel.set_title(said, loc="right", fontsize=7.5, color=VERMILION, pad=2)
     rows[-1].set_xlabel(f"time [{unit}]")
     rows[-1].set_xlim(t[0], t[-1])
     figure.align_ylabels(rows)
@@ -345,7 +347,7 @@ def _profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> Non
     panel.fill_between(t[starts], low, high, color=colour, linewidth=0.5)
 
 
-def _limit_lines(panel: Axes, values: FloatArray, limit: float, note: str) -> None:
+def _limit_lines(panel: Axes, values: FloatArray, limit: float) -> None:
     peak = float(np.abs(values).max())
     far = peak > FAR * limit  # a linear scale would show the peak only
     if far:
@@ -355,22 +357,17 @@ def _limit_lines(panel: Axes, values: FloatArray, limit: float, note: str) -> No
         panel.set_yticks([-value for value in named[:0:-1]] + named)
         panel.yaxis.set_major_formatter("{x:g}")
         panel.minorticks_off()
-    reach = max(peak, limit) * ((4.0 if far else 1.45) if note else 1.18)
+    reach = max(peak, limit) * (1.6 if far else 1.18)
     panel.set_ylim(-reach, reach)
     panel.axhline(0.0, color="#cccccc", linewidth=0.5, zorder=0)
     for side in (limit, -limit):
         panel.axhline(side, color=VERMILION, linewidth=0.8, linestyle=(0, (4, 2)))
-    if note:
-        panel.text(
-            0.995, 0.97, note, transform=panel.transAxes, ha="right", va="top", fontsize=7, color=VERMILION,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
-        )  # fmt: skip
 
 
 def _free_quantities(plan: Plan) -> set[str]:
     if plan.verdict is None:
         return set()
-    return {name for name, check in plan.verdict.limits.items() if not check.limited}
+    return {name.partition(".")[0] for name, check in plan.verdict.limits.items() if not check.limited}
 
 
 def _time_unit(seconds: float) -> tuple[float, str]:

@@ -193,10 +193,10 @@ def _by_quantity(verdict: Verdict) -> dict[str, list]:
 
 
 def _ratio(value: float) -> str:
-    """A ratio to a limit, rounded up in the sixth digit, so that 1.0000004 does not pass for 1."""
+    """A ratio to a limit; near 1 to the sixth digit, the verdict's own rounding."""
     if not np.isfinite(value):
         return "-"
-    return f"{np.ceil(value * 1e6) / 1e6:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
+    return f"{value:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
 
 
 def _hours(seconds: float) -> str:

@@ -24,7 +24,7 @@ def test_plan() -> None:
     said = text(plan_table(make_plan()))
     assert "0.8000 s" in said
     assert "1.2500 s, 1.56 times as long" in said
-    assert "x 0.5, y 1.000001" in said  # rounded up: 1.0000004 is above the limit
+    assert "x 0.5, y 1.000001" in said
     assert "x 3.5  (not limited by this method)" in said
     assert "12.300 µm" in said
     assert "passed" in said

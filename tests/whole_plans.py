@@ -1,0 +1,117 @@
+"""All stages of a second-order plan in one call, without sampling and verification, for tests of stages and laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.constraints.assemble import feedrate_problem
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.bezier import BezierCorner
+from planner.corners.blend import CORNER_DTYPE, corner_point
+from planner.corners.elements import to_arc_length
+from planner.corners.fir import FirCorner
+from planner.corners.smooth import CornerShape, SmoothPath, round_corners
+from planner.feedrate.grid import add_switching_points
+from planner.feedrate.reachability import Reachability
+from planner.feedrate.solution import FeedrateSolution
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.legs import legs_of
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.nc.program import Program
+from planner.path import RESOLUTION, PathSamples, sample_path
+from planner.timing import Motion, TimeLaw, second_order_law
+
+CORNERS = ("bezier", "fir")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solved:
+    """What the stages of one plan made."""
+
+    toolpath: Toolpath
+    path: SmoothPath
+    samples: PathSamples
+    problem: FeedrateProblem
+    solution: FeedrateSolution
+    law: TimeLaw
+
+    @property
+    def motion(self) -> Motion:
+        return Motion(samples=self.samples, law=self.law)
+
+    @property
+    def time(self) -> float:
+        """Cycle time, dwells included [s]."""
+        return self.law.end
+
+
+def smooth_path(
+    program: Program, machine: Machine, corner: str | CornerShape = "bezier", tolerance: float | None = None
+) -> SmoothPath:
+    toolpath = toolpath_from_program(program, machine, tolerance)
+    if isinstance(corner, str):
+        corner = BezierCorner() if corner == "bezier" else FirCorner.from_machine(machine, toolpath.axes)
+    return round_corners(toolpath, machine, corner)
+
+
+def solve(
+    program: Program,
+    machine: Machine,
+    corner: str | CornerShape = "bezier",
+    tolerance: float | None = None,
+    resolution: float = RESOLUTION,
+) -> Solved:
+    path = smooth_path(program, machine, corner, tolerance)
+    samples = sample_path(path, machine, resolution)
+    problem = feedrate_problem(samples, machine)
+    solution = Reachability().solve(problem).require()
+    samples = add_switching_points(samples, problem, solution, machine)
+    problem = feedrate_problem(samples, machine)
+    solution = Reachability().solve(problem).require()
+    return Solved(
+        toolpath=path.toolpath,
+        path=path,
+        samples=samples,
+        problem=problem,
+        solution=solution,
+        law=second_order_law(samples, problem, solution),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Corner:
+    """One corner evaluated: w-derivatives (n, 4, A) and arc-length derivatives (n, 4, A); row 0 is the point."""
+
+    by_w: FloatArray
+    by_s: FloatArray
+    vertex: FloatArray
+
+
+def evaluate_corner(
+    toolpath: Toolpath,
+    joint: int,
+    shape: CornerShape,
+    params: FloatArray,
+    w: FloatArray,
+    side: FloatArray | None = None,
+) -> Corner:
+    """Evaluate a corner of given shape parameters (4,) at the joint between legs joint-1 and joint.
+
+    side : (n,) parameters that choose the branch where two pieces meet; None means w itself
+    """
+    legs = legs_of(toolpath).table
+    corners = np.zeros(len(legs) + 1, CORNER_DTYPE)
+    corners["shape"], corners["params"][joint] = int(shape.shape), params
+    axes = len(toolpath.axes)
+    by_w, by_s = np.empty((len(w), 4, axes)), np.empty((len(w), 4, axes))
+    one, two = np.empty((4, axes)), np.empty((4, axes))
+    for i in range(len(w)):
+        ref = w[i] if side is None else side[i]
+        corner_point(legs, corners, joint, w[i], ref, one, two, by_w[i])
+        by_s[i] = by_w[i]
+        to_arc_length(by_s[i])
+    return Corner(by_w=by_w, by_s=by_s, vertex=legs[joint]["start"].copy())

@@ -214,26 +214,23 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array,
     in_order, said = True, []
     for look in looks:
         match = look.seen.match
-        unreached = np.zeros_like(lost)
-        if not np.isfinite(match.low[-1]):
-            unreached[match.window[1] + 1 :] = True
-        here = np.unique(pieces.segment[match.lost | unreached])
-        lost |= match.lost | unreached
+        end_reached = match.near[-1] <= pieces.vertex_budget[-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+        left_out = match.lost.copy()
+        left_out[match.window[1] + 1 :] = True
+        left_out[-1] |= not end_reached
+        lost |= left_out
+        here = np.unique(pieces.segment[left_out])
         if len(here):
             lines = list(dict.fromkeys(toolpath.line[here].tolist()))
             shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + (
                 " ..." if len(lines) > FAULTS_OF_A_KIND else ""
             )
-            said.append("order: " + look.noted(f"{len(here)} blocks are not run, line {shown}"))
+            said.append("order: " + look.noted(f"{len(here)} blocks are not run to their end, line {shown}"))
         if match.window[5]:
             said.append(
                 "order: " + look.noted(f"{match.window[5]} samples far from where the program should be")
             )
-        elif not np.isfinite(match.low[-1]) and not len(here):
-            said.append("order: " + look.noted("the motion ends before the program does"))
-        in_order = (
-            in_order and not match.window[3] and not match.window[5] and bool(np.isfinite(match.low[-1]))
-        )
+        in_order = in_order and not match.window[3] and not match.window[5] and not len(here)
     return np.unique(pieces.segment[lost]), in_order, said
 
 

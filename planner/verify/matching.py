@@ -35,7 +35,15 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray
-from planner.verify.pieces import CONTOUR_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, Pieces, reach, reach_line
+from planner.verify.pieces import (
+    CONTOUR_ROUNDING,
+    PLACE_ROUNDING,
+    RATIO_ROUNDING,
+    Pieces,
+    distance_from,
+    reach,
+    reach_line,
+)
 
 NEAR_MISS = (
     2.0  # errors up to this multiple of the budget are matched in place, beyond it a block counts as left out
@@ -241,7 +249,7 @@ def _recover(pieces: Pieces, match: Match, point: FloatArray, time: float) -> tu
     nearest, best, feed = np.inf, match.window[0], 0.0
     for j in range(match.window[0], end + 1):
         if match.low[j] < np.inf:
-            _, _, distance = reach(pieces, j, point, 0.0)
+            distance = distance_from(pieces, j, match.low[j], point)
             feed = max(feed, pieces.feed[j])
             if distance < nearest:
                 nearest, best = distance, j

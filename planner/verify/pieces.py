@@ -179,6 +179,31 @@ def reach_line(
 
 
 @njit(cache=True)
+def distance_from(pieces: Pieces, i: int, low: float, q: FloatArray) -> float:
+    """Distance [mm] of q (A,) from the part of piece i that begins at the fraction `low`."""
+    _, _, distance = reach(pieces, i, q, 0.0)
+    apart_sq, ahead = 0.0, 0.0
+    k = pieces.arc[i]
+    x = pieces.x0[i] + low * (pieces.x1[i] - pieces.x0[i])
+    for n in range(len(q)):
+        if k >= 0:
+            c, s, turn = (
+                math.cos(pieces.rate[k] * x),
+                math.sin(pieces.rate[k] * x),
+                pieces.radius[k] * pieces.rate[k],
+            )
+            e1, e2, drift = pieces.e1[k, n], pieces.e2[k, n], pieces.drift[k, n]
+            place = pieces.center[k, n] + pieces.radius[k] * (c * e1 + s * e2) + drift * x
+            tangent = turn * (c * e2 - s * e1) + drift
+        else:
+            tangent = pieces.vertex[i + 1, n] - pieces.vertex[i, n]
+            place = pieces.vertex[i, n] + low * tangent
+        apart_sq += (place - q[n]) ** 2
+        ahead += (place - q[n]) * tangent
+    return math.sqrt(apart_sq) if ahead > 0.0 else distance  # q lies behind: the part's beginning is nearest
+
+
+@njit(cache=True)
 def _reach_arc(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
     k = pieces.arc[i]
     center, e1, e2, drift = pieces.center[k], pieces.e1[k], pieces.e2[k], pieces.drift[k]

@@ -126,7 +126,7 @@ def test_no_corner_is_faster_than_its_closed_form(job, kind):
 
 
 def test_the_budget_is_never_overdrawn():
-    rng = np.random.default_rng(12)
+    rng = np.random.default_rng(13)
     machine = problems.machine(dt=0.004, fir=Fir(time_constants=(0.02, 0.01)))
     for _ in range(10):
         path = smooth_path(problems.random_polyline(rng, blocks=20), machine)

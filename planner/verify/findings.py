@@ -10,6 +10,7 @@ from planner.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.verify import limits as rows
+from planner.verify.matching import HELD, JUMPS, LAST, WORST_AT
 from planner.verify.pieces import CONTOUR_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, Pieces
 from planner.verify.stream import Limits, Seen
 from planner.verify.verdict import LimitCheck
@@ -135,9 +136,9 @@ def contour_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> Limi
         unit="mm",
         ratio=float(ratio),
         value=float(distance),
-        limit=float(budget) if budget > 0 else float(pieces.budget.min()),
+        limit=float(budget) if budget > 0 else float(pieces.piece["budget"].min()),
         time=float(time),
-        position=look.seen.match.worst_at,
+        position=look.seen.match.place[WORST_AT],
         line=_line(toolpath, pieces, int(piece)),
         note=look.note,
     )
@@ -145,15 +146,15 @@ def contour_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> Limi
 
 def vertex_error(looks: list[Look], pieces: Pieces) -> float:
     """Largest distance of a programmed vertex from the motion [mm]."""
-    return max(float(_near(look, pieces)[pieces.real].max()) for look in looks)
+    return max(float(_near(look, pieces)[pieces.joint["real"]].max()) for look in looks)
 
 
 def vertex_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> LimitCheck:
     """The vertex that the motion misses by most, against its budget."""
-    look = max(looks, key=lambda each: (_near(each, pieces) / pieces.vertex_budget).max())
+    look = max(looks, key=lambda each: (_near(each, pieces) / pieces.joint["budget"]).max())
     near = _near(look, pieces)
-    i = int((near / pieces.vertex_budget).argmax())
-    budget = float(pieces.vertex_budget[i])
+    i = int((near / pieces.joint["budget"]).argmax())
+    budget = float(pieces.joint["budget"][i])
     ratio = near[i] / budget
     if near[i] <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
         ratio = min(ratio, 1.0)
@@ -163,7 +164,7 @@ def vertex_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> Limit
         ratio=float(ratio),
         value=float(near[i]),
         limit=budget,
-        time=float(look.seen.match.near_time[i]),
+        time=float(look.seen.match.passed["near_time"][i]),
         position=pieces.vertex[i],
         line=_line(toolpath, pieces, i - 1),
         note=look.note,
@@ -175,17 +176,17 @@ def vertex_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list
     said = []
     for look in looks:
         near = _near(look, pieces)
-        missed = np.flatnonzero(near > pieces.vertex_budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING)
+        missed = np.flatnonzero(near > pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING)
         for i in missed[:FAULTS_OF_A_KIND]:
-            what = "end of the block" if pieces.real[i] else "a point of the arc"
+            what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
             where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, pieces.vertex[i], strict=True))
-            budget = pieces.vertex_budget[i]
+            budget = pieces.joint["budget"][i]
             said.append(
                 f"vertex: {what} of line {_line(toolpath, pieces, i - 1)} at {where}: "
                 + look.noted(
                     f"missed by {near[i]:.7g} mm, {near[i] / budget:.6g} of the budget {budget:.6g} mm"
                 )
-                + f", t = {look.seen.match.near_time[i]:.6g} s"
+                + f", t = {look.seen.match.passed['near_time'][i]:.6g} s"
             )
         if len(missed) > FAULTS_OF_A_KIND:
             said.append(f"vertex: {len(missed)} vertices missed in all")
@@ -210,51 +211,57 @@ def end_error(looks: list[Look], toolpath: Toolpath) -> tuple[float, list[str]]:
 
 def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array, bool, list[str]]:
     """Segments that are never visited, whether the rest is run in order, and what is wrong with it."""
-    lost = np.zeros(len(pieces.segment), dtype=np.bool_)
+    lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
     in_order, said = True, []
     for look in looks:
         match = look.seen.match
-        end_reached = match.near[-1] <= pieces.vertex_budget[-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
-        left_out = match.lost.copy()
-        left_out[match.window[1] + 1 :] = True
+        end_reached = (
+            match.passed["near"][-1] <= pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+        )
+        left_out = match.track["lost"].copy()
+        left_out[match.count[LAST] + 1 :] = True
         left_out[-1] |= not end_reached
         lost |= left_out
-        here = np.unique(pieces.segment[left_out])
+        here = np.unique(pieces.piece["segment"][left_out])
         if len(here):
             lines = list(dict.fromkeys(toolpath.line[here].tolist()))
             shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + (
                 " ..." if len(lines) > FAULTS_OF_A_KIND else ""
             )
             said.append("order: " + look.noted(f"{len(here)} blocks are not run to their end, line {shown}"))
-        if match.window[5]:
+        if match.count[HELD]:
             said.append(
-                "order: " + look.noted(f"{match.window[5]} samples far from where the program should be")
+                "order: " + look.noted(f"{match.count[HELD]} samples far from where the program should be")
             )
-        in_order = in_order and not match.window[3] and not match.window[5] and not len(here)
-    return np.unique(pieces.segment[lost]), in_order, said
+        in_order = in_order and not match.count[JUMPS] and not match.count[HELD] and not len(here)
+    return np.unique(pieces.piece["segment"][lost]), in_order, said
 
 
 def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[str]:
     """Full stops that are run through, and dwells cut short."""
-    joint = np.flatnonzero(pieces.real)
+    joint = np.flatnonzero(pieces.joint["real"])
     said = []
     for look in looks:
         match = look.seen.match
-        stop_ratio = match.stop_ratio[joint]
+        stop_ratio = match.passed["stop_ratio"][joint]
         visited = np.isfinite(stop_ratio)  # the others belong to blocks that are not run, which `order` names
-        through = np.flatnonzero(pieces.stop[joint] & visited & (stop_ratio > 1.0 + RATIO_ROUNDING))
+        through = np.flatnonzero(
+            (pieces.joint["stop"][joint] == 1) & visited & (stop_ratio > 1.0 + RATIO_ROUNDING)
+        )
         resolution = 2.0 * look.seen.gap_max  # the periods in which a standstill begins and ends are not seen
         # n periods are summed with one rounding each
-        short = toolpath.dwell - match.rest[joint] - resolution > RATIO_ROUNDING * (
+        short = toolpath.dwell - match.passed["rest"][joint] - resolution > RATIO_ROUNDING * (
             toolpath.dwell + resolution
         )
         for i in through[:FAULTS_OF_A_KIND]:
             ratio = look.noted(
-                f"{match.stop_ratio[joint[i]]:.6g} of the speed or distance that a sample next to it can have"
+                f"{stop_ratio[i]:.6g} of the speed or distance that a sample next to it can have"
             )
             said.append(f"stop: no full stop at {_joint_name(toolpath, i)}: {ratio}")
         for i in np.flatnonzero(short)[:FAULTS_OF_A_KIND]:
-            seen = look.noted(f"{match.rest[joint[i]]:.6g} s seen, {toolpath.dwell[i]:.6g} s programmed")
+            seen = look.noted(
+                f"{match.passed['rest'][joint[i]]:.6g} s seen, {toolpath.dwell[i]:.6g} s programmed"
+            )
             said.append(f"dwell: too short at {_joint_name(toolpath, i)}: {seen}")
         for what, count in (("stop", len(through)), ("dwell", int(short.sum()))):
             if count > FAULTS_OF_A_KIND:
@@ -264,7 +271,7 @@ def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[s
 
 def _near(look: Look, pieces: Pieces) -> FloatArray:
     """Distance of each vertex from the motion; from the motion's end where it never came that far [mm]."""
-    near = look.seen.match.near.copy()
+    near = look.seen.match.passed["near"].copy()
     unseen = np.isinf(near)
     near[unseen] = np.linalg.norm(pieces.vertex[unseen] - look.seen.last, axis=1)
     return near
@@ -284,4 +291,4 @@ def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
 
 
 def _line(toolpath: Toolpath, pieces: Pieces, piece: int) -> int:
-    return int(toolpath.line[pieces.segment[max(piece, 0)]])
+    return int(toolpath.line[pieces.piece["segment"][max(piece, 0)]])

@@ -44,7 +44,7 @@ FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def scan(
     t: FloatArray,
     position: FloatArray,
@@ -108,7 +108,8 @@ def scan(
                         k,
                         DIFFERENCE,
                     )
-            before[axis], error_before[axis] = difference, error
+            for order in range(3):
+                before[axis, order], error_before[axis, order] = difference[order], error[order]
             if k < skip:
                 continue
             _keep(worst, sample, VELOCITY * axes + axis, abs(velocity[k, axis]), limits[0, axis], k, COLUMN)
@@ -135,7 +136,7 @@ def scan(
             _keep(worst, sample, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
         if k < skip:
             continue
-        feed, normal = _feed_and_normal(velocity[k], acceleration[k], linear)
+        feed, normal = _feed_and_normal(velocity, acceleration, k, linear)
         _keep(worst, sample, alone + FEED, feed, feed_max[k], k, COLUMN)
         _keep(worst, sample, alone + NORMAL, normal, normal_max, k, COLUMN)
         if k > first:
@@ -146,24 +147,26 @@ def scan(
     return travelled
 
 
-@njit(cache=True)
-def _feed_and_normal(velocity: FloatArray, acceleration: FloatArray, linear: Array) -> tuple[float, float]:
+@njit(cache=True, error_model="numpy")
+def _feed_and_normal(
+    velocity: FloatArray, acceleration: FloatArray, k: int, linear: Array
+) -> tuple[float, float]:
     feed_sq, along = 0.0, 0.0
-    for axis in range(len(velocity)):
+    for axis in range(len(linear)):
         if linear[axis]:
-            feed_sq += velocity[axis] ** 2
-            along += velocity[axis] * acceleration[axis]
+            feed_sq += velocity[k, axis] ** 2
+            along += velocity[k, axis] * acceleration[k, axis]
     feed = math.sqrt(feed_sq)
     if feed <= FEED_AT_REST:
         return feed, 0.0
     normal_sq = 0.0
-    for axis in range(len(velocity)):
+    for axis in range(len(linear)):
         if linear[axis]:
-            normal_sq += (acceleration[axis] - along * velocity[axis] / feed_sq) ** 2
+            normal_sq += (acceleration[k, axis] - along * velocity[k, axis] / feed_sq) ** 2
     return feed, math.sqrt(normal_sq)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _keep(worst: FloatArray, sample: Array, row: int, value: float, limit: float, k: int, seen: int) -> None:
     if value > worst[row, 0] * limit:  # false where the limit is inf
         worst[row, 0], worst[row, 1], worst[row, 2], worst[row, 3] = value / limit, value, limit, seen

@@ -42,7 +42,7 @@ from planner.verify.pieces import (
     Pieces,
     distance_from,
     reach,
-    reach_line,
+    reach_chord,
 )
 
 NEAR_MISS = (
@@ -56,52 +56,45 @@ SEARCH_MAX = (
 STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding of coordinates up to 1e6 mm
 
 
+TRACK = np.dtype([("low", "f8"), ("new", "f8"), ("lost", "?")])
+PASSED = np.dtype([("near", "f8"), ("near_time", "f8"), ("rest", "f8"), ("stop_ratio", "f8")])
+FIRST, LAST, JUMPS, SEARCHED, HELD = range(5)  # in Match.count
+BEFORE, WORST_AT = range(2)  # in Match.place
+
+
 class Match(NamedTuple):
     """State of the matching after some samples, and what it has found; all arrays are written in place.
 
-    low, new    (N,) lowest possible fraction of each piece, now and next
-    near        (N+1,) smallest distance of each vertex from the motion [mm], near_time when [s]
-    rest        (N+1,) standstill at a vertex where the motion must stop [s]
-    stop_ratio  (N+1,) how well the motion stops there: <= 1 if within what samples can show
-    lost        (N,) pieces left out
-    window      (6,) first and last possible piece; failures; jumps; pieces looked through; samples held
-    last        (A,) the sample before
-    worst       (6,) of the worst sample: ratio, distance [mm], budget [mm], time [s], piece, largest distance [mm]
-    worst_at    (A,) where
+    track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
+    passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to
+             stop: rest = standstill there [s], stop_ratio = how well it stops, <= 1 if within what samples can show
+    count  : (5,) first and last possible piece; jumps over lost pieces; pieces searched; samples held
+    place  : (2, A) the sample before; the worst sample [mm]
+    worst  : (6,) of the worst sample: ratio, distance [mm], budget [mm], time [s], piece; largest distance of any [mm]
     """
 
-    low: FloatArray
-    new: FloatArray
-    near: FloatArray
-    near_time: FloatArray
-    rest: FloatArray
-    stop_ratio: FloatArray
-    lost: Array
-    window: Array
-    last: FloatArray
+    track: Array
+    passed: Array
+    count: Array
+    place: FloatArray
     worst: FloatArray
-    worst_at: FloatArray
 
 
 def new_match(pieces: Pieces) -> Match:
     """The state before the first sample."""
     vertices, axes = pieces.vertex.shape
+    track, passed = np.zeros(vertices - 1, dtype=TRACK), np.zeros(vertices, dtype=PASSED)
+    track["low"] = passed["near"] = passed["stop_ratio"] = np.inf
     return Match(
-        low=np.full(vertices - 1, np.inf),
-        new=np.empty(vertices - 1),
-        near=np.full(vertices, np.inf),
-        near_time=np.zeros(vertices),
-        rest=np.zeros(vertices),
-        stop_ratio=np.full(vertices, np.inf),
-        lost=np.zeros(vertices - 1, dtype=np.bool_),
-        window=np.zeros(6, dtype=np.int64),
-        last=np.empty(axes),
+        track=track,
+        passed=passed,
+        count=np.zeros(5, dtype=np.int64),
+        place=np.zeros((2, axes)),
         worst=np.zeros(6),
-        worst_at=np.zeros(axes),
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def follow(
     pieces: Pieces,
     match: Match,
@@ -120,216 +113,199 @@ def follow(
     piece, feed_max  : (n,) written: the piece each sample lies on, and the largest feed of those it can lie on [mm/s]
     """
     n, axes = position.shape
-    point = np.empty(axes)
+    before, point = match.place[BEFORE], np.empty(axes)
     parts = 2 if middles else 1
     for k in range(skip, n):
         if k == 0:
-            match.last[:] = position[0]
-            match.low[0] = 0.0
-            match.near[0] = _distance(position[0], pieces.vertex[0])
-            match.near_time[0] = t[0]
-            piece[0], feed_max[0] = _step(pieces, match, position[0], t[0])
-            continue
-        period = t[k] - t[k - 1]
-        for part in range(1, parts + 1):
-            weight = part / parts
+            match.track[0].low = 0.0
             for axis in range(axes):
-                point[axis] = position[k - 1, axis] + weight * (position[k, axis] - position[k - 1, axis])
-            if part == parts:
-                point[:] = position[k]
-            first = match.window[0]
-            piece[k], feed_max[k] = _step(pieces, match, point, t[k - 1] + weight * period)
-            for i in range(first, match.window[1] + 2):
-                if pieces.stop[i]:
-                    _watch_stop(pieces, match, i, point, period, parts, acceleration_max)
-            match.last[:] = point
+                before[axis] = point[axis] = position[0, axis]
+            _, _, apart = reach_chord(before, point, pieces, 0, 0.0)
+            match.passed[0].near, match.passed[0].near_time = apart, t[0]
+        period = t[k] - t[k - 1] if k else 0.0
+        for part in range(1, parts + 1):
+            rest = (parts - part) / parts
+            for axis in range(axes):
+                back = position[k, axis] - position[k - 1, axis] if k else 0.0
+                point[axis] = position[k, axis] - rest * back
+            first = match.count[FIRST]
+            piece[k], feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
+            for i in range(first, match.count[LAST] + 2):
+                if k and pieces.joint[i].stop:
+                    _watch_stop(pieces, match, i, before, point, period, parts, acceleration_max)
+            for axis in range(axes):
+                before[axis] = point[axis]
 
 
-@njit(cache=True)
-def _step(pieces: Pieces, match: Match, point: FloatArray, time: float) -> tuple[int, float]:
-    """Go on to `point`; return the piece it lies on and the largest feed of those it can lie on."""
-    first, last, distance, i, feed = _column(pieces, match, point, time, 1.0, 1.0, False)
-    if first > last:
-        return _recover(pieces, match, point, time)
-    _commit(match, first, last)
-    _note(pieces, match, point, time, distance, i)
+@njit(cache=True, error_model="numpy")
+def _step(
+    pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
+) -> tuple[int, float]:
+    """Go on from `before` to `point`; return the piece it lies on and the largest feed of those it can lie on.
+
+    Where nothing within the budget is possible, go on as the module's text says.
+    """
+    little, enough = 1.0, NEAR_MISS  # the bisection of the widened budget
+    widen, widen_vertex = 1.0, 1.0
+    for attempt in range(BISECTIONS + 4):
+        late = attempt > 0
+        first, last, distance, i, feed = _column(
+            pieces, match, before, point, time, widen, widen_vertex, late
+        )
+        if attempt <= 1:  # 0: as it should be, 1: a vertex missed by little
+            if first <= last:
+                break
+            widen, widen_vertex = (1.0, NEAR_MISS) if attempt == 0 else (NEAR_MISS, NEAR_MISS)
+            continue
+        if attempt == BISECTIONS + 3 or (attempt == 2 and first > last):
+            break
+        enough, little = (widen, little) if first <= last else (enough, widen)
+        widen = 0.5 * (enough + little) if attempt < BISECTIONS + 2 else enough
+        widen_vertex = widen
+    if first <= last:
+        _commit(match, first, last)
+    else:
+        distance, i, feed = _stray(pieces, match, before, point, time)
+    match.worst[5] = max(match.worst[5], distance)
+    budget = pieces.piece[i].budget
+    if distance > match.worst[0] * budget:
+        match.worst[0], match.worst[1], match.worst[2] = distance / budget, distance, budget
+        match.worst[3], match.worst[4] = time, i
+        for axis in range(len(point)):
+            match.place[WORST_AT, axis] = point[axis]
     return i, feed
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _column(
     pieces: Pieces,
     match: Match,
+    before: FloatArray,
     point: FloatArray,
     time: float,
     widen: float,
     widen_vertex: float,
     late: bool,
 ) -> tuple[int, int, float, int, float]:
-    """Which pieces `point` can lie on, into match.new. The one step of the sweep.
+    """Which pieces `point` can lie on, into match.track.new. The one step of the sweep.
 
     widen, widen_vertex : factors on the budgets of samples and vertices
     late                : a vertex counts as passed if any earlier chord came near enough
 
     -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed
     """
-    pieces_count = len(match.low)
-    i, last_before = match.window[0], match.window[1]
+    track, passed = match.track, match.passed
+    i, last_before = match.count[FIRST], match.count[LAST]
     entry = np.inf  # where on the chord vertex i was passed
-    first, last, nearest, best, feed = pieces_count, -1, np.inf, i, 0.0
-    while i < pieces_count:
-        before = match.low[i] if i <= last_before else np.inf
-        possible = before < np.inf or entry < np.inf
+    first, last, nearest, best, feed = len(track), -1, np.inf, i, 0.0
+    while i < len(track):
+        low_before = track[i].low if i <= last_before else np.inf
+        possible = low_before < np.inf or entry < np.inf
         if not possible and i > last_before:
             break
-        match.new[i] = np.inf
+        track[i].new = np.inf
         leave = np.inf
         if possible:
-            a, b, distance = reach(pieces, i, point, _allowed(pieces.budget[i] * widen))
-            low = a if entry < np.inf else max(a, before)
+            a, b, distance = reach(pieces, i, point, _allowed(pieces.piece[i].budget * widen))
+            low = a if entry < np.inf else max(a, low_before)
             if low <= b:
-                match.new[i] = low
+                track[i].new = low
                 first, last = min(first, i), i
-                feed = max(feed, pieces.feed[i])
+                feed = max(feed, pieces.piece[i].feed)
                 if distance < nearest:
                     nearest, best = distance, i
-            allowed = _allowed(pieces.vertex_budget[i + 1] * widen_vertex)
-            c, d, apart = reach_line(match.last, point, pieces.vertex[i + 1], allowed)
-            if apart < match.near[i + 1]:
-                match.near[i + 1], match.near_time[i + 1] = apart, time
-            earliest = 0.0 if before < np.inf else entry
+            allowed = _allowed(pieces.joint[i + 1].budget * widen_vertex)
+            c, d, apart = reach_chord(before, point, pieces, i + 1, allowed)
+            if apart < passed[i + 1].near:
+                passed[i + 1].near, passed[i + 1].near_time = apart, time
+            earliest = 0.0 if low_before < np.inf else entry
             if max(c, earliest) <= d:
                 leave = max(c, earliest)
-            elif late and match.near[i + 1] <= allowed:
+            elif late and passed[i + 1].near <= allowed:
                 leave = earliest
         entry = leave
         i += 1
     return first, last, nearest, best, feed
 
 
-@njit(cache=True)
-def _recover(pieces: Pieces, match: Match, point: FloatArray, time: float) -> tuple[int, float]:
-    """Go on where nothing within the budget is possible (the module's text says how); as `_step`."""
-    match.window[2] += 1
-    first, last, distance, i, feed = _column(pieces, match, point, time, 1.0, NEAR_MISS, True)
-    if first > last:
-        first, last, distance, i, feed = _column(pieces, match, point, time, NEAR_MISS, NEAR_MISS, True)
-        if first <= last:
-            enough, little = NEAR_MISS, 1.0
-            for _ in range(BISECTIONS):
-                widen = 0.5 * (enough + little)
-                first, last, distance, i, feed = _column(pieces, match, point, time, widen, widen, True)
-                if first <= last:
-                    enough = widen
-                else:
-                    little = widen
-            first, last, distance, i, feed = _column(pieces, match, point, time, enough, enough, True)
-    if first <= last:
-        _commit(match, first, last)
-        _note(pieces, match, point, time, distance, i)
-        return i, feed
+@njit(cache=True, error_model="numpy")
+def _stray(
+    pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
+) -> tuple[float, int, float]:
+    """Far from where the program should be: take the first piece ahead that fits, or hold the place on the path.
 
-    end = match.window[1]
-    ahead = _first_ahead(pieces, match, point)
-    if ahead >= 0:
-        match.window[3] += 1
-        for j in range(end + 1, ahead + 1):
-            _, _, apart = reach_line(match.last, point, pieces.vertex[j], 0.0)
-            if apart < match.near[j]:
-                match.near[j], match.near_time[j] = apart, time
-            if j < ahead:
-                match.lost[j] = True
-        match.new[ahead] = 0.0
+    -> distance [mm], piece, feed [mm/s]
+    """
+    track, passed, count = match.track, match.passed, match.count
+    begin = count[LAST] + 1
+    for ahead in range(begin, min(begin + PIECES_AHEAD, len(track))):
+        if count[SEARCHED] >= SEARCH_MAX:
+            break
+        count[SEARCHED] += 1
+        a, b, distance = reach(pieces, ahead, point, _allowed(pieces.piece[ahead].budget))
+        if a > b:
+            continue
+        count[JUMPS] += 1
+        for j in range(begin, ahead + 1):
+            _, _, apart = reach_chord(before, point, pieces, j, 0.0)
+            if apart < passed[j].near:
+                passed[j].near, passed[j].near_time = apart, time
+            track[j].lost = j < ahead
+        track[ahead].new = 0.0
         _commit(match, ahead, ahead)
-        _, _, distance = reach(pieces, ahead, point, 0.0)
-        _note(pieces, match, point, time, distance, ahead)
-        return ahead, pieces.feed[ahead]
+        return distance, ahead, pieces.piece[ahead].feed
 
-    match.window[5] += 1
-    nearest, best, feed = np.inf, match.window[0], 0.0
-    for j in range(match.window[0], end + 1):
-        if match.low[j] < np.inf:
-            distance = distance_from(pieces, j, match.low[j], point)
-            feed = max(feed, pieces.feed[j])
+    count[HELD] += 1
+    nearest, best, feed = np.inf, count[FIRST], 0.0
+    for i in range(count[FIRST], begin):
+        if track[i].low < np.inf:
+            distance = distance_from(pieces, i, track[i].low, point)
+            feed = max(feed, pieces.piece[i].feed)
             if distance < nearest:
-                nearest, best = distance, j
-    _note(pieces, match, point, time, nearest, best)
-    return best, feed
+                nearest, best = distance, i
+    return nearest, best, feed
 
 
-@njit(cache=True)
-def _first_ahead(pieces: Pieces, match: Match, point: FloatArray) -> int:
-    """The first piece after the window within the budget of `point`, or -1."""
-    begin = match.window[1] + 1
-    end = min(begin + PIECES_AHEAD, len(match.low))
-    for j in range(begin, end):
-        if match.window[4] >= SEARCH_MAX:
-            return -1
-        match.window[4] += 1
-        a, b, _ = reach(pieces, j, point, _allowed(pieces.budget[j]))
-        if a <= b:
-            return j
-    return -1
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _commit(match: Match, first: int, last: int) -> None:
-    for i in range(match.window[0], match.window[1] + 1):
-        match.low[i] = np.inf
-    match.low[first : last + 1] = match.new[first : last + 1]
-    match.window[0], match.window[1] = first, last
+    """Make the possible pieces `first` to `last` of match.track.new the present ones."""
+    for i in range(match.count[FIRST], match.count[LAST] + 1):
+        match.track[i].low = np.inf
+    for i in range(first, last + 1):
+        match.track[i].low = match.track[i].new
+    match.count[FIRST], match.count[LAST] = first, last
 
 
-@njit(cache=True)
-def _note(pieces: Pieces, match: Match, point: FloatArray, time: float, distance: float, i: int) -> None:
-    match.worst[5] = max(match.worst[5], distance)
-    if distance > match.worst[0] * pieces.budget[i]:
-        match.worst[0], match.worst[1], match.worst[2] = (
-            distance / pieces.budget[i],
-            distance,
-            pieces.budget[i],
-        )
-        match.worst[3], match.worst[4] = time, i
-        match.worst_at[:] = point
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _watch_stop(
     pieces: Pieces,
     match: Match,
     i: int,
+    before: FloatArray,
     point: FloatArray,
     period: float,
     parts: int,
     acceleration_max: FloatArray,
 ) -> None:
-    """What the chord to `point` shows of the stop at vertex i.
+    """What the chord from `before` to `point`, one of `parts` of a period, shows of the stop at vertex i.
 
     If the motion rests at the vertex at some time within a period h, then with |acceleration| <= a its chord over the period
     is at most a h^2 / 2 long, and the nearer end of the period is at most a (h/2)^2 / 2 away. Per axis, each.
     """
     slow, away_sq, still = 0.0, 0.0, True
     for axis in range(len(point)):
-        move = abs(point[axis] - match.last[axis])
+        move = abs(point[axis] - before[axis])
         bow = acceleration_max[axis] * period * period / 8.0
         slow = max(slow, max(move * parts - STILL, 0.0) / (4.0 * bow))
         away_sq += bow * bow
         still = still and move <= STILL
     away = math.sqrt(away_sq) + PLACE_ROUNDING
-    _, _, apart = reach_line(match.last, point, pieces.vertex[i], 0.0)
-    match.stop_ratio[i] = min(match.stop_ratio[i], max(slow, apart / away))
+    _, _, apart = reach_chord(before, point, pieces, i, 0.0)
+    match.passed[i].stop_ratio = min(match.passed[i].stop_ratio, max(slow, apart / away))
     if still and apart <= away:
-        match.rest[i] += period / parts
+        match.passed[i].rest += period / parts
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _allowed(budget: float) -> float:
     return budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
-
-
-@njit(cache=True)
-def _distance(p: FloatArray, q: FloatArray) -> float:
-    total = 0.0
-    for n in range(len(p)):
-        total += (p[n] - q[n]) ** 2
-    return math.sqrt(total)

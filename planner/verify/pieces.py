@@ -38,30 +38,31 @@ PLACE_ROUNDING = 1e-6  # [mm] what "exactly at the point" means: the least digit
 NEWTON_STEPS = 8  # quadratic from the polar angle; four suffice for a helix whose pitch equals its radius
 
 
-class Pieces(NamedTuple):
-    """N pieces over A axes, the N+1 vertices around them, and the data of the arcs.
+PIECE = np.dtype(
+    [("budget", "f8"), ("feed", "f8"), ("x0", "f8"), ("x1", "f8"), ("arc", "i8"), ("segment", "i8")]
+)
+JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
-    vertex (N+1, A) [mm]; segment (N,) of the toolpath; real (N+1,) True at the program's own joints;
-    budget (N,), vertex_budget (N+1,) [mm]: allowed distance, without rounding; feed (N,) [mm/s];
-    stop (N+1,) full stop; arc (N,) row or -1; x0, x1 (N,) range of the arc's parameter [mm]; the rest as in `Arcs`
+
+class Pieces(NamedTuple):
+    """N pieces over A axes, the N+1 vertices around them, and the K arcs. Few arrays, since each costs at every call.
+
+    vertex : (N+1, A) [mm]
+    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real, if it is a joint of the program
+    piece  : (N,) `PIECE`: budget [mm]; feed [mm/s]; x0, x1 range of the arc's parameter [mm]; arc row or -1; segment
+    frame  : (K, 4, A) center, e1, e2, drift of an arc
+    turn   : (K, 2) radius [mm], rate [rad/mm]
     """
 
     vertex: FloatArray
-    segment: Array
-    real: Array
-    budget: FloatArray
-    vertex_budget: FloatArray
-    feed: FloatArray
-    stop: Array
-    arc: Array
-    x0: FloatArray
-    x1: FloatArray
-    center: FloatArray
-    e1: FloatArray
-    e2: FloatArray
-    drift: FloatArray
-    radius: FloatArray
-    rate: FloatArray
+    joint: Array
+    piece: Array
+    frame: FloatArray
+    turn: FloatArray
+
+
+CENTER, E1, E2, DRIFT = range(4)  # in `frame`
+RADIUS, RATE = range(2)  # in `turn`
 
 
 def pieces_of(toolpath: Toolpath) -> Pieces:
@@ -85,31 +86,20 @@ def pieces_of(toolpath: Toolpath) -> Pieces:
     vertex[on_arc] = _arc_points(toolpath, arc[on_arc], x0[on_arc])
     _check_consistent(toolpath, vertex[first])
     vertex[first] = toolpath.start
-    joint = np.append(first, len(segment))
-    real = np.zeros(len(segment) + 1, dtype=np.bool_)
-    real[joint] = True
-    budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
-    vertex_budget = np.append(budget, 0.0)
-    vertex_budget[joint] = toolpath.tolerance
-    stop = np.zeros(len(real), dtype=np.bool_)
-    stop[joint] = toolpath.joint == Joint.STOP
+    at = np.append(first, len(segment))  # the vertices that are joints of the program
+    piece = np.zeros(len(segment), dtype=PIECE)
+    piece["budget"] = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
+    piece["feed"] = toolpath.feed[segment]
+    piece["x0"], piece["x1"] = x0, x1
+    piece["arc"], piece["segment"] = arc, segment
+    joint = np.zeros(len(vertex), dtype=JOINT)
+    joint["budget"][:-1] = piece["budget"]
+    joint["budget"][at] = toolpath.tolerance
+    joint["real"][at] = True
+    joint["stop"][at] = toolpath.joint == Joint.STOP
+    frame = np.stack([arcs.center, arcs.e1, arcs.e2, arcs.drift], axis=1)
     return Pieces(
-        vertex=vertex,
-        segment=segment,
-        real=real,
-        budget=budget,
-        vertex_budget=vertex_budget,
-        feed=toolpath.feed[segment],
-        stop=stop,
-        arc=np.ascontiguousarray(arc),
-        x0=x0,
-        x1=x1,
-        center=arcs.center.copy(),
-        e1=arcs.e1.copy(),
-        e2=arcs.e2.copy(),
-        drift=arcs.drift.copy(),
-        radius=arcs.radius.copy(),
-        rate=arcs.rate.copy(),
+        vertex=vertex, joint=joint, piece=piece, frame=frame, turn=np.stack([arcs.radius, arcs.rate], axis=1)
     )
 
 
@@ -139,62 +129,74 @@ def _check_consistent(toolpath: Toolpath, computed_start: FloatArray) -> None:
             )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def reach(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
     """Which part of piece i lies within `radius` of the point q (A,).
 
     -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
     Exact on lines; on arcs the distance is, and a and b are to second order about the nearest point.
     """
-    if pieces.arc[i] >= 0:
+    if pieces.piece[i].arc >= 0:
         return _reach_arc(pieces, i, q, radius)
-    return reach_line(pieces.vertex[i], pieces.vertex[i + 1], q, radius)
-
-
-@njit(cache=True)
-def reach_line(
-    start: FloatArray, end: FloatArray, q: FloatArray, radius: float
-) -> tuple[float, float, float]:
-    """`reach` on the straight piece from `start` to `end`, which may be a point."""
+    vertex = pieces.vertex
     along, length_sq = 0.0, 0.0
     for n in range(len(q)):
-        u = end[n] - start[n]
-        along += (q[n] - start[n]) * u
+        u, w = vertex[i + 1, n] - vertex[i, n], q[n] - vertex[i, n]
+        along += w * u
         length_sq += u * u
     x = along / length_sq if length_sq > 0.0 else 0.0
-    off_sq = 0.0  # square of the distance from the unbounded line
+    off_sq = 0.0
     for n in range(len(q)):
-        off = q[n] - start[n] - x * (end[n] - start[n])
-        off_sq += off * off
-    beyond = x - min(max(x, 0.0), 1.0)
-    distance = math.sqrt(off_sq + beyond * beyond * length_sq)
+        off_sq += (q[n] - vertex[i, n] - x * (vertex[i + 1, n] - vertex[i, n])) ** 2
+    return _within(x, off_sq, length_sq, radius)
+
+
+@njit(cache=True, error_model="numpy")
+def reach_chord(
+    begin: FloatArray, end: FloatArray, pieces: Pieces, i: int, radius: float
+) -> tuple[float, float, float]:
+    """Which part of the chord from `begin` to `end` (A,), which may be a point, lies within `radius` of vertex i; as `reach`."""
+    vertex = pieces.vertex
+    along, length_sq = 0.0, 0.0
+    for n in range(len(begin)):
+        u, w = end[n] - begin[n], vertex[i, n] - begin[n]
+        along += w * u
+        length_sq += u * u
+    x = along / length_sq if length_sq > 0.0 else 0.0
+    off_sq = 0.0
+    for n in range(len(begin)):
+        off_sq += (vertex[i, n] - begin[n] - x * (end[n] - begin[n])) ** 2
+    return _within(x, off_sq, length_sq, radius)
+
+
+@njit(cache=True, error_model="numpy")
+def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[float, float, float]:
+    """The part of a segment within `radius` of a point whose foot on its line is at the fraction x, off_sq away (squared)."""
+    nearest = min(max(x, 0.0), 1.0)
+    distance = math.sqrt(off_sq + (x - nearest) ** 2 * length_sq)
     if distance > radius:
         return 1.0, 0.0, distance
     if length_sq == 0.0:
         return 0.0, 1.0, distance
     half = math.sqrt(max(radius * radius - off_sq, 0.0) / length_sq)
     # the nearest point belongs to the part whatever the rounding of `half`
-    nearest = x - beyond
     return min(max(x - half, 0.0), nearest), max(min(x + half, 1.0), nearest), distance
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def distance_from(pieces: Pieces, i: int, low: float, q: FloatArray) -> float:
     """Distance [mm] of q (A,) from the part of piece i that begins at the fraction `low`."""
     _, _, distance = reach(pieces, i, q, 0.0)
     apart_sq, ahead = 0.0, 0.0
-    k = pieces.arc[i]
-    x = pieces.x0[i] + low * (pieces.x1[i] - pieces.x0[i])
+    piece = pieces.piece[i]
+    k, x, c, s = piece.arc, piece.x0 + low * (piece.x1 - piece.x0), 1.0, 0.0
+    if k >= 0:
+        c, s = math.cos(pieces.turn[k, RATE] * x), math.sin(pieces.turn[k, RATE] * x)
     for n in range(len(q)):
         if k >= 0:
-            c, s, turn = (
-                math.cos(pieces.rate[k] * x),
-                math.sin(pieces.rate[k] * x),
-                pieces.radius[k] * pieces.rate[k],
-            )
-            e1, e2, drift = pieces.e1[k, n], pieces.e2[k, n], pieces.drift[k, n]
-            place = pieces.center[k, n] + pieces.radius[k] * (c * e1 + s * e2) + drift * x
-            tangent = turn * (c * e2 - s * e1) + drift
+            e1, e2, drift = pieces.frame[k, E1, n], pieces.frame[k, E2, n], pieces.frame[k, DRIFT, n]
+            place = pieces.frame[k, CENTER, n] + pieces.turn[k, RADIUS] * (c * e1 + s * e2) + drift * x
+            tangent = pieces.turn[k, RADIUS] * pieces.turn[k, RATE] * (c * e2 - s * e1) + drift
         else:
             tangent = pieces.vertex[i + 1, n] - pieces.vertex[i, n]
             place = pieces.vertex[i, n] + low * tangent
@@ -203,20 +205,19 @@ def distance_from(pieces: Pieces, i: int, low: float, q: FloatArray) -> float:
     return math.sqrt(apart_sq) if ahead > 0.0 else distance  # q lies behind: the part's beginning is nearest
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _reach_arc(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
-    k = pieces.arc[i]
-    center, e1, e2, drift = pieces.center[k], pieces.e1[k], pieces.e2[k], pieces.drift[k]
-    big, rate, x0, x1 = pieces.radius[k], pieces.rate[k], pieces.x0[i], pieces.x1[i]
+    k, x0, x1 = pieces.piece[i].arc, pieces.piece[i].x0, pieces.piece[i].x1
+    big, rate, frame = pieces.turn[k, RADIUS], pieces.turn[k, RATE], pieces.frame
     w1, w2, wd, d1, d2, dd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(len(q)):
-        w = q[n] - center[n]
-        w1 += w * e1[n]
-        w2 += w * e2[n]
-        wd += w * drift[n]
-        d1 += e1[n] * drift[n]
-        d2 += e2[n] * drift[n]
-        dd += drift[n] * drift[n]
+        w, e1, e2, drift = q[n] - frame[k, CENTER, n], frame[k, E1, n], frame[k, E2, n], frame[k, DRIFT, n]
+        w1 += w * e1
+        w2 += w * e2
+        wd += w * drift
+        d1 += e1 * drift
+        d2 += e2 * drift
+        dd += drift * drift
 
     middle = 0.5 * (x0 + x1)
     angle = math.atan2(w2 - d2 * middle, w1 - d1 * middle) - rate * middle
@@ -240,11 +241,12 @@ def _reach_arc(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[fl
     c, s = math.cos(rate * x), math.sin(rate * x)
     distance_sq, g, slope = 0.0, 0.0, 0.0
     for n in range(len(q)):
-        off = center[n] + big * (c * e1[n] + s * e2[n]) + drift[n] * x - q[n]
-        d = big * rate * (c * e2[n] - s * e1[n]) + drift[n]
+        e1, e2, drift = frame[k, E1, n], frame[k, E2, n], frame[k, DRIFT, n]
+        off = frame[k, CENTER, n] + big * (c * e1 + s * e2) + drift * x - q[n]
+        d = big * rate * (c * e2 - s * e1) + drift
         distance_sq += off * off
         g += off * d
-        slope += d * d - off * big * rate * rate * (c * e1[n] + s * e2[n])
+        slope += d * d - off * big * rate * rate * (c * e1 + s * e2)
     distance = math.sqrt(distance_sq)
     if distance > radius:
         return 1.0, 0.0, distance

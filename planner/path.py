@@ -46,7 +46,7 @@ MARGIN_SAFETY = 1.25
 HALVINGS_MAX = 20
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
 ARC_STEP = np.pi / 8
-# Free parts of legs shorter than this share of the leg are nothing but the rounding of d_i + d_{i+1} = L [-].
+# Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
 FREE_PART_MIN = 1e-9
 
 
@@ -125,7 +125,8 @@ def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTI
         table.corners,
         path.legs.first,
         path.legs.offset,
-        path.d,
+        path.d_in,
+        path.d_out,
         path.joint == Joint.STOP,
         _corner_breaks(path),
         path.toolpath.feed,
@@ -324,7 +325,9 @@ def _grown(array, needed):
 
 
 @njit(cache=True, error_model="numpy")
-def _grid(legs, corners, first, offset, d, is_stop, breaks, feed, velocity, acceleration, resolution):
+def _grid(
+    legs, corners, first, offset, d_in, d_out, is_stop, breaks, feed, velocity, acceleration, resolution
+):
     """Intervals of the whole path in order; a closing row (w0 = w1) where a piece ends.
 
     Returns element, w0, w1, segment (P,) and `last` (P,), True on closing rows.
@@ -345,30 +348,30 @@ def _grid(legs, corners, first, offset, d, is_stop, breaks, feed, velocity, acce
         for half in range(3):  # 0: free part, 1: corner before its apex, 2: after it
             k = leg + 1
             if half == 0:
-                if length - d[leg] - d[k] <= FREE_PART_MIN * length:
+                if length - d_out[leg] - d_in[k] <= FREE_PART_MIN * length:
                     continue
-            elif d[k] <= 0.0:
+            elif d_in[k] <= 0.0:
                 continue
             owner = k if half == 2 else leg
             for seg in range(first[owner], first[owner + 1]):
                 begin = offset[seg]
                 end = offset[seg + 1] if seg + 1 < first[owner + 1] else legs[owner].length
                 if half == 0:
-                    wa, wb = max(begin, d[leg]), min(end, length - d[k])
+                    wa, wb = max(begin, d_out[leg]), min(end, length - d_in[k])
                     if wb - wa <= FREE_PART_MIN * length:
                         continue
                     curve = leg
                 elif half == 1:
-                    if end <= length - d[k]:
+                    if end <= length - d_in[k]:
                         continue
-                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d[k] else 0.0
+                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d_in[k] else 0.0
                     wb = _corner_parameter(corners, k, end - length) if seg + 1 < first[owner + 1] else 0.5
                     curve = ~k
                 else:
-                    if begin >= d[k]:
+                    if begin >= d_out[k]:
                         break
                     wa = _corner_parameter(corners, k, begin) if seg > first[owner] else 0.5
-                    wb = _corner_parameter(corners, k, end) if end < d[k] else 1.0
+                    wb = _corner_parameter(corners, k, end) if end < d_out[k] else 1.0
                     curve = ~k
                 parts = 1
                 if half == 0 and curved:

@@ -29,12 +29,15 @@ from planner.feedrate.solution import FeedrateSolution, interval_times
 from planner.path import PathSamples
 from planner.trajectory import Trajectory
 
-# Arc length is inverted to this share of the interval [-]: 1e-11 mm on 0.1 mm, below the rounding of coordinates.
-LENGTH_ROUNDING = 1e-10
+# Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of coordinates, so that
+# accelerations by differences of nearby positions are as good as the columns.
+LENGTH_ROUNDING = 1e-13
 # Steps on s(w) at most; one is the rule where the interpolated inverse is not good enough by itself.
 REFINE_STEPS = 12
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
-CUBE_ROOT_ROUNDING = 4e-4
+CUBE_ROOT_ROUNDING = 4e-5
+# Distance of the outer samples of a piece of the law from its ends [share of the piece].
+DENSE_EDGE = 0.05
 # Samples per chunk of a finely sampled motion: 20 MB with three axes.
 CHUNK = 100_000
 
@@ -129,19 +132,19 @@ def sample_motion(motion: Motion, dt: float) -> Trajectory:
     return _trajectory(motion, _sample_times(motion.law.end, dt), dt)
 
 
-def dense_motion(motion: Motion) -> Iterator[Trajectory]:
-    """The motion between the samples: just after the start of every piece of the law, in its middle, just before its end.
+def dense_motion(motion: Motion, dt: float) -> Iterator[Trajectory]:
+    """The motion between its samples at dt [s]: half-way between them, and near both ends and in the middle of every piece of
+    the law, in chunks.
 
-    In chunks. On a piece all speeds and accelerations are smooth and nearly linear, so that their extremes show there.
+    On a piece all speeds and accelerations are smooth and nearly linear, so that their extremes show there.
     """
     edges = np.append(motion.law.t, motion.law.end)
     begin, end = edges[:-1], edges[1:]
-    inside = np.stack([0.999 * begin + 0.001 * end, 0.5 * (begin + end), 0.001 * begin + 0.999 * end], axis=1)
-    times = np.concatenate([[0.0], inside.ravel(), [motion.law.end]])
-    times = np.unique(np.maximum.accumulate(times))  # pieces of no duration leave equal times
-    longest = float(np.diff(times).max())
+    inside = [near * begin + (1.0 - near) * end for near in (1.0 - DENSE_EDGE, 0.5, DENSE_EDGE)]
+    halves = np.arange(0.5 * dt, motion.law.end, dt)
+    times = np.unique(np.concatenate([[0.0], *inside, halves, [motion.law.end]]))
     for first in range(0, len(times), CHUNK):
-        yield _trajectory(motion, times[first : first + CHUNK + 1], longest)
+        yield _trajectory(motion, times[first : first + CHUNK + 1], dt)
 
 
 def _dwells(samples: PathSamples) -> FloatArray:

@@ -50,8 +50,9 @@ class Shape(IntEnum):
 
 SHAPE_BEZIER = int(Shape.BEZIER)  # numba reads plain integers
 
-# What the kernels know of a corner: its shape and the shape's parameters.
-CORNER_DTYPE = np.dtype([("shape", np.int64), ("params", np.float64, (4,))])
+# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.stretch`). Scaling X
+# and Y is an affine map, which keeps every geometric continuity.
+CORNER_DTYPE = np.dtype([("shape", np.int64), ("params", np.float64, (4,)), ("stretch", np.float64, (2,))])
 
 
 def middle_from_tolerance(tol: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
@@ -136,8 +137,10 @@ def shape_at(corner, w, w_ref):
     """
     p = corner.params
     if corner.shape == SHAPE_BEZIER:
-        return _bezier_shape(p[0], p[1], p[2], w, w_ref)
-    return _fir_shape(p[0], p[1], p[2], p[3], w, w_ref)
+        X, Y = _bezier_shape(p[0], p[1], p[2], w, w_ref)
+    else:
+        X, Y = _fir_shape(p[0], p[1], p[2], p[3], w, w_ref)
+    return _scaled(X, corner.stretch[0], 1.0), _scaled(Y, corner.stretch[1], 1.0)
 
 
 @njit(cache=True, error_model="numpy")

@@ -40,6 +40,11 @@ class CornerShape(Protocol):
     def breaks(self, params: FloatArray) -> tuple[float, ...]: ...
 
 
+# A leg whose free part is shorter than this share of it is closed by stretching one of its corners [-]; grid intervals of the
+# size of rounding would otherwise be left between corners that share a leg.
+CLOSE = 1e-4
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SmoothPath:
     """Legs and corners of a job; R legs, R+1 joints between and around them.
@@ -47,6 +52,7 @@ class SmoothPath:
     joint       : (R+1,) `Joint`: STOP, SMOOTH (tangent, passed as it is) or CORNER (blended)
     d           : (R+1,) tangent length of the corner [mm]; 0 where there is none
     params      : (R+1, 4) parameters of the corner's shape
+    stretch     : (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more (`CLOSE`)
     tol         : (R+1,) contour error budget eps [mm]
     tol_ap      : (R+1,) what the rounding uses of it, E(m) [mm]
     normal_max  : (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
@@ -58,6 +64,7 @@ class SmoothPath:
     joint: Array
     d: FloatArray
     params: FloatArray
+    stretch: FloatArray
     tol: FloatArray
     tol_ap: FloatArray
     normal_max: FloatArray
@@ -66,8 +73,19 @@ class SmoothPath:
         joints = len(self.legs) + 1
         freeze(self, "joint", np.uint8, (joints,))
         freeze(self, "params", np.float64, (joints, 4))
+        freeze(self, "stretch", np.float64, (joints, 2))
         for name in ("d", "tol", "tol_ap", "normal_max"):
             freeze(self, name, np.float64, (joints,))
+
+    @property
+    def d_in(self) -> FloatArray:
+        """(R+1,) tangent length before each vertex [mm]."""
+        return self.d * self.stretch[:, 0]
+
+    @property
+    def d_out(self) -> FloatArray:
+        """(R+1,) tangent length after each vertex [mm]."""
+        return self.d * self.stretch[:, 1]
 
     @property
     def theta(self) -> FloatArray:
@@ -106,12 +124,14 @@ def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> 
     with np.errstate(divide="ignore"):
         wanted = np.minimum(wanted, np.maximum(BEND_MAX - theta, 0.0) / bend)
     ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half, 1e-12)
-    d = share_legs(wanted, np.maximum(ease, 1e-12), legs.length)
+    d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), legs.length)
+    stretch = _close_legs(d, legs.length)
 
     params = np.zeros((len(at), 4))
     params[blend] = corner.params(d[blend], feed[blend])
     tol_ap = np.zeros(len(at))
-    tol_ap[blend] = error_from_middle(corner.middle(d, feed)[blend], sin_half[blend], curvature[blend])
+    middle = corner.middle(d, feed)[blend] * stretch[blend].max(axis=1)
+    tol_ap[blend] = error_from_middle(middle, sin_half[blend], curvature[blend])
     return SmoothPath(
         toolpath=toolpath,
         legs=legs,
@@ -119,10 +139,23 @@ def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> 
         joint=joint,
         d=d,
         params=params,
+        stretch=stretch,
         tol=tol,
         tol_ap=tol_ap,
         normal_max=normal_acceleration_max(tol, tol_ap, reachable, rate),
     )
+
+
+def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
+    """(R+1, 2) stretches that close legs with next to nothing between their corners; the larger corner takes it."""
+    stretch = np.ones((len(d), 2))
+    free = length - d[:-1] - d[1:]
+    leg = np.flatnonzero(free < CLOSE * length)
+    before = d[leg] >= d[leg + 1]
+    left, right = leg[before], leg[~before]
+    stretch[left, 1] = 1.0 + free[left] / d[left]
+    stretch[right + 1, 0] = 1.0 + free[right] / d[right + 1]
+    return stretch
 
 
 def _neighbours(at: Array, segments: int) -> tuple[Array, Array]:

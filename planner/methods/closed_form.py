@@ -69,8 +69,8 @@ def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: Feedr
     return CornerTable(
         line=path.toolpath.line[path.legs.first[joint] - 1],
         theta=path.theta[joint],
-        d_in=path.d[joint],
-        d_out=path.d[joint],
+        d_in=path.d_in[joint],
+        d_out=path.d_out[joint],
         tol_ap=path.tol_ap[joint],
         kappa_max=kappa,
         feed_closed_form=np.sqrt(path.normal_max[joint] / kappa),

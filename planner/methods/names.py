@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Protocol
 
 from planner.errors import InputError
 from planner.machine import Machine, load_machine
 from planner.methods.plan import Plan
-from planner.methods.stages import Progress
+from planner.methods.stages import Progress, Stages
 from planner.methods.stop import StopMethod
 from planner.methods.toppra import SOLVERS, ToppraMethod
 from planner.nc.program import Program
@@ -58,11 +59,13 @@ def plan(
     chosen = _method(method, corner, solver) if isinstance(method, str) else method
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
-    if not isinstance(program, Program):
-        if progress is not None:
-            progress("read", 0.0)
+    if isinstance(program, Program):
+        return chosen.plan(program, machine, tolerance, progress)
+    reading = Stages(progress)
+    with reading.stage("read"):
         program = read_program(program, machine)
-    return chosen.plan(program, machine, tolerance, progress)
+    made = chosen.plan(program, machine, tolerance, progress)
+    return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 
 def _method(name: str, corner: str, solver: str) -> Method:

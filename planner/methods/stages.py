@@ -52,7 +52,7 @@ def deliver(
             trajectory,
             toolpath,
             machine,
-            dense=dense_motion(motion),
+            dense=dense_motion(motion, machine.dt),
             not_limited=not_limited,
             progress=progress,
         )

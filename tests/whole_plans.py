@@ -98,6 +98,7 @@ def evaluate_corner(
     params: FloatArray,
     w: FloatArray,
     side: FloatArray | None = None,
+    stretch: tuple[float, float] = (1.0, 1.0),
 ) -> Corner:
     """Evaluate a corner of given shape parameters (4,) at the joint between legs joint-1 and joint.
 
@@ -106,6 +107,7 @@ def evaluate_corner(
     legs = legs_of(toolpath).table
     corners = np.zeros(len(legs) + 1, CORNER_DTYPE)
     corners["shape"], corners["params"][joint] = int(shape.shape), params
+    corners["stretch"][joint] = stretch
     axes = len(toolpath.axes)
     by_w, by_s = np.empty((len(w), 4, axes)), np.empty((len(w), 4, axes))
     one, two = np.empty((4, axes)), np.empty((4, axes))

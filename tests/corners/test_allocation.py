@@ -110,9 +110,10 @@ def test_paper_002s_five_points(sigma2, gain):
     table = corner_table(solved.samples, solved.problem, solved.solution)
     np.testing.assert_allclose(np.rad2deg(table.theta), [48.53, 73.70, 58.01], atol=0.005)
     np.testing.assert_allclose(table.d_in, [0.292, 0.200, 0.2475], atol=1e-4)
-    np.testing.assert_allclose(table.tol_ap, 0.03, rtol=1e-9)
+    np.testing.assert_allclose(table.tol_ap, 0.03, rtol=3e-4)
+    assert (table.tol_ap <= 0.03 * (1 + 1e-12)).all()
     np.testing.assert_allclose(table.kappa_max, np.array([4.515, 12.48, 6.83]) * sigma2, rtol=1e-3)
-    np.testing.assert_allclose(table.feed_closed_form, np.array(POLYNOMIAL_SPEEDS) * gain, rtol=2e-4)
+    np.testing.assert_allclose(table.feed_closed_form, np.array(POLYNOMIAL_SPEEDS) * gain, rtol=4e-4)
     np.testing.assert_allclose(table.feed_planned, table.feed_closed_form, rtol=1e-3)
     assert table.worst_ratio() <= 1 + 1e-9
 

@@ -131,9 +131,11 @@ def test_the_planned_corner_uses_exactly_its_share_of_the_tolerance(theta_deg):
         ):  # the FIR corner stops growing at a full overlap
             assert path.d[1] < 25.0
         assert met == pytest.approx(path.tol_ap[1], rel=1e-9)
+        share = MACHINE.tolerance - MACHINE.dt**2 / 8 * reachable(theta)
+        assert path.tol_ap[1] <= share * (1 + 1e-12)
         assert path.tol_ap[1] == pytest.approx(
-            MACHINE.tolerance - MACHINE.dt**2 / 8 * reachable(theta), rel=1e-9
-        )
+            share, rel=3e-4
+        )  # a little is kept for closing legs (smooth.CLOSE)
 
 
 def reachable(theta: float) -> float:
@@ -227,11 +229,13 @@ def test_impossible_weights_are_refused(settings_, message):
 # --- the proof of the error bound -----------------------------------------------------------------------------------------
 
 
-def shape_values(shape, params: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+def shape_values(
+    shape, params: FloatArray, w: FloatArray, stretch=(1.0, 1.0)
+) -> tuple[FloatArray, FloatArray]:
     from planner.corners.blend import CORNER_DTYPE
 
     record = np.zeros(1, CORNER_DTYPE)
-    record["shape"], record["params"] = int(shape.shape), params
+    record["shape"], record["params"], record["stretch"] = int(shape.shape), params, stretch
     both = [shape_at(record[0], x, x) for x in w]
     return np.array([b[0][0] for b in both]), np.array([b[1][0] for b in both])
 
@@ -271,13 +275,16 @@ def test_the_product_bound_holds_for_every_accepted_pair():
 
 
 @given(
-    eps=st.floats(1e-6, 1.0), half=st.floats(0.0, np.pi / 2), curvature=st.floats(0.0, 1e3)
+    eps=st.floats(1e-6, 1.0), half=st.floats(1e-9, np.pi / 2), curvature=st.floats(0.0, 1e3)
 )  # fmt: skip
 def test_the_middle_uses_the_whole_tolerance(eps, half, curvature):
     s, k = np.array([np.sin(half)]), np.array([curvature])
     m = middle_from_tolerance(np.array([eps]), s, k)
-    if np.isfinite(m[0]) and m[0] < 1e12:
-        assert error_from_middle(m, s, k)[0] == pytest.approx(eps, rel=1e-9)
+    assert error_from_middle(m, s, k)[0] == pytest.approx(eps, rel=1e-9)
+
+
+def test_what_does_not_bend_may_be_as_long_as_it_likes():
+    assert np.isinf(middle_from_tolerance(np.array([0.1]), np.zeros(1), np.zeros(1))[0])
 
 
 ARC_JOBS = {
@@ -302,8 +309,8 @@ def test_a_corner_on_arcs_stays_within_its_bound_in_order(name, kind):
     legs = element_table(path).legs
     for k in np.flatnonzero(path.joint == Joint.CORNER):
         w = np.linspace(0, 1, 401)
-        found = evaluate_corner(path.toolpath, k, path.corner, path.params[k], w)
-        X, Y = shape_values(path.corner, path.params[k], w)
+        found = evaluate_corner(path.toolpath, k, path.corner, path.params[k], w, stretch=path.stretch[k])
+        X, Y = shape_values(path.corner, path.params[k], w, path.stretch[k])
         along = Y - X
         assert (np.diff(along) >= -1e-12).all()  # the matching runs forward
         programmed = np.empty((len(w), 3))
@@ -315,7 +322,7 @@ def test_a_corner_on_arcs_stays_within_its_bound_in_order(name, kind):
         assert matched.max() <= path.tol_ap[k] * (1 + 1e-9)
         assert frechet(found.by_w[::4, 0], programmed[::4]) <= matched.max() * (1 + 1e-12)
         assert path.tol_ap[k] <= path.tol[k]
-        assert_joins_with_curvature(found, legs, k, path.d[k])
+        assert_joins_with_curvature(found, legs, k, path.d_in[k], path.d_out[k])
 
 
 def frechet(one: FloatArray, other: FloatArray) -> float:
@@ -333,10 +340,10 @@ def frechet(one: FloatArray, other: FloatArray) -> float:
     return float(reach[-1, -1])
 
 
-def assert_joins_with_curvature(found, legs, k: int, d: float) -> None:
+def assert_joins_with_curvature(found, legs, k: int, d_in: float, d_out: float) -> None:
     """At w = 0 and w = 1 the corner has the leg's point, tangent and curvature vector."""
     at = np.empty((4, 3))
-    for i, leg, x in ((0, k - 1, legs[k - 1]["length"] - d), (-1, k, d)):
+    for i, leg, x in ((0, k - 1, legs[k - 1]["length"] - d_in), (-1, k, d_out)):
         leg_point(legs, leg, x, at)
         speed = np.linalg.norm(at[1])
         tangent = at[1] / speed
@@ -358,15 +365,14 @@ def test_random_arc_corners_are_regular_and_within_tolerance(theta, radii, turns
     if path.joint[1] != Joint.CORNER:
         return
     w = np.linspace(0, 1, 201)
-    found = evaluate_corner(path.toolpath, 1, path.corner, path.params[1], w)
-    _, Y = shape_values(path.corner, path.params[1], w)
+    found = evaluate_corner(path.toolpath, 1, path.corner, path.params[1], w, stretch=path.stretch[1])
+    X, Y = shape_values(path.corner, path.params[1], w, path.stretch[1])
     bound = path.d[1] * np.cos(
         BEND_MAX / 2
     )  # |B'| >= (|X'| + |Y'|) cos(bend/2), and |X'| + |Y'| >= 0.4 d on the pair
     assert np.linalg.norm(found.by_w[:, 1], axis=1).min() >= 0.4 * bound
     legs = element_table(path).legs
     at = np.empty((4, 3))
-    X = Y[::-1]
     for i, z in enumerate(Y - X):
         leg_point(legs, 0 if z < 0 else 1, legs[0]["length"] + z if z < 0 else z, at)
         assert np.linalg.norm(found.by_w[i, 0] - at[0]) <= path.tol_ap[1] * (1 + 1e-9) + 1e-12

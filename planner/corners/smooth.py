@@ -121,8 +121,8 @@ def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> 
     middle = middle_from_tolerance(allocate(tol, reachable, rate), sin_half, curvature)[blend]
     wanted[blend] = np.minimum(corner.reach(middle, feed[blend]), longest[blend])
     bend = np.maximum(toolpath.curvature[before], toolpath.curvature[after])
-    with np.errstate(divide="ignore"):
-        wanted = np.minimum(wanted, np.maximum(BEND_MAX - theta, 0.0) / bend)
+    room = np.maximum(BEND_MAX - theta, 0.0)
+    wanted = np.minimum(wanted, np.divide(room, bend, out=np.full(len(at), np.inf), where=bend > 0))
     ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half, 1e-12)
     d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), legs.length)
     stretch = _close_legs(d, legs.length)

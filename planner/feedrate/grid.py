@@ -42,6 +42,7 @@ def add_switching_points(
     places = np.stack([rise, fall], axis=1)
     share = places / length[:, None]
     real = (share > SWITCH_MIN) & (share < 1.0 - SWITCH_MIN)
+    real[:, 1] &= share[:, 1] - share[:, 0] > SWITCH_MIN  # a peak that just touches the limit is one point
     row, _ = np.nonzero(real)
     return insert_points(samples, interval[row], samples.s[interval[row]] + places[real])
 

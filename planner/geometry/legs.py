@@ -52,8 +52,8 @@ def leg_dtype(axes: int) -> np.dtype:
 
 def legs_of(toolpath: Toolpath) -> Legs:
     """Join collinear lines; every other segment is a leg of its own."""
-    straight = toolpath.arc < 0
-    joined = (toolpath.joint[1:-1] == Joint.SMOOTH) & straight[:-1] & straight[1:]
+    line = toolpath.arc < 0
+    joined = (toolpath.joint[1:-1] == Joint.SMOOTH) & line[:-1] & line[1:]
     first = np.concatenate([[0], np.flatnonzero(~joined) + 1, [len(toolpath)]])
     leg_of_segment = np.repeat(np.arange(len(first) - 1), np.diff(first))
     along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
@@ -64,7 +64,8 @@ def legs_of(toolpath: Toolpath) -> Legs:
     length = np.where(arc < 0, chord, toolpath.length[first[:-1]])
     table = np.zeros(len(length), leg_dtype(len(toolpath.axes)))
     table["length"], table["start"], table["round"] = length, start, arc >= 0
-    table["direction"][arc < 0] = ((end - start) / chord[:, None])[arc < 0]
+    straight = arc < 0
+    table["direction"][straight] = (end - start)[straight] / chord[straight, None]
     for name in ("center", "e1", "e2", "drift", "radius", "rate"):
         table[name][arc >= 0] = getattr(toolpath.arcs, name)[arc[arc >= 0]]
     return Legs(first=first, offset=offset, length=length, table=table)

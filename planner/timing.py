@@ -1,9 +1,9 @@
 """From a speed profile along the path to samples in time: the solution itself, integrated exactly, nothing smoothed on top.
 
-The profile becomes a time law, s(t) in pieces of constant jerk (zero for second-order profiles, whose acceleration u along the
-path is constant on every grid interval):
+The profile becomes a time law, s(t) in pieces of constant jerk, one per grid interval (zero for second-order profiles, whose
+acceleration u along the path is constant there):
 
-    t_{i+1} = t_i + 2 h / (feed_i + feed_{i+1}),      s(t) = s_i + feed_i tau + u tau^2/2 + jerk tau^3/6,    tau = t - t_i,
+    t_{i+1} = t_i + duration_i,      s(t) = s_i + feed_i tau + u tau^2/2 + jerk tau^3/6,    tau = t - t_i,
 
 and per axis, with r', r'', r''' at s(t):
 
@@ -23,9 +23,8 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.elements import element_length, element_point, to_arc_length
-from planner.feedrate.solution import FeedrateSolution, interval_times
+from planner.feedrate.solution import FeedrateSolution
 from planner.path import PathSamples
 from planner.trajectory import Trajectory
 
@@ -78,9 +77,9 @@ class Motion:
     law: TimeLaw
 
 
-def second_order_law(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> TimeLaw:
-    """The time law of a solved problem, dwells included. Raises NotSolvedError without a solution."""
-    duration = interval_times(problem, solution.require().feed_sq)
+def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw:
+    """The time law of a solution of any order, dwells included. Raises NotSolvedError without a solution."""
+    duration = solution.require().duration.copy()
     dwell = _dwells(samples)
     duration[samples.piece[1:] - 1] += dwell[1:]  # the last point of a piece stands still
     return TimeLaw(
@@ -88,7 +87,7 @@ def second_order_law(samples: PathSamples, problem: FeedrateProblem, solution: F
         s=samples.s,
         feed=np.sqrt(solution.feed_sq),
         acc_s=solution.acc_s,
-        jerk_s=np.zeros(len(samples)),
+        jerk_s=solution.jerk_s,
         run=np.repeat(np.arange(len(samples.piece) - 1), np.diff(samples.piece)),
         end=float(dwell[0] + duration.sum()),
     )
@@ -284,6 +283,8 @@ def _sample(
             s_here = min(s_here, s_law[m + 1])
         if times[n] >= end:
             s_here, v, u, j = s[-1], 0.0, 0.0, 0.0
+        elif times[n] < t[m]:  # a dwell before the first move
+            v, u, j = 0.0, 0.0, 0.0
         first, last = piece[run[m]], piece[run[m] + 1] - 2  # the intervals of this run
         if i < first:
             i = _last_not_after(s, s_here, first, last)

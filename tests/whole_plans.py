@@ -23,7 +23,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.nc.program import Program
 from planner.path import RESOLUTION, PathSamples, sample_path
-from planner.timing import Motion, TimeLaw, second_order_law
+from planner.timing import Motion, TimeLaw, law_of_solution
 
 CORNERS = ("bezier", "fir")
 
@@ -78,7 +78,7 @@ def solve(
         samples=samples,
         problem=problem,
         solution=solution,
-        law=second_order_law(samples, problem, solution),
+        law=law_of_solution(samples, solution),
     )
 
 

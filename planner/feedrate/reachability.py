@@ -62,12 +62,12 @@ class Reachability:
         if not (np.isfinite(x).all() and np.isfinite(u).all()):
             sentence = "the profile is not finite; check the path for points that coincide"
             return FeedrateSolution.failed(problem, Status.NUMERICAL_ERROR, sentence, repr(self), took)
-        return FeedrateSolution(
-            status=Status.OPTIMAL,
-            sentence="time-optimal for the second-order limits",
-            solver=repr(self),
+        return FeedrateSolution.second_order(
+            problem,
             feed_sq=x,
             acc_s=u,
+            sentence="time-optimal for the second-order limits",
+            solver=repr(self),
             solve_time=took,
         )
 

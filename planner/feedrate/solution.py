@@ -14,23 +14,52 @@ from planner.errors import NotSolvedError
 
 
 class Status(Enum):
-    """How a solver ended."""
+    """How a solver ended. Only the first two come with a profile; both keep every limit."""
 
     OPTIMAL = "optimal"
+    ACCEPTABLE = "acceptable"  # feasible, and optimal to a coarser tolerance than the one asked for
     INFEASIBLE = "infeasible"
+    ITERATION_LIMIT = "iteration limit"
+    TIME_LIMIT = "time limit"
     NUMERICAL_ERROR = "numerical error"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FeedrateSolution:
-    """The profile of a `FeedrateProblem` with P points.
+class Prices:
+    """What the limits cost: derivatives of the cycle time with respect to them, never positive, on the solved grid.
 
-    status     : see `Status`
-    sentence   : what happened and, on failure, what to do
-    solver     : repr of the solver
-    feed_sq    : (P,) x [mm2/s2]; all NaN unless solved
-    acc_s      : (P,) u on the interval to the right of each point [mm/s2]; 0 at the last point of a piece
-    solve_time : [s]
+    velocity, acceleration, jerk : (A,) dT/d(axis limit) [s per mm/s, mm/s2, mm/s3]
+    feed_sq_max                  : (P,) dT/d(feed_sq_max) of each point [s per mm2/s2]; what an axis velocity or the
+                                   acceleration at a jump of the curvature costs is in here too, as part of the sums above
+    """
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    feed_sq_max: FloatArray
+
+    def __post_init__(self) -> None:
+        axes = len(self.jerk)
+        for name in ("velocity", "acceleration", "jerk"):
+            freeze(self, name, np.float64, (axes,))
+        freeze(self, "feed_sq_max", np.float64, (None,))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FeedrateSolution:
+    """The profile of a `FeedrateProblem` with P points: constant jerk along the path on every interval.
+
+    status       : see `Status`
+    sentence     : what happened and, on failure, what to do
+    solver       : repr of the solver
+    feed_sq      : (P,) x [mm2/s2]; all NaN unless solved, like the next three
+    acc_s        : (P,) acceleration along the path just after each point [mm/s2]; 0 at the last point of a piece that ends at rest
+    jerk_s       : (P,) jerk along the path on the interval to the right of each point [mm/s3]; 0 everywhere at second order
+    duration     : (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile rests at both ends
+    solve_time   : [s]
+    iterations   : of an iterative solver; the largest of all pieces
+    jerk_limited : True if the jerk limits of the problem were kept
+    prices       : what the limits cost, if the solver knows
     """
 
     status: Status
@@ -38,17 +67,28 @@ class FeedrateSolution:
     solver: str
     feed_sq: FloatArray
     acc_s: FloatArray
+    jerk_s: FloatArray
+    duration: FloatArray
     solve_time: float
+    iterations: int = 0
+    jerk_limited: bool = False
+    prices: Prices | None = None
 
     def __post_init__(self) -> None:
         points = len(self.feed_sq)
-        freeze(self, "feed_sq", np.float64, (points,), finite=self.solved)
-        freeze(self, "acc_s", np.float64, (points,), finite=self.solved)
+        for name in ("feed_sq", "acc_s", "jerk_s"):
+            freeze(self, name, np.float64, (points,), finite=self.solved)
+        freeze(self, "duration", np.float64, (points,), finite=False)
 
     @property
     def solved(self) -> bool:
         """True if the arrays hold a profile."""
-        return self.status is Status.OPTIMAL
+        return self.status in (Status.OPTIMAL, Status.ACCEPTABLE)
+
+    @property
+    def cycle_time(self) -> float:
+        """Duration of the motion without dwells [s]; NaN unless solved."""
+        return float(self.duration.sum())
 
     def require(self) -> FeedrateSolution:
         """Return self, or raise NotSolvedError with the sentence."""
@@ -57,13 +97,50 @@ class FeedrateSolution:
         return self
 
     @classmethod
+    def second_order(
+        cls,
+        problem: FeedrateProblem,
+        *,
+        feed_sq: FloatArray,
+        acc_s: FloatArray,
+        sentence: str,
+        solver: str,
+        solve_time: float,
+    ) -> FeedrateSolution:
+        """A second-order optimum: constant acceleration on every interval."""
+        return cls(
+            status=Status.OPTIMAL,
+            sentence=sentence,
+            solver=solver,
+            feed_sq=feed_sq,
+            acc_s=acc_s,
+            jerk_s=np.zeros(len(problem)),
+            duration=interval_times(problem, feed_sq),
+            solve_time=solve_time,
+        )
+
+    @classmethod
     def failed(
-        cls, problem: FeedrateProblem, status: Status, sentence: str, solver: str, solve_time: float
+        cls,
+        problem: FeedrateProblem,
+        status: Status,
+        sentence: str,
+        solver: str,
+        solve_time: float,
+        iterations: int = 0,
     ) -> FeedrateSolution:
         """A failure: every number is NaN."""
         nan = np.full(len(problem), np.nan)
         return cls(
-            status=status, sentence=sentence, solver=solver, feed_sq=nan, acc_s=nan, solve_time=solve_time
+            status=status,
+            sentence=sentence,
+            solver=solver,
+            feed_sq=nan,
+            acc_s=nan,
+            jerk_s=nan,
+            duration=nan,
+            solve_time=solve_time,
+            iterations=iterations,
         )
 
 
@@ -76,7 +153,8 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] of the interval to the right of each point (0 at the end of a piece): 2 h / (feed_i + feed_{i+1})."""
+    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1});
+    0 at the end of a piece. Solutions carry their own `duration`, exact at any order."""
     feed = np.sqrt(feed_sq)
     times = np.zeros(len(problem))
     inner = np.flatnonzero(problem.interval)
@@ -85,35 +163,41 @@ def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
     return times
 
 
-def cycle_time(problem: FeedrateProblem, solution: FeedrateSolution) -> float:
-    """Duration of the motion without dwells [s]. Raises NotSolvedError without a solution."""
-    return float(interval_times(problem, solution.require().feed_sq).sum())
-
-
 def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> tuple[FloatArray, Array]:
     """How close the profile comes to its limits, and to which.
 
-    Returns the largest ratio (P,) of any constraint at each point or on the interval to its right (1 = active), and the
-    constraint's index (P,) in `active_names`. Solver-independent: computed from the profile alone.
+    Returns the largest ratio (P,) of any constraint at each point or at either end of the interval to its right (1 = active),
+    and the constraint's index (P,) in `active_names`. Jerk counts for jerk-limited solutions only. Solver-independent: computed
+    from the profile alone.
     """
     x, u = solution.require().feed_sq, solution.acc_s
     worst = x / problem.feed_sq_max
     which = problem.feed_sq_bound.copy()
     inner = np.flatnonzero(problem.interval)
-    scale = 1.0 - problem.margin[inner]
+    jerk = solution.jerk_s[inner]
     ends = (
-        (problem.d1[inner], problem.d2_right[inner], x[inner]),
-        (problem.d1[inner + 1], problem.d2_left[inner + 1], x[inner + 1]),
+        (inner, u[inner], problem.d2_right, problem.d3_right),
+        (inner + 1, u[inner] + jerk * solution.duration[inner], problem.d2_left, problem.d3_left),
     )
-    for k in range(len(problem.axes)):
-        limit = problem.acceleration[k] * scale
-        ratio = np.maximum(*(np.abs(d1[:, k] * u[inner] + d2[:, k] * xs) / limit for d1, d2, xs in ends))
+    first = len(problem.bound_names)
+    for point, acc, d2, d3 in ends:
+        feed = np.sqrt(x[point])[:, None]
+        acc_axes = problem.d1[point] * acc[:, None] + d2[point] * feed**2
+        rows = [np.abs(acc_axes) / (problem.acceleration * (1.0 - problem.margin[inner, None]))]
+        if solution.jerk_limited:
+            turning = 3.0 * d2[point] * feed * acc[:, None] + d3[point] * feed**3
+            rows.append(np.abs(problem.d1[point] * jerk[:, None] + turning) / problem.jerk)
+        ratios = np.concatenate(rows, axis=1)
+        largest = ratios.argmax(axis=1)
+        ratio = ratios[np.arange(len(inner)), largest]
         better = ratio > worst[inner]
         worst[inner[better]] = ratio[better]
-        which[inner[better]] = len(problem.bound_names) + k
+        which[inner[better]] = first + largest[better]
     return worst, which
 
 
 def active_names(problem: FeedrateProblem) -> tuple[str, ...]:
     """Names for the indices of `constraint_ratios`."""
-    return problem.bound_names + tuple(f"acceleration.{axis}" for axis in problem.axes)
+    return problem.bound_names + tuple(
+        f"{limit}.{axis}" for limit in ("acceleration", "jerk") for axis in problem.axes
+    )

@@ -32,7 +32,7 @@ from planner.methods.plan import GridHistory, Plan
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.nc.program import Program
 from planner.path import PathSamples, sample_path
-from planner.timing import Motion, TimeLaw, second_order_law
+from planner.timing import Motion, TimeLaw, law_of_solution
 
 CORNERS = ("bezier", "fir")
 SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
@@ -68,7 +68,7 @@ class ToppraMethod:
             samples, problem, solution = _solve(samples, machine, solver)
         trajectory = verdict = corners = grid = None
         if solution.solved:
-            law = second_order_law(samples, problem, solution)
+            law = law_of_solution(samples, solution)
             trajectory, verdict = deliver(
                 Motion(samples=samples, law=law), toolpath, machine, stages, not_limited=("jerk",)
             )

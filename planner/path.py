@@ -46,6 +46,8 @@ MARGIN_SAFETY = 1.25
 HALVINGS_MAX = 20
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
 ARC_STEP = np.pi / 8
+# ... and with so many at least, so that a short arc between two stops can start and stop.
+ARC_PARTS_MIN = 4
 # Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
 FREE_PART_MIN = 1e-9
 
@@ -120,6 +122,8 @@ def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTI
     axes = path.toolpath.axes
     table = element_table(path)
     velocity, acceleration = machine.limits("velocity", axes), machine.limits("acceleration", axes)
+    if machine.normal_acceleration is not None:
+        acceleration = np.minimum(acceleration, machine.normal_acceleration)
     element, w0, w1, segment, last = _grid(
         table.legs,
         table.corners,
@@ -375,7 +379,7 @@ def _grid(
                     curve = ~k
                 parts = 1
                 if half == 0 and curved:
-                    parts = int(np.ceil(abs(legs[leg].rate) * (wb - wa) / ARC_STEP))
+                    parts = max(ARC_PARTS_MIN, int(np.ceil(abs(legs[leg].rate) * (wb - wa) / ARC_STEP)))
                 cut = 0
                 left = wa
                 while left < wb:

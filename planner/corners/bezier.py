@@ -24,6 +24,10 @@ from planner.corners.blend import Shape
 from planner.errors import InputError
 
 
+# Up to here retreat times advance is largest at the middle of the corner, which the error bound needs (tested).
+SIGMA2_MAX = 1.5
+
+
 @dataclass(frozen=True, kw_only=True)
 class BezierCorner:
     """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given."""
@@ -37,8 +41,11 @@ class BezierCorner:
     MIDDLE = 0.125
 
     def __post_init__(self) -> None:
-        if not 0.75 < self.sigma2 < np.inf:
-            raise InputError(f"sigma2 = {self.sigma2}; the G3 joint needs sigma2 > 3/4")
+        if not 0.75 < self.sigma2 <= SIGMA2_MAX:
+            raise InputError(
+                f"sigma2 = {self.sigma2}; allowed are 3/4 < sigma2 <= {SIGMA2_MAX}: the joint is G3 above the one, "
+                "the error bound of corners/blend.py holds up to the other"
+            )
         if self.sigma1 is not None and not 0 < self.sigma1 < np.inf:
             raise InputError(f"sigma1 = {self.sigma1}; it must be positive")
 

@@ -35,13 +35,18 @@ def share_legs(wanted: FloatArray, ease: FloatArray, length: FloatArray) -> Floa
     d = np.zeros_like(wanted)
     for _ in range(ROUNDS):
         free = np.maximum(length - d[:-1] - d[1:], 0.0)
-        grow = wanted - d
-        grow[:-1] = np.minimum(grow[:-1], _claim(free, part_left, wanted[1:] - d[1:]))
-        grow[1:] = np.minimum(grow[1:], _claim(free, part_right, wanted[:-1] - d[:-1]))
-        d += np.maximum(grow, 0.0)
+        can = np.maximum(
+            wanted - d, 0.0
+        )  # what a corner could still use: its wish, and what both of its legs have left
+        can[:-1] = np.minimum(can[:-1], free)
+        can[1:] = np.minimum(can[1:], free)
+        grow = can.copy()
+        grow[:-1] = np.minimum(grow[:-1], _claim(free, part_left, can[1:]))
+        grow[1:] = np.minimum(grow[1:], _claim(free, part_right, can[:-1]))
+        d += grow
     return d
 
 
-def _claim(free: FloatArray, part: FloatArray, other_wants: FloatArray) -> FloatArray:
-    """What one end may take of the free length: its part, or all that the other end does not want."""
-    return np.maximum(free * part, free - np.maximum(other_wants, 0.0))
+def _claim(free: FloatArray, part: FloatArray, other_can: FloatArray) -> FloatArray:
+    """What one end may take of the free length: its part, or all that the other end cannot use."""
+    return np.maximum(free * part, free - other_can)

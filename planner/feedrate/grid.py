@@ -20,8 +20,8 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 from planner.path import PathSamples, insert_points
 
-# A switch nearer to an interval's end than this share of it adds nothing but rounding [-].
-SWITCH_MIN = 1e-6
+# Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit.
+SWITCH_MIN = 1e-9
 
 
 def add_switching_points(
@@ -39,12 +39,12 @@ def add_switching_points(
     capped = x0 + 2.0 * rate * single > cap
     rise = np.where(capped, (cap - x0) / (2.0 * rate), single)
     fall = np.where(capped, length - (cap - x1) / (2.0 * rate), np.inf)
-    places = np.stack([rise, fall], axis=1)
-    share = places / length[:, None]
-    real = (share > SWITCH_MIN) & (share < 1.0 - SWITCH_MIN)
-    real[:, 1] &= share[:, 1] - share[:, 0] > SWITCH_MIN  # a peak that just touches the limit is one point
+    s0, s1 = samples.s[interval, None], samples.s[interval + 1, None]
+    places = s0 + np.stack([rise, fall], axis=1)
+    real = (places > s0) & (places < s1)  # as far as arc length can tell them apart
+    real[:, 1] &= places[:, 1] - places[:, 0] > SWITCH_MIN * length
     row, _ = np.nonzero(real)
-    return insert_points(samples, interval[row], samples.s[interval[row]] + places[real])
+    return insert_points(samples, interval[row], places[real])
 
 
 def _straight(samples: PathSamples) -> Array:

@@ -18,6 +18,10 @@ from planner.arrays import Array, FloatArray, freeze
 from planner.geometry.toolpath import Joint, Toolpath
 
 
+# Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
+JOINED_ANGLE = 1e-7
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Legs:
     """R legs of a toolpath and the R+1 joints between them.
@@ -54,6 +58,8 @@ def legs_of(toolpath: Toolpath) -> Legs:
     """Join collinear lines; every other segment is a leg of its own."""
     line = toolpath.arc < 0
     joined = (toolpath.joint[1:-1] == Joint.SMOOTH) & line[:-1] & line[1:]
+    turned = np.cumsum(np.where(joined, toolpath.theta[1:-1], 0.0))
+    joined[1:] &= np.diff(np.floor(turned / JOINED_ANGLE)) == 0
     first = np.concatenate([[0], np.flatnonzero(~joined) + 1, [len(toolpath)]])
     leg_of_segment = np.repeat(np.arange(len(first) - 1), np.diff(first))
     along = np.concatenate([[0.0], np.cumsum(toolpath.length)])

@@ -20,6 +20,7 @@ from planner.corners.bezier import BezierCorner, kappa_max
 from planner.corners.blend import BEND_MAX, error_from_middle, middle_from_tolerance, shape_at
 from planner.corners.elements import element_table
 from planner.corners.fir import FirCorner
+from planner.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import leg_point
 from planner.geometry.toolpath import Joint
@@ -267,11 +268,10 @@ def test_retreat_times_advance_is_largest_in_the_middle_of_the_fir_corner(T1, ra
     assert_product_bound(shape, 100.0 * (T1 + T2) / 2 * share)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="X Y <= m^2 fails for sigma2 > 1.5, so E(m) is no bound on arcs; refuse such weights"
-)
 def test_the_product_bound_holds_for_every_accepted_pair():
-    assert_product_bound(BezierCorner(sigma2=2.0), 1.0)
+    assert_product_bound(BezierCorner(sigma2=1.5), 1.0)
+    with pytest.raises(InputError, match="sigma2 = 2"):
+        BezierCorner(sigma2=2.0)
 
 
 @given(

@@ -71,10 +71,6 @@ def test_without_legs_nothing_happens():
     assert share_legs(np.zeros(1), np.ones(1), np.zeros(0)).tolist() == [0.0]
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a corner that is stopped by its other leg keeps its claim on this one: up to 84 % of a corner's wish stays unused",
-)
 def test_nothing_is_left_unused():
     worst = 0.0
     for seed in range(300):

@@ -110,21 +110,7 @@ ARCS = {
 }
 
 
-CLOSED = pytest.mark.xfail(
-    strict=True, raises=RuntimeWarning, reason="legs_of divides by the chord of a full circle: 0/0"
-)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "quarter",
-        "clockwise",
-        "helix",
-        pytest.param("full circle", marks=CLOSED),
-        pytest.param("three turns", marks=CLOSED),
-    ],
-)
+@pytest.mark.parametrize("name", ARCS)
 def test_arcs_have_their_length_ends_and_curvature(name):
     text, length, curvature = ARCS[name]
     path = build(text)

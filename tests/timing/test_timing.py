@@ -152,9 +152,6 @@ def test_dwells_hold_the_position_at_start_middle_and_end():
             assert not got.acceleration[still].any()
 
 
-@pytest.mark.xfail(
-    strict=True, reason="before the first piece of the law its acceleration is reported while nothing moves"
-)
 def test_a_dwell_at_the_start_has_no_acceleration():
     got = sampled(solve(parse_program(DWELLS), MACHINE))
     still = got.t < 0.499

@@ -1,0 +1,70 @@
+"""Method `stop`, the baseline: every block from rest to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
+from planner.geometry.build import toolpath_from_program
+from planner.methods.stop import StopMethod
+from planner.nc.reader import parse_program
+
+JOBS = problems.all_jobs()
+MACHINE = problems.machine()
+
+
+@pytest.fixture(scope="module", params=["pentagon", "arcs", "five points"])
+def planned(request):
+    return StopMethod().plan(JOBS[request.param], MACHINE)
+
+
+def test_the_pentagon_takes_what_the_papers_setting_gives():
+    assert StopMethod().plan(JOBS["pentagon"], MACHINE).trajectory.cycle_time == pytest.approx(
+        1.065, abs=5e-4
+    )
+
+
+def test_the_plan_is_verified_and_as_long_as_the_closed_form(planned):
+    assert planned.require().verdict.passed, planned.verdict.faults
+    assert planned.trajectory.cycle_time == pytest.approx(planned.stop_time, rel=1e-6)
+
+
+def test_every_programmed_point_is_met_at_rest(planned):
+    path, got = planned.toolpath, planned.trajectory
+    ends = np.cumsum(rest_to_rest_times(path.length, *block_limits(path, MACHINE)))
+    for end, point in zip(ends, path.end, strict=True):
+        near = np.abs(got.t - end).argmin()
+        gap = abs(got.t[near] - end)
+        reach = 2e5 * np.sqrt(3) * gap**3 / 6 + 1e-3 * np.sqrt(3) * 100 * (gap > 1e-3)
+        assert np.linalg.norm(got.position[near] - point) <= reach + 1e-6
+        assert np.abs(got.velocity[near]).max() <= 2e5 * np.sqrt(3) * gap**2 / 2 + 1e-6
+
+
+def test_limits_hold_with_jerk(planned):
+    got = planned.trajectory
+    assert np.abs(got.velocity).max() <= 100 * (1 + 1e-9)
+    assert np.abs(got.acceleration).max() <= 2000 * (1 + 1e-9)
+    assert np.abs(got.jerk).max() <= 2e5 * (1 + 1e-9)
+
+
+def test_dwells_add_up():
+    with_dwells = StopMethod().plan(
+        parse_program("G21 F6000\nG4 P0.5\nG1 X10\nG4 P1\nY10\nG4 P0.25\n"), MACHINE
+    )
+    without = StopMethod().plan(parse_program("G21 F6000\nG1 X10\nY10\n"), MACHINE)
+    extra = with_dwells.trajectory.cycle_time - without.trajectory.cycle_time
+    assert extra == pytest.approx(1.75, rel=1e-9)
+    still = with_dwells.trajectory.t < 0.499
+    assert not with_dwells.trajectory.velocity[still].any()
+
+
+def test_jerk_limits_on_arcs_are_safe_for_every_direction():
+    """block_limits on a circle: acceleration and jerk vectors stay within the smallest axis limit."""
+    program = parse_program("G21 G17 F60000\nG2 X0 Y0 I1 J0\n")
+    path = toolpath_from_program(program, MACHINE)
+    v, a, j = block_limits(path, MACHINE)
+    kappa = path.curvature
+    assert (np.hypot(kappa * v**2, a) <= 2000 * (1 + 1e-12)).all()
+    assert (np.hypot(kappa**2 * v**3 + j, 3 * kappa * v * a) <= 2e5 * (1 + 1e-12)).all()

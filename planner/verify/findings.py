@@ -219,7 +219,7 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array,
             match.passed["near"][-1] <= pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
         )
         left_out = match.track["lost"].copy()
-        left_out[match.count[LAST] + 1 :] = True
+        left_out[match.tally[LAST] + 1 :] = True
         left_out[-1] |= not end_reached
         lost |= left_out
         here = np.unique(pieces.piece["segment"][left_out])
@@ -229,11 +229,11 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array,
                 " ..." if len(lines) > FAULTS_OF_A_KIND else ""
             )
             said.append("order: " + look.noted(f"{len(here)} blocks are not run to their end, line {shown}"))
-        if match.count[HELD]:
+        if match.tally[HELD]:
             said.append(
-                "order: " + look.noted(f"{match.count[HELD]} samples far from where the program should be")
+                "order: " + look.noted(f"{match.tally[HELD]} samples far from where the program should be")
             )
-        in_order = in_order and not match.count[JUMPS] and not match.count[HELD] and not len(here)
+        in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
     return np.unique(pieces.piece["segment"][lost]), in_order, said
 
 

@@ -27,11 +27,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numba import njit
-
 from planner.arrays import Array, FloatArray
-from planner.verify.pieces import RATIO_ROUNDING
+from planner.verify.pieces import RATIO_ROUNDING, kernel
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
 FEED_AT_REST = 1e-6  # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
@@ -44,7 +41,7 @@ FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def scan(
     t: FloatArray,
     position: FloatArray,
@@ -59,6 +56,7 @@ def scan(
     travelled: float,
     worst: FloatArray,
     sample: Array,
+    work: FloatArray,
 ) -> float:
     """Find the worst of samples `skip` to the last; up to three samples before them serve the differences.
 
@@ -70,19 +68,17 @@ def scan(
     worst, sample    : (GROUPS A + ROWS_ALONE, 4) ratio, value, limit, `COLUMN` or `DIFFERENCE`, and the sample's index;
                        written. The gaps are those of the module's text over h, h^2 and h, with the limits in place of A, J.
 
+    work             : (4, A, 4) room for d0 .. d3 and their rounding, now and at the sample before
+
     -> path length run at the last sample [mm]
     """
     n, axes = position.shape
     alone = GROUPS * axes
-    difference, error = np.zeros(4), np.zeros(4)
-    before, error_before = (
-        np.zeros((axes, 4)),
-        np.zeros((axes, 4)),
-    )  # d0, d1, d2 at the sample before, and their rounding
+    difference, error, before, error_before = work[0, 0], work[1, 0], work[2], work[3]
     ulp, resolution = ROUNDING_ULPS * 2.0**-52, RATIO_ROUNDING
     first = max(skip - 3, 0)
     for k in range(first, n):
-        period = t[k] - t[k - 1] if k > first else np.inf
+        period = t[k] - t[k - 1] if k > first else math.inf
         step_sq = 0.0
         for axis in range(axes):
             if k > first and linear[axis]:
@@ -147,7 +143,7 @@ def scan(
     return travelled
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def _feed_and_normal(
     velocity: FloatArray, acceleration: FloatArray, k: int, linear: Array
 ) -> tuple[float, float]:
@@ -166,7 +162,7 @@ def _feed_and_normal(
     return feed, math.sqrt(normal_sq)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def _keep(worst: FloatArray, sample: Array, row: int, value: float, limit: float, k: int, seen: int) -> None:
     if value > worst[row, 0] * limit:  # false where the limit is inf
         worst[row, 0], worst[row, 1], worst[row, 2], worst[row, 3] = value / limit, value, limit, seen

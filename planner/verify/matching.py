@@ -32,7 +32,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.verify.pieces import (
@@ -41,6 +40,7 @@ from planner.verify.pieces import (
     RATIO_ROUNDING,
     Pieces,
     distance_from,
+    kernel,
     reach,
     reach_chord,
 )
@@ -58,8 +58,8 @@ STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding
 
 TRACK = np.dtype([("low", "f8"), ("new", "f8"), ("lost", "?")])
 PASSED = np.dtype([("near", "f8"), ("near_time", "f8"), ("rest", "f8"), ("stop_ratio", "f8")])
-FIRST, LAST, JUMPS, SEARCHED, HELD = range(5)  # in Match.count
-BEFORE, WORST_AT = range(2)  # in Match.place
+FIRST, LAST, JUMPS, SEARCHED, HELD = range(5)  # in Match.tally
+BEFORE, POINT, WORST_AT = range(3)  # in Match.place
 
 
 class Match(NamedTuple):
@@ -68,14 +68,14 @@ class Match(NamedTuple):
     track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
     passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to
              stop: rest = standstill there [s], stop_ratio = how well it stops, <= 1 if within what samples can show
-    count  : (5,) first and last possible piece; jumps over lost pieces; pieces searched; samples held
-    place  : (2, A) the sample before; the worst sample [mm]
+    tally  : (5,) first and last possible piece; jumps over lost pieces; pieces searched; samples held
+    place  : (3, A) the sample before, the present one, the worst one [mm]
     worst  : (6,) of the worst sample: ratio, distance [mm], budget [mm], time [s], piece; largest distance of any [mm]
     """
 
     track: Array
     passed: Array
-    count: Array
+    tally: Array
     place: FloatArray
     worst: FloatArray
 
@@ -88,13 +88,13 @@ def new_match(pieces: Pieces) -> Match:
     return Match(
         track=track,
         passed=passed,
-        count=np.zeros(5, dtype=np.int64),
-        place=np.zeros((2, axes)),
+        tally=np.zeros(5, dtype=np.int64),
+        place=np.zeros((3, axes)),
         worst=np.zeros(6),
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def follow(
     pieces: Pieces,
     match: Match,
@@ -113,31 +113,31 @@ def follow(
     piece, feed_max  : (n,) written: the piece each sample lies on, and the largest feed of those it can lie on [mm/s]
     """
     n, axes = position.shape
-    before, point = match.place[BEFORE], np.empty(axes)
+    before, point = match.place[BEFORE], match.place[POINT]
     parts = 2 if middles else 1
     for k in range(skip, n):
         if k == 0:
-            match.track[0].low = 0.0
+            match.track[0]["low"] = 0.0
             for axis in range(axes):
                 before[axis] = point[axis] = position[0, axis]
             _, _, apart = reach_chord(before, point, pieces, 0, 0.0)
-            match.passed[0].near, match.passed[0].near_time = apart, t[0]
+            match.passed[0]["near"], match.passed[0]["near_time"] = apart, t[0]
         period = t[k] - t[k - 1] if k else 0.0
         for part in range(1, parts + 1):
             rest = (parts - part) / parts
             for axis in range(axes):
                 back = position[k, axis] - position[k - 1, axis] if k else 0.0
                 point[axis] = position[k, axis] - rest * back
-            first = match.count[FIRST]
+            first = match.tally[FIRST]
             piece[k], feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
-            for i in range(first, match.count[LAST] + 2):
-                if k and pieces.joint[i].stop:
+            for i in range(first, match.tally[LAST] + 2):
+                if k and pieces.joint[i]["stop"]:
                     _watch_stop(pieces, match, i, before, point, period, parts, acceleration_max)
             for axis in range(axes):
                 before[axis] = point[axis]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def _step(
     pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[int, float]:
@@ -167,7 +167,7 @@ def _step(
     else:
         distance, i, feed = _stray(pieces, match, before, point, time)
     match.worst[5] = max(match.worst[5], distance)
-    budget = pieces.piece[i].budget
+    budget = pieces.piece[i]["budget"]
     if distance > match.worst[0] * budget:
         match.worst[0], match.worst[1], match.worst[2] = distance / budget, distance, budget
         match.worst[3], match.worst[4] = time, i
@@ -176,7 +176,7 @@ def _step(
     return i, feed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def _column(
     pieces: Pieces,
     match: Match,
@@ -195,40 +195,40 @@ def _column(
     -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed
     """
     track, passed = match.track, match.passed
-    i, last_before = match.count[FIRST], match.count[LAST]
+    i, last_before = match.tally[FIRST], match.tally[LAST]
     entry = np.inf  # where on the chord vertex i was passed
     first, last, nearest, best, feed = len(track), -1, np.inf, i, 0.0
     while i < len(track):
-        low_before = track[i].low if i <= last_before else np.inf
+        low_before = track[i]["low"] if i <= last_before else np.inf
         possible = low_before < np.inf or entry < np.inf
         if not possible and i > last_before:
             break
-        track[i].new = np.inf
+        track[i]["new"] = np.inf
         leave = np.inf
         if possible:
-            a, b, distance = reach(pieces, i, point, _allowed(pieces.piece[i].budget * widen))
+            a, b, distance = reach(pieces, i, point, _allowed(pieces.piece[i]["budget"] * widen))
             low = a if entry < np.inf else max(a, low_before)
             if low <= b:
-                track[i].new = low
+                track[i]["new"] = low
                 first, last = min(first, i), i
-                feed = max(feed, pieces.piece[i].feed)
+                feed = max(feed, pieces.piece[i]["feed"])
                 if distance < nearest:
                     nearest, best = distance, i
-            allowed = _allowed(pieces.joint[i + 1].budget * widen_vertex)
+            allowed = _allowed(pieces.joint[i + 1]["budget"] * widen_vertex)
             c, d, apart = reach_chord(before, point, pieces, i + 1, allowed)
-            if apart < passed[i + 1].near:
-                passed[i + 1].near, passed[i + 1].near_time = apart, time
+            if apart < passed[i + 1]["near"]:
+                passed[i + 1]["near"], passed[i + 1]["near_time"] = apart, time
             earliest = 0.0 if low_before < np.inf else entry
             if max(c, earliest) <= d:
                 leave = max(c, earliest)
-            elif late and passed[i + 1].near <= allowed:
+            elif late and passed[i + 1]["near"] <= allowed:
                 leave = earliest
         entry = leave
         i += 1
     return first, last, nearest, best, feed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def _stray(
     pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[float, int, float]:
@@ -236,47 +236,47 @@ def _stray(
 
     -> distance [mm], piece, feed [mm/s]
     """
-    track, passed, count = match.track, match.passed, match.count
-    begin = count[LAST] + 1
+    track, passed, tally = match.track, match.passed, match.tally
+    begin = tally[LAST] + 1
     for ahead in range(begin, min(begin + PIECES_AHEAD, len(track))):
-        if count[SEARCHED] >= SEARCH_MAX:
+        if tally[SEARCHED] >= SEARCH_MAX:
             break
-        count[SEARCHED] += 1
-        a, b, distance = reach(pieces, ahead, point, _allowed(pieces.piece[ahead].budget))
+        tally[SEARCHED] += 1
+        a, b, distance = reach(pieces, ahead, point, _allowed(pieces.piece[ahead]["budget"]))
         if a > b:
             continue
-        count[JUMPS] += 1
+        tally[JUMPS] += 1
         for j in range(begin, ahead + 1):
             _, _, apart = reach_chord(before, point, pieces, j, 0.0)
-            if apart < passed[j].near:
-                passed[j].near, passed[j].near_time = apart, time
-            track[j].lost = j < ahead
-        track[ahead].new = 0.0
+            if apart < passed[j]["near"]:
+                passed[j]["near"], passed[j]["near_time"] = apart, time
+            track[j]["lost"] = j < ahead
+        track[ahead]["new"] = 0.0
         _commit(match, ahead, ahead)
-        return distance, ahead, pieces.piece[ahead].feed
+        return distance, ahead, pieces.piece[ahead]["feed"]
 
-    count[HELD] += 1
-    nearest, best, feed = np.inf, count[FIRST], 0.0
-    for i in range(count[FIRST], begin):
-        if track[i].low < np.inf:
-            distance = distance_from(pieces, i, track[i].low, point)
-            feed = max(feed, pieces.piece[i].feed)
+    tally[HELD] += 1
+    nearest, best, feed = np.inf, tally[FIRST], 0.0
+    for i in range(tally[FIRST], begin):
+        if track[i]["low"] < np.inf:
+            distance = distance_from(pieces, i, track[i]["low"], point)
+            feed = max(feed, pieces.piece[i]["feed"])
             if distance < nearest:
                 nearest, best = distance, i
     return nearest, best, feed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def _commit(match: Match, first: int, last: int) -> None:
     """Make the possible pieces `first` to `last` of match.track.new the present ones."""
-    for i in range(match.count[FIRST], match.count[LAST] + 1):
-        match.track[i].low = np.inf
+    for i in range(match.tally[FIRST], match.tally[LAST] + 1):
+        match.track[i]["low"] = np.inf
     for i in range(first, last + 1):
-        match.track[i].low = match.track[i].new
-    match.count[FIRST], match.count[LAST] = first, last
+        match.track[i]["low"] = match.track[i]["new"]
+    match.tally[FIRST], match.tally[LAST] = first, last
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def _watch_stop(
     pieces: Pieces,
     match: Match,
@@ -301,11 +301,11 @@ def _watch_stop(
         still = still and move <= STILL
     away = math.sqrt(away_sq) + PLACE_ROUNDING
     _, _, apart = reach_chord(before, point, pieces, i, 0.0)
-    match.passed[i].stop_ratio = min(match.passed[i].stop_ratio, max(slow, apart / away))
+    match.passed[i]["stop_ratio"] = min(match.passed[i]["stop_ratio"], max(slow, apart / away))
     if still and apart <= away:
-        match.passed[i].rest += period / parts
+        match.passed[i]["rest"] += period / parts
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def _allowed(budget: float) -> float:
     return budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING

@@ -17,7 +17,8 @@ nearest point an error of x enters it only squared.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -42,6 +43,22 @@ PIECE = np.dtype(
     [("budget", "f8"), ("feed", "f8"), ("x0", "f8"), ("x1", "f8"), ("arc", "i8"), ("segment", "i8")]
 )
 JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
+
+
+def kernel(inline: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The compiler's settings for all kernels of the verifier. They work on arrays that their caller owns and allocate nothing.
+
+    Counting references to those arrays at every call was four fifths of the running time, hence `_nrt=False`; so was passing
+    them on the stack, hence `inline` for the innermost functions, which the interpreter then cannot call. Division by zero
+    gives inf, as in numpy.
+    """
+    settings: dict[str, Any] = {
+        "forceinline": inline,
+        "no_cpython_wrapper": inline,
+        "no_cfunc_wrapper": True,
+        "_nrt": False,
+    }
+    return njit(cache=True, error_model="numpy", **settings)
 
 
 class Pieces(NamedTuple):
@@ -129,14 +146,14 @@ def _check_consistent(toolpath: Toolpath, computed_start: FloatArray) -> None:
             )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def reach(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
     """Which part of piece i lies within `radius` of the point q (A,).
 
     -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
     Exact on lines; on arcs the distance is, and a and b are to second order about the nearest point.
     """
-    if pieces.piece[i].arc >= 0:
+    if pieces.piece[i]["arc"] >= 0:
         return _reach_arc(pieces, i, q, radius)
     vertex = pieces.vertex
     along, length_sq = 0.0, 0.0
@@ -151,7 +168,7 @@ def reach(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, 
     return _within(x, off_sq, length_sq, radius)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def reach_chord(
     begin: FloatArray, end: FloatArray, pieces: Pieces, i: int, radius: float
 ) -> tuple[float, float, float]:
@@ -169,7 +186,7 @@ def reach_chord(
     return _within(x, off_sq, length_sq, radius)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(inline=True)
 def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[float, float, float]:
     """The part of a segment within `radius` of a point whose foot on its line is at the fraction x, off_sq away (squared)."""
     nearest = min(max(x, 0.0), 1.0)
@@ -183,13 +200,13 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
     return min(max(x - half, 0.0), nearest), max(min(x + half, 1.0), nearest), distance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def distance_from(pieces: Pieces, i: int, low: float, q: FloatArray) -> float:
     """Distance [mm] of q (A,) from the part of piece i that begins at the fraction `low`."""
     _, _, distance = reach(pieces, i, q, 0.0)
     apart_sq, ahead = 0.0, 0.0
     piece = pieces.piece[i]
-    k, x, c, s = piece.arc, piece.x0 + low * (piece.x1 - piece.x0), 1.0, 0.0
+    k, x, c, s = piece["arc"], piece["x0"] + low * (piece["x1"] - piece["x0"]), 1.0, 0.0
     if k >= 0:
         c, s = math.cos(pieces.turn[k, RATE] * x), math.sin(pieces.turn[k, RATE] * x)
     for n in range(len(q)):
@@ -205,9 +222,9 @@ def distance_from(pieces: Pieces, i: int, low: float, q: FloatArray) -> float:
     return math.sqrt(apart_sq) if ahead > 0.0 else distance  # q lies behind: the part's beginning is nearest
 
 
-@njit(cache=True, error_model="numpy")
+@kernel()
 def _reach_arc(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
-    k, x0, x1 = pieces.piece[i].arc, pieces.piece[i].x0, pieces.piece[i].x1
+    k, x0, x1 = pieces.piece[i]["arc"], pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     big, rate, frame = pieces.turn[k, RADIUS], pieces.turn[k, RATE], pieces.frame
     w1, w2, wd, d1, d2, dd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(len(q)):

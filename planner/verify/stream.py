@@ -127,6 +127,7 @@ def _block(
         travelled,
         worst,
         sample,
+        np.zeros((4, position.shape[1], 4)),
     )
     new = np.flatnonzero(sample >= 0)
     seen.worst[new] = worst[new]

@@ -45,14 +45,10 @@ from planner.verify.pieces import (
     reach_chord,
 )
 
-NEAR_MISS = (
-    2.0  # errors up to this multiple of the budget are matched in place, beyond it a block counts as left out
-)
+NEAR_MISS = 2.0  # errors up to this multiple of the budget are matched in place; beyond, a block is left out
 BISECTIONS = 12  # of the widened budget: 1/4096 of it
 PIECES_AHEAD = 5_000  # looked through for the block at which a lost motion comes back
-SEARCH_MAX = (
-    100_000_000  # pieces looked through in total; then a lost motion stays lost (bounds the time on garbage)
-)
+SEARCH_MAX = 100_000_000  # pieces looked through in total; then a lost motion stays lost: bounds the time
 STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding of coordinates up to 1e6 mm
 
 

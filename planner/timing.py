@@ -24,6 +24,7 @@ from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.corners.elements import element_length, element_point, to_arc_length
+from planner.errors import InputError
 from planner.feedrate.solution import FeedrateSolution
 from planner.path import PathSamples
 from planner.trajectory import Trajectory
@@ -37,6 +38,8 @@ REFINE_STEPS = 12
 CUBE_ROOT_ROUNDING = 4e-5
 # Distance of the outer samples of a piece of the law from its ends [share of the piece].
 DENSE_EDGE = 0.05
+# More samples than this are refused: with three axes they fill 14 GB.
+SAMPLES_MAX = 1e8
 # Samples per chunk of a finely sampled motion: 20 MB with three axes.
 CHUNK = 100_000
 
@@ -153,6 +156,11 @@ def _dwells(samples: PathSamples) -> FloatArray:
 
 def _sample_times(end: float, dt: float) -> FloatArray:
     """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
+    if not end / dt <= SAMPLES_MAX:
+        raise InputError(
+            f"the motion takes {end:.6g} s, {end / dt:.3g} periods of {dt:g} s; at most {SAMPLES_MAX:.0e} samples are made: "
+            "raise the machine's dt or split the program"
+        )
     count = int(np.floor(end / dt * (1 + 1e-12)))
     times = np.arange(count + 1) * dt
     if count and end - times[-1] <= 1e-6 * dt:

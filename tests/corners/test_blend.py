@@ -274,11 +274,11 @@ def test_the_product_bound_holds_for_every_accepted_pair():
         BezierCorner(sigma2=2.0)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="X Y <= m^2 also needs a bound of a given sigma1; sigma1 sigma2 <= 3 is enough"
-)
 def test_the_product_bound_holds_for_every_accepted_sigma1():
-    assert_product_bound(BezierCorner(sigma1=20.0, sigma2=1.0), 1.0)
+    assert_product_bound(BezierCorner(sigma1=3.0, sigma2=1.0), 1.0)
+    assert_product_bound(BezierCorner(sigma1=2.0, sigma2=1.5), 1.0)
+    with pytest.raises(InputError, match=r"sigma1 = 20\.0"):
+        BezierCorner(sigma1=20.0, sigma2=1.0)
 
 
 @given(

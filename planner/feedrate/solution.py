@@ -20,7 +20,6 @@ class Status(Enum):
     ACCEPTABLE = "acceptable"  # feasible, and optimal to a coarser tolerance than the one asked for
     INFEASIBLE = "infeasible"
     ITERATION_LIMIT = "iteration limit"
-    TIME_LIMIT = "time limit"
     NUMERICAL_ERROR = "numerical error"
 
 

@@ -1,0 +1,318 @@
+"""The reference solver of the jerk-limited feedrate problem: one nonlinear program per piece, for ipopt or fatrop through casadi.
+
+Every interval of a piece has constant jerk j_i along the path and a duration h_i; every point a feed v_i and an acceleration a_i.
+The kinematics are exact cubics in time, so that a start or a stop (v = a = 0) needs no trick:
+
+    minimise   T = sum_i h_i
+    subject to v_{i+1} = v_i + a_i h_i + j_i h_i^2/2,     a_{i+1} = a_i + j_i h_i
+               ds_i = v_i h_i + a_i h_i^2/2 + j_i h_i^3/6
+               0 <= v_i <= sqrt(feed_sq_max_i),           h_i >= 0
+    and at both ends of every interval (r', r'', r''' of that side; jerk of that interval), for every axis k
+               | r'_k a + r''_k v^2 |                     <= a_k (1 - margin_i)
+               | r'_k j + 3 r''_k v a + r'''_k v^3 |      <= j_k
+               v = sqrt(feed_sq_start), sqrt(feed_sq_end) at the ends; a = 0 where that is rest, free where it is not
+               (a piece that starts in motion continues something whose acceleration the problem does not know).
+
+So that all rows of a point depend on that point alone, as fatrop's stages ask for, the jerk of the interval to its left is a state
+of the point as well. A stage is the state (v, a, j_left), the control (j, h), and the gap  state_{i+1} - f(state_i, control_i) = 0;
+fatrop's interface wants exactly this sign and order (gap rows of a stage, then its other rows), ipopt does not mind.
+
+Not convex, and no certificate of a global optimum; from many starting points both solvers end in the same optimum (tests). Every
+row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed duration 1), so that the iterates do not
+depend on the unit of length or time.
+
+Prices are Lagrange multipliers: with rows scaled by their limit c, |g| <= 1, the optimum obeys dT/dc = -sum |lambda| / c. They hold
+for the given grid: `margin`, which depends a little on the limits, stays. Where two limits coincide (an axis velocity and the programmed
+feed), the first in `bound_names` has the price of loosening both.
+
+Costs 1-4 ms per grid point; building fatrop's interface grows with the square of the points and dominates above some 1500.
+References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023, arXiv 2303.16746 (fatrop).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.reachability import Reachability
+from planner.feedrate.solution import FeedrateSolution, Prices, Status
+
+# The guess is the second-order optimum, everywhere this much slower [-]. Of 0.3 to 1, and of optima at a third or a tenth of the
+# acceleration, the best by iterations (23-41); all of them lead to the same optimum.
+SLOWER = 0.7
+# Largest violation of a scaled row or bound that a solution may have [-].
+VIOLATION_MAX = 1e-6
+# Fewer intervals cannot go from rest to rest: the jerk must be positive, negative and positive again.
+INTERVALS_MIN = 3
+
+OUTCOMES = {
+    "Solve_Succeeded": (Status.OPTIMAL, "time-optimal for the limits with jerk"),
+    "Solved_To_Acceptable_Level": (
+        Status.ACCEPTABLE,
+        "keeps all limits with jerk, but optimal only to a coarser tolerance than asked for",
+    ),
+    "Infeasible_Problem_Detected": (
+        Status.INFEASIBLE,
+        "no motion keeps all limits on this grid; refine it, or change the speeds asked for at the ends",
+    ),
+    "Maximum_Iterations_Exceeded": (
+        Status.ITERATION_LIMIT,
+        "not converged within the iterations allowed; raise max_iterations or loosen tol",
+    ),
+}
+BROKE_DOWN = (
+    Status.NUMERICAL_ERROR,
+    "the solver broke down; solve with the other one (ipopt, fatrop), or look for nearly coincident grid points",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JerkLimitedNLP:
+    """The jerk-limited reference.
+
+    solver         : "ipopt" (with mumps), or "fatrop", which uses the stages: half the time where it converges
+    tol            : relative tolerance of optimality [-]
+    max_iterations : per piece
+    """
+
+    solver: Literal["ipopt", "fatrop"] = "ipopt"
+    tol: float = 1e-8
+    max_iterations: int = 500
+
+    def __post_init__(self) -> None:
+        if self.solver not in ("ipopt", "fatrop"):
+            raise ValueError(f"JerkLimitedNLP.solver: '{self.solver}'; there are ipopt and fatrop")
+        if not self.tol > 0:
+            raise ValueError(f"JerkLimitedNLP.tol: {self.tol} must be positive")
+
+    def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
+        """Time-optimal jerk-limited profile with prices; a failure of any piece is the status of the whole."""
+        began = time.perf_counter()
+        guess = Reachability().solve(problem)
+        if not guess.solved:
+            took = time.perf_counter() - began
+            return FeedrateSolution.failed(problem, guess.status, guess.sentence, repr(self), took)
+        points = len(problem)
+        columns = np.zeros((points, 4))
+        prices = np.zeros((points, 1 + 2 * len(problem.axes)))
+        status, sentence = OUTCOMES["Solve_Succeeded"]
+        iterations = 0
+        for g in range(len(problem.piece) - 1):
+            found = _solve_piece(problem, g, guess, self)
+            iterations = max(iterations, found.iterations)
+            if found.columns is None or found.prices is None:
+                where = f"piece {g} (from s = {problem.s[problem.piece[g]]:.6g} mm): {found.sentence}"
+                took = time.perf_counter() - began
+                return FeedrateSolution.failed(problem, found.status, where, repr(self), took, iterations)
+            if found.status is Status.ACCEPTABLE:
+                status, sentence = found.status, found.sentence
+            here = slice(problem.piece[g], problem.piece[g + 1])
+            columns[here], prices[here] = found.columns, found.prices
+        return FeedrateSolution(
+            status=status,
+            sentence=sentence,
+            solver=repr(self),
+            feed_sq=columns[:, 0] ** 2,
+            acc_s=columns[:, 1],
+            jerk_s=columns[:, 2],
+            duration=columns[:, 3],
+            solve_time=time.perf_counter() - began,
+            iterations=iterations,
+            jerk_limited=True,
+            prices=_sums(problem, prices),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Found:
+    """One piece of n points: v, a, j, h (n, 4) and dT/d(feed_sq_max), then dT/d(ln limit) of acceleration and jerk
+    (n, 1 + 2A); both None on failure."""
+
+    status: Status
+    sentence: str
+    iterations: int
+    columns: FloatArray | None = None
+    prices: FloatArray | None = None
+
+
+def _solve_piece(
+    problem: FeedrateProblem, g: int, guess: FeedrateSolution, settings: JerkLimitedNLP
+) -> _Found:
+    """Transcribe and solve piece g; the whole formulation, from top to bottom."""
+    import casadi as ca
+
+    here = slice(problem.piece[g], problem.piece[g + 1])
+    ds = np.diff(problem.s[here])
+    intervals, axes = len(ds), len(problem.axes)
+    points = intervals + 1
+    v_start, v_end = np.sqrt(problem.feed_sq_start[g]), np.sqrt(problem.feed_sq_end[g])
+    if v_start == 0.0 and v_end == 0.0 and intervals < INTERVALS_MIN:
+        return _Found(
+            status=Status.INFEASIBLE,
+            sentence=f"from rest to rest takes {INTERVALS_MIN} intervals, there are {intervals}; refine the grid",
+            iterations=0,
+        )
+
+    # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
+    h_guess = guess.duration[here][:-1] / SLOWER
+    length, second = ds.mean(), h_guess.mean()
+    speed, acc, jerk = length / second, length / second**2, length / second**3
+
+    # ---- variables: state (v, a, j_left) and control (j, h) of each point; the last has no control ----------------------------
+    w = ca.MX.sym("w", 5 * points - 2)
+    stages = ca.reshape(ca.vertcat(w, ca.DM.zeros(2)), 5, points)
+
+    # ---- objective ------------------------------------------------------------------------------------------------------------
+    total = ca.sum2(stages[4, :])
+
+    # ---- dynamics and constraints of one stage; its numbers are parameters ----------------------------------------------------
+    v, a, j_left, j, h, length_i = (ca.SX.sym(name) for name in ("v", "a", "j_left", "j", "h", "length"))
+    rows_of = [ca.SX.sym("rows", axes, 5) for _ in range(2)]  # right and left of the point
+    following = ca.vertcat(v + h * (a + h * j / 2), a + h * j, j)
+    rows = [h * (v + h * (a / 2 + h * j / 6)) / length_i - 1]
+    for c, own_jerk in zip(rows_of, (j, j_left), strict=True):
+        rows += [c[:, 0] * a + c[:, 1] * v**2, c[:, 2] * own_jerk + c[:, 3] * v * a + c[:, 4] * v**3]
+    numbers = ca.vertcat(length_i, *(ca.vec(c) for c in rows_of))
+    stage = ca.Function("stage", [ca.vertcat(v, a, j_left, j, h), numbers], [following, ca.vertcat(*rows)])
+
+    # ---- constraints of all stages, in stage order: gap, length, rows; the last stage has rows only ---------------------------
+    data = _stage_numbers(problem, here, ds / length, speed, acc, jerk)
+    after, limited = stage.map(points)(stages, ca.DM(data.T))
+    gap = stages[:3, 1:] - after[:, :-1]
+    constraints = ca.vertcat(ca.vec(ca.vertcat(gap, limited[:, :-1])), limited[1:, -1])
+    of_stage = np.repeat([0.0, 1.0], [4, 4 * axes])  # equations, then rows as shares of their limits
+    row_max = np.append(np.tile(of_stage, intervals), of_stage[4:])
+    lower, upper = np.full((points, 5), -np.inf), np.full((points, 5), np.inf)
+    lower[:, 0], upper[:, 0] = 0.0, np.sqrt(problem.feed_sq_max[here]) / speed
+    lower[:, 4] = 0.0
+
+    # ---- boundary -------------------------------------------------------------------------------------------------------------
+    for end, v_there in ((0, v_start), (-1, v_end)):
+        lower[end, 0] = upper[end, 0] = v_there / speed
+        if v_there == 0.0:
+            lower[end, 1] = upper[end, 1] = 0.0
+    lower[0, 2] = upper[0, 2] = 0.0  # nothing to the left of the first point
+
+    # ---- initial guess: the second-order optimum, slower; its acceleration made continuous ------------------------------------
+    start = np.zeros((points, 5))
+    start[:, 0] = np.sqrt(guess.feed_sq[here]) * SLOWER / speed
+    u = guess.acc_s[here][:-1] * SLOWER**2 / acc
+    start[1:-1, 1] = (u[:-1] + u[1:]) / 2
+    start[:-1, 4] = h_guess / second
+    start[:-1, 3] = start[1:, 2] = np.diff(start[:, 1]) / start[:-1, 4]
+
+    # ---- solve ----------------------------------------------------------------------------------------------------------------
+    program = {"x": w, "f": total, "g": constraints}
+    solver = ca.nlpsol(
+        "solver", settings.solver, program, _options(settings, points, row_max == 0.0, 4 * axes + 1)
+    )
+    bounds = {"lbx": lower.ravel()[:-2], "ubx": upper.ravel()[:-2], "lbg": -row_max, "ubg": row_max}
+    result = {
+        name: np.array(value).ravel() for name, value in solver(x0=start.ravel()[:-2], **bounds).items()
+    }
+    status, sentence, iterations = _outcome(solver.stats(), settings)
+    violation = max(
+        (bounds["lbx"] - result["x"]).max(),
+        (result["x"] - bounds["ubx"]).max(),
+        (np.abs(result["g"]) - row_max).max(),
+    )
+    if status in (Status.OPTIMAL, Status.ACCEPTABLE) and not violation <= VIOLATION_MAX:
+        status, sentence = BROKE_DOWN
+    if status not in (Status.OPTIMAL, Status.ACCEPTABLE):
+        return _Found(status=status, sentence=sentence, iterations=iterations)
+
+    # ---- unpack ---------------------------------------------------------------------------------------------------------------
+    found = np.append(result["x"], [0.0, 0.0]).reshape(points, 5)
+    columns = found[:, [0, 1, 3, 4]] * [speed, acc, jerk, second]
+    columns[:, 0] = np.clip(columns[:, 0], 0.0, np.sqrt(problem.feed_sq_max[here]))
+    columns[[0, -1], 0] = v_start, v_end
+    shadow = np.abs(np.insert(result["lam_g"], -4 * axes, np.zeros(4)).reshape(points, 4 + 4 * axes)[:, 4:])
+    shadow = shadow.reshape(points, 2, 2, axes).sum(axis=1).reshape(points, 2 * axes)
+    of_feed = np.append(result["lam_x"], [0.0, 0.0]).reshape(points, 5)[:, 0]
+    of_feed[[0, -1]] = 0.0  # given, not limited
+    of_feed = np.maximum(of_feed, 0.0) / (2.0 * np.sqrt(problem.feed_sq_max[here]) * speed)
+    prices = -second * np.column_stack([of_feed, shadow])
+    return _Found(status=status, sentence=sentence, iterations=iterations, columns=columns, prices=prices)
+
+
+def _stage_numbers(
+    problem: FeedrateProblem, here: slice, ds: FloatArray, speed: float, acc: float, jerk: float
+) -> FloatArray:
+    """(n, 1 + 10 A) what a stage needs to know: its ds, then for the right and the left side the factors of a, v^2 (acceleration)
+    and j, v a, v^3 (jerk), all rows as shares of their limits; 0 on the side where a piece ends."""
+    d1 = problem.d1[here]
+    limit = problem.acceleration * (1.0 - problem.margin[here, None])
+    sides = []
+    for d2, d3, of_interval, outside in (
+        (problem.d2_right[here], problem.d3_right[here], limit, -1),
+        (problem.d2_left[here], problem.d3_left[here], np.roll(limit, 1, axis=0), 0),
+    ):
+        factors = np.stack(
+            [
+                d1 * acc / of_interval,
+                d2 * speed**2 / of_interval,
+                d1 * jerk / problem.jerk,
+                3.0 * d2 * speed * acc / problem.jerk,
+                d3 * speed**3 / problem.jerk,
+            ],
+            axis=1,
+        )
+        factors[outside] = 0.0
+        sides.append(factors.reshape(len(d1), -1))
+    return np.column_stack([np.append(ds, 1.0), *sides])
+
+
+def _options(settings: JerkLimitedNLP, points: int, equality: Array, rows: int) -> dict[str, Any]:
+    """Options of casadi's interface. Fatrop is told the stages: left to find them, it finds wrong ones."""
+    if settings.solver == "ipopt":
+        return {
+            "print_time": False,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "ipopt.mu_strategy": "adaptive",
+            "ipopt.tol": settings.tol,
+            "ipopt.max_iter": settings.max_iterations,
+            "ipopt.acceptable_constr_viol_tol": VIOLATION_MAX,
+        }
+    return {
+        "print_time": False,
+        "structure_detection": "manual",
+        "equality": equality.tolist(),
+        "N": points - 1,
+        "nx": [3] * points,
+        "nu": [2] * (points - 1) + [0],
+        "ng": [rows] * (points - 1) + [rows - 1],
+        "fatrop": {"print_level": 0, "tol": settings.tol, "max_iter": settings.max_iterations},
+    }
+
+
+def _outcome(stats: dict[str, Any], settings: JerkLimitedNLP) -> tuple[Status, str, int]:
+    """Status, sentence and iterations. nlpsol returns numbers whatever happened; only its statistics tell."""
+    iterations = int(stats["iter_count"])
+    if settings.solver == "ipopt":
+        return *OUTCOMES.get(stats["return_status"], BROKE_DOWN), iterations
+    if stats["success"]:
+        return *OUTCOMES["Solve_Succeeded"], iterations
+    if iterations >= settings.max_iterations:  # fatrop has one code for every failure
+        return *OUTCOMES["Maximum_Iterations_Exceeded"], iterations
+    return *BROKE_DOWN, iterations
+
+
+def _sums(problem: FeedrateProblem, prices: FloatArray) -> Prices:
+    """Prices of the limits from those of the rows (P, 1 + 2A); bounds on feed^2 that come from an axis limit count for it."""
+    axes = len(problem.axes)
+    names = np.array(problem.bound_names)[problem.feed_sq_bound]
+    relative = prices[:, 0] * problem.feed_sq_max  # dT / d(ln feed_sq_max)
+    velocity = np.array([2.0 * relative[names == f"velocity.{axis}"].sum() for axis in problem.axes])
+    jump = np.array([relative[names == f"curvature_jump.{axis}"].sum() for axis in problem.axes])
+    return Prices(
+        velocity=velocity / problem.velocity,
+        acceleration=(prices[:, 1 : 1 + axes].sum(axis=0) + jump) / problem.acceleration,
+        jerk=prices[:, 1 + axes :].sum(axis=0) / problem.jerk,
+        feed_sq_max=prices[:, 0],
+    )

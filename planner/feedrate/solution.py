@@ -174,9 +174,10 @@ def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> t
     which = problem.feed_sq_bound.copy()
     inner = np.flatnonzero(problem.interval)
     jerk = solution.jerk_s[inner]
+    gained = jerk * np.where(jerk == 0.0, 0.0, solution.duration[inner])  # a rest of second order lasts for ever
     ends = (
         (inner, u[inner], problem.d2_right, problem.d3_right),
-        (inner + 1, u[inner] + jerk * solution.duration[inner], problem.d2_left, problem.d3_left),
+        (inner + 1, u[inner] + gained, problem.d2_left, problem.d3_left),
     )
     first = len(problem.bound_names)
     for point, acc, d2, d3 in ends:

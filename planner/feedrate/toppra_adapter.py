@@ -1,0 +1,178 @@
+"""The package toppra as a second solver of the same problem: written by others, to compare the own kernel with.
+
+toppra (H. Pham, MIT) solves one linear programme in (u, x) per grid point and pass with Seidel's method. It is given exactly the
+rows of `FeedrateProblem`: for every interval the left and the right end (|a u + b x| <= 1 after division by the limit; see
+reachability.py), declared as "collocation" so that toppra interpolates nothing of its own. Its interpolation scheme would take one
+r'' per point, and a jump of the curvature would be lost.
+
+What toppra 0.6 adds silently, in its own unscaled units, and what it would cost:
+
+    |u|, |x| <= 1e8                    bounds in Seidel's wrapper: a rapid of 10 m/s in mm/s is already at 1e8
+    x_{i+1} lowered by min(1e-8, 1e-4 x_{i+1})   on every forward step: 1e-4 of a small x (metres: every x below 1e-4 m2/s2)
+    x_start up to 1e-5 above reach     is accepted; 3 mm/s from nowhere, in metres
+    x_end above its own bound          is accepted, whatever the limits at the last point
+    objective x - 1e-9 u               instead of x: wrong vertex where 2 h < 1e-9
+    rows within 1e-10 of parallel      are not intersected; rows are met to 1e-10
+    u_i and x_{i+1} - x_i              differ by the lowering above
+    MAXU, MAXX = 1e4                   of constants.py act in other wrappers and in feasible sets, not here
+
+    a walk of 1e10 (normalised by     along a row ends at "infinity", and a row without u (r'_k = 0) walks so far: the pass fails as
+    the row) from the origin           "uncontrollable"; four of our six jobs did until u was given bounds of its own
+
+All of these are absolute, so the adapter chooses the units: the largest u is about 1 and the largest x about `FEED_SQ_SCALE`, so
+large that a slack of 1e-8 is 1e-14 of it and yet far from 1e8. The units are powers of two: scaling rounds nothing. What remains
+of the lowering is 1e-14 of the largest x per point, and u is toppra's own, which keeps the rows. Measured on 200 random problems
+against the own kernel: cycle times differ by 1e-5 at worst (pieces with stretches at crawling speed) and rows are exceeded by
+1e-10; with the largest x at 1 instead, by 1.2e-2 and 1e-4.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.solution import FeedrateSolution, Status
+
+# Largest x in toppra's eyes [-]: 1e-8 must be small against it, and it must be small against 1e8 (module text).
+FEED_SQ_SCALE = 1e6
+# The limit in every row [-]: the geometric mean of 1 and `FEED_SQ_SCALE`, so that neither the coefficients of u nor those of x are
+# near the 1e-10 at which rows count as parallel.
+ROW_SCALE = 1e3
+# Relative slack under which an end speed counts as allowed: rounding, as in the own kernel [-].
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToppraSolver:
+    """toppra's TOPPRA with Seidel's solver; it has no settings."""
+
+    def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
+        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is reachable."""
+        toppra = _import_toppra()
+        began = time.perf_counter()
+        x, u = np.empty(len(problem)), np.zeros(len(problem))
+        with _silent(logging.getLogger("toppra")):
+            for g in range(len(problem.piece) - 1):
+                first, last = problem.piece[g], problem.piece[g + 1] - 1
+                failure = _solve_piece(toppra, problem, g, x[first : last + 1], u[first:last])
+                if failure is not None:
+                    status, reason = failure
+                    sentence = f"piece {g} (from s = {problem.s[first]:.6g} mm): {reason}"
+                    return FeedrateSolution.failed(
+                        problem, status, sentence, repr(self), time.perf_counter() - began
+                    )
+        return FeedrateSolution.second_order(
+            problem,
+            feed_sq=x,
+            acc_s=u,
+            sentence="time-optimal for the second-order limits",
+            solver=repr(self),
+            solve_time=time.perf_counter() - began,
+        )
+
+
+def _solve_piece(
+    toppra: Any, problem: FeedrateProblem, g: int, x: FloatArray, u: FloatArray
+) -> tuple[Status, str] | None:
+    """Solve piece g into x (n+1,) and u (n,); on failure the status, and why with a remedy."""
+    unreachable = (
+        Status.INFEASIBLE,
+        "the speeds at its ends cannot be joined within the limits; lower them or loosen the limits",
+    )
+    x_start, x_end = problem.feed_sq_start[g], problem.feed_sq_end[g]
+    last = problem.piece[g + 1] - 1
+    if x_end > problem.feed_sq_max[last] * (1.0 + ROUNDING):
+        return unreachable
+    length, time_unit = _units(problem, g)
+    feed = length / time_unit
+    grid, rows = _rows(problem, g, length, time_unit)
+    constraint = toppra.constraint.LinearConstraint()
+    constraint.identical = True
+    constraint.compute_constraint_params = lambda *_: rows
+    path = SimpleNamespace(path_interval=grid[[0, -1]], duration=grid[-1], dof=problem.d1.shape[1])
+    algorithm = toppra.algorithm.TOPPRA([constraint], path, gridpoints=grid, solver_wrapper="seidel")
+    algorithm.compute_parameterization(math.sqrt(x_start) / feed, math.sqrt(x_end) / feed)
+    data = algorithm.problem_data
+    codes = toppra.algorithm.algorithm.ParameterizationReturnCode
+    if data.return_code == codes.FailUncontrollable and max(x_start, x_end) > 0.0:
+        return unreachable
+    if data.return_code != codes.Ok or not (
+        np.isfinite(data.sd_vec).all() and np.isfinite(data.sdd_vec).all()
+    ):
+        return (
+            Status.NUMERICAL_ERROR,
+            f"toppra ended with {data.return_code.name}; use the solver Reachability",
+        )
+    x[:] = (data.sd_vec * feed) ** 2
+    u[:] = data.sdd_vec * (length / time_unit**2)
+    return None
+
+
+def _units(problem: FeedrateProblem, g: int) -> tuple[float, float]:
+    """Units of length [mm] and time [s], powers of two, in which the largest u of piece g is about 1 and the largest x about
+    `FEED_SQ_SCALE`."""
+    first, last = problem.piece[g], problem.piece[g + 1] - 1
+    along = np.abs(problem.d1[first : last + 1]) / problem.acceleration
+    u_max = float((1.0 / along.max(axis=1)).max())
+    ends = max(problem.feed_sq_start[g], problem.feed_sq_end[g])
+    reachable = u_max * (problem.s[last] - problem.s[first]) + ends
+    x_max = float(min(problem.feed_sq_max[first : last + 1].max(), reachable))
+    length = x_max / (u_max * FEED_SQ_SCALE)
+    return 2.0 ** round(math.log2(length)), 2.0 ** round(0.5 * math.log2(length / u_max))
+
+
+def _rows(
+    problem: FeedrateProblem, g: int, length: float, time_unit: float
+) -> tuple[FloatArray, tuple[FloatArray | None, ...]]:
+    """Grid (n+1,) of piece g and toppra's parameters (a, b, c, F, g, bounds of u, bounds of x) in the given units."""
+    points = slice(problem.piece[g], problem.piece[g + 1])
+    d1, d2_left, d2_right = problem.d1[points], problem.d2_left[points], problem.d2_right[points]
+    size, axes = d1.shape
+    step = np.diff(problem.s[points])[:, None]
+    limit = problem.acceleration * (1.0 - problem.margin[points][:-1, None])
+    a, b = np.zeros((size, 2 * axes)), np.zeros((size, 2 * axes))  # no rows at the last point
+    a[:-1, :axes], b[:-1, :axes] = d1[:-1] / limit, d2_right[:-1] / limit
+    a[:-1, axes:], b[:-1, axes:] = (d1[1:] + 2.0 * step * d2_left[1:]) / limit, d2_left[1:] / limit
+    feed_sq, acc = (length / time_unit) ** 2, length / time_unit**2
+    x_max = problem.feed_sq_max[points] / feed_sq
+    a, b = a * (ROW_SCALE * acc), b * (ROW_SCALE * feed_sq)
+    both = np.vstack([np.eye(2 * axes), -np.eye(2 * axes)])
+    # Bounds of u that the rows imply, twice over: without them Seidel's walk along a row with a = 0 ends at its own "infinity".
+    with np.errstate(divide="ignore"):
+        u_max = 2.0 * ((ROW_SCALE + np.abs(b) * x_max[:, None]) / np.abs(a)).min(axis=1)
+    u_bounds = np.stack([-u_max, u_max], axis=1)
+    x_bounds = np.stack([np.zeros(size), x_max], axis=1)
+    rows = (a, b, np.zeros_like(a), both, np.full(len(both), ROW_SCALE), u_bounds, x_bounds)
+    return problem.s[points] / length, rows
+
+
+def _import_toppra() -> Any:
+    """The package, imported when it is first needed: 0.9 s, because it loads pyplot."""
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore"
+        )  # its sources hold escapes that newer Pythons warn of when they compile them
+        import toppra
+    return toppra
+
+
+@contextmanager
+def _silent(logger: logging.Logger) -> Iterator[None]:
+    """Mute a logger for a while: what toppra warns of is in the status."""
+    was = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(was)

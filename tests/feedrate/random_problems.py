@@ -1,0 +1,163 @@
+"""Feedrate problems made directly as arrays, for tests of the solvers alone."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from planner.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+
+AXES = "xyzabc"
+
+
+def make_problem(
+    s: ArrayLike,
+    d1: ArrayLike,
+    d2_left: ArrayLike,
+    d2_right: ArrayLike | None = None,
+    *,
+    feed_sq_max: ArrayLike = 1e4,
+    acceleration: ArrayLike = 2e3,
+    piece: ArrayLike | None = None,
+    **fields: Any,
+) -> FeedrateProblem:
+    """A problem of one piece, with what second-order solvers do not read filled in."""
+    d1, d2_left = np.asarray(d1, dtype=float), np.asarray(d2_left, dtype=float)
+    points, axes = d1.shape
+    piece = np.array([0, points]) if piece is None else np.asarray(piece)
+    values: dict[str, Any] = {
+        "piece": piece,
+        "s": np.asarray(s, dtype=float),
+        "axes": tuple(AXES[:axes]),
+        "d1": d1,
+        "d2_left": d2_left,
+        "d2_right": d2_left if d2_right is None else d2_right,
+        "d3_left": np.zeros_like(d1),
+        "d3_right": np.zeros_like(d1),
+        "velocity": np.full(axes, 1e3),
+        "acceleration": np.broadcast_to(np.asarray(acceleration, dtype=float), (axes,)).copy(),
+        "jerk": np.full(axes, 1e6),
+        "feed_sq_max": np.broadcast_to(np.asarray(feed_sq_max, dtype=float), (points,)).copy(),
+        "feed_sq_bound": np.zeros(points, dtype=int),
+        "bound_names": ("feed",),
+        "margin": np.zeros(points),
+        "feed_sq_start": np.zeros(len(piece) - 1),
+        "feed_sq_end": np.zeros(len(piece) - 1),
+    }
+    return FeedrateProblem(**(values | fields))
+
+
+def line(
+    length: float, points: int = 2, *, start: float = 0.0, direction: ArrayLike = (1.0, 0.0), **fields: Any
+) -> FeedrateProblem:
+    """A straight line on a uniform grid."""
+    unit = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    d1 = np.tile(unit, (points, 1))
+    return make_problem(start + np.linspace(0.0, length, points), d1, np.zeros_like(d1), **fields)
+
+
+def circle(radius: float, turn: float, points: int, **fields: Any) -> FeedrateProblem:
+    """An arc of `turn` [rad]."""
+    angle = np.linspace(0.0, turn, points)
+    d1 = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+    d2 = np.stack([-np.cos(angle), -np.sin(angle)], axis=1) / radius
+    return make_problem(radius * angle, d1, d2, **fields)
+
+
+def random_curve(
+    rng: np.random.Generator, points: int, axes: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Arc length (n,), r' and r'' (n, axes) of a random trigonometric curve on an uneven grid, a few mm to a metre long."""
+    waves = 4
+    size = rng.normal(size=(waves, axes)) / np.arange(1, waves + 1)[:, None]
+    phase = rng.uniform(0.0, 2 * np.pi, (waves, axes))
+    turns = np.arange(1, waves + 1)[:, None] * rng.uniform(0.5, 2.0)
+    t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.8, points - 1))])
+    t *= rng.uniform(1.0, 4.0) / t[-1]
+    angle = turns * t[:, None, None] + phase
+    by_t = (size * turns * np.cos(angle)).sum(axis=1)
+    by_tt = -(size * turns**2 * np.sin(angle)).sum(axis=1)
+    scale = 10.0 ** rng.uniform(0.5, 2.5)
+    speed = np.linalg.norm(by_t, axis=1, keepdims=True)
+    d1 = by_t / speed
+    d2 = (by_tt - (by_tt * d1).sum(axis=1, keepdims=True) * d1) / speed**2 / scale
+    step = np.diff(t) * 0.5 * (speed[1:, 0] + speed[:-1, 0]) * scale
+    return np.concatenate([[0.0], np.cumsum(step)]), d1, d2
+
+
+def random_problem(seed: int) -> FeedrateProblem:
+    """Seeded problem in 2, 3 or 6 dimensions: several pieces, jumps of the curvature and of the feed, margins; in every second
+    one non-zero speeds at the ends (which not every problem can join)."""
+    rng = np.random.default_rng([20, seed])
+    axes = (2, 3, 6)[seed % 3]
+    counts = rng.integers(2, 120, rng.integers(1, 5))
+    parts = [random_curve(rng, max(int(count), 2), axes) for count in counts]
+    s = np.concatenate([part[0] for part in parts])
+    piece = np.concatenate([[0], np.cumsum(counts)])
+    for k in range(1, len(counts)):
+        s[piece[k] : piece[k + 1]] += s[piece[k] - 1]
+    d1, d2 = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    points = len(s)
+    # Stretches with a curvature of their own: r'' jumps between them.
+    factor = np.repeat(rng.uniform(0.0, 2.0, points), 1 + rng.integers(0, 60, points))[: points + 1]
+    feed = np.repeat(rng.uniform(10.0, 200.0, points), 1 + rng.integers(0, 100, points))[:points]
+    feed_sq_max = feed**2 * rng.uniform(0.5, 1.0, points)
+    acceleration = 10.0 ** rng.uniform(2.5, 4.0, axes)
+    room = np.minimum(feed_sq_max, 1.0 / (np.abs(d2) / acceleration).max(axis=1))
+    share = rng.uniform(0.0, 0.3, (2, len(counts))) * (seed % 2)
+    return make_problem(
+        s,
+        d1,
+        d2 * factor[:-1, None],
+        d2 * factor[1:, None],
+        feed_sq_max=feed_sq_max,
+        acceleration=acceleration,
+        piece=piece,
+        margin=rng.uniform(0.0, 0.02, points),
+        feed_sq_start=share[0] * room[piece[:-1]],
+        feed_sq_end=share[1] * room[piece[1:] - 1],
+    )
+
+
+def reversed_problem(problem: FeedrateProblem) -> FeedrateProblem:
+    """The same path run backwards."""
+    points = len(problem)
+    margin = np.zeros(points)
+    inner = np.flatnonzero(problem.interval)
+    margin[points - 2 - inner] = problem.margin[inner]
+    return dataclasses.replace(
+        problem,
+        piece=points - problem.piece[::-1],
+        s=problem.s[-1] - problem.s[::-1],
+        d1=-problem.d1[::-1],
+        d2_left=problem.d2_right[::-1],
+        d2_right=problem.d2_left[::-1],
+        feed_sq_max=problem.feed_sq_max[::-1],
+        feed_sq_bound=problem.feed_sq_bound[::-1],
+        margin=margin,
+        feed_sq_start=problem.feed_sq_end[::-1],
+        feed_sq_end=problem.feed_sq_start[::-1],
+    )
+
+
+def in_units(problem: FeedrateProblem, length: float, time: float = 1.0) -> FeedrateProblem:
+    """The same problem with lengths and times multiplied: `length` 1e-3 gives metres instead of millimetres."""
+    feed_sq = (length / time) ** 2
+    return dataclasses.replace(
+        problem,
+        s=problem.s * length,
+        d2_left=problem.d2_left / length,
+        d2_right=problem.d2_right / length,
+        d3_left=problem.d3_left / length**2,
+        d3_right=problem.d3_right / length**2,
+        velocity=problem.velocity * (length / time),
+        acceleration=problem.acceleration * (length / time**2),
+        jerk=problem.jerk * (length / time**3),
+        feed_sq_max=problem.feed_sq_max * feed_sq,
+        feed_sq_start=problem.feed_sq_start * feed_sq,
+        feed_sq_end=problem.feed_sq_end * feed_sq,
+    )

@@ -1,4 +1,4 @@
-"""Grid points where a second-order profile switches on straight stretches.
+"""Grid points on straight stretches: where a second-order profile switches, and what a jerk-limited one needs.
 
 Between rest and feed, or between two corners, a straight stretch is one interval; its end speeds are already exact, because the
 limits do not change along it. Inside it the optimum accelerates at the largest rate b, holds the speed limit, decelerates at b:
@@ -7,21 +7,37 @@ limits do not change along it. Inside it the optimum accelerates at the largest 
     limit x_c reached:     two,         sigma = (x_c - x0)/(2 b)  and  L - (x_c - x1)/(2 b)
 
 With these points added the profile on the grid *is* the optimum, however long the stretch.
+
+A jerk-limited profile rounds the switches off: on a stretch of length L, with limits a and j along it, in about
+
+    tau = min(a/j, (L / (16 j))^(1/3)),
+
+which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in all). The second-order
+profile with the acceleration j tau tells when and where things happen; between its events the points are spread in time, every
+`STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
+So a stretch from rest to rest takes some 20 points if it is short, and each tenfold length of cruise only a few more.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from planner.arrays import Array
-from planner.constraints.assemble import interval_feed_sq_max
+from planner.arrays import Array, FloatArray
+from planner.constraints.assemble import feedrate_problem, interval_feed_sq_max
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 from planner.path import PathSamples, insert_points
 
 # Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit.
 SWITCH_MIN = 1e-9
+
+# Spacing of points for jerk-limited profiles (module text) [tau].
+STEP = 0.5
+NEAR = 2.0
 
 
 def add_switching_points(
@@ -45,6 +61,59 @@ def add_switching_points(
     real[:, 1] &= places[:, 1] - places[:, 0] > SWITCH_MIN * length
     row, _ = np.nonzero(real)
     return insert_points(samples, interval[row], places[real])
+
+
+def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) -> PathSamples:
+    """Split the straight intervals of freshly sampled paths for a jerk-limited solver.
+
+    finer : divides the spacing of the points, for convergence studies [-]
+
+    Raises NotSolvedError where even the second-order problem has no solution.
+    """
+    axes = samples.path.toolpath.axes
+    straight = _straight(samples)
+    along = np.abs(samples.d1[straight])
+    a = 1.0 / (along / machine.limits("acceleration", axes)).max(axis=1)
+    j = 1.0 / (along / machine.limits("jerk", axes)).max(axis=1)
+    length = samples.s[straight + 1] - samples.s[straight]
+    tau = np.zeros(len(samples))
+    tau[straight] = np.minimum(a / j, np.cbrt(length / (16.0 * j)))
+    margin = samples.margin.copy()
+    margin[straight] = 1.0 - tau[straight] * j / a  # leaves the acceleration j tau
+    model = replace(samples, margin=margin)
+    problem = feedrate_problem(model, machine)
+    model = add_switching_points(model, problem, Reachability().solve(problem), machine)
+    problem = feedrate_problem(model, machine)
+    solution = Reachability().solve(problem).require()
+    interval = _straight(model)
+    parent = np.searchsorted(samples.s[straight], model.s[interval], side="right") - 1
+    tau_here = tau[straight][parent]
+    row, t = _spread(solution.duration[interval] / tau_here, finer)
+    at, t = interval[row], t * tau_here[row]
+    s = model.s[at] + t * (np.sqrt(solution.feed_sq[at]) + 0.5 * solution.acc_s[at] * t)
+    inside = (s > model.s[at]) & (
+        s < model.s[at + 1]
+    )  # rounding may put points of tiny intervals on their ends
+    inside[1:] &= (np.diff(s) > 0) | (np.diff(at) > 0)
+    margin = model.margin.copy()
+    margin[interval] = 0.0  # straight: nothing to interpolate
+    return insert_points(replace(model, margin=margin), at[inside], s[inside])
+
+
+def _spread(whole: FloatArray, finer: float) -> tuple[Array, FloatArray]:
+    """Points inside intervals of durations `whole` (n,) [tau], graded towards both ends: their interval and time, ascending."""
+    step = STEP / finer
+    half = whole / 2.0
+    most = np.where(half <= NEAR, half, NEAR * (1.0 + np.log(np.maximum(half, NEAR) / NEAR))) / step
+    steps = np.where(whole > step, np.ceil(most), 0).astype(np.int64)  # from each end to the middle
+    count = np.maximum(2 * steps - 1, 0)
+    row = np.repeat(np.arange(len(whole)), count)
+    k = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1
+    steps, most = steps[row], most[row]
+    from_left = k <= steps
+    x = step * np.where(from_left, k, 2 * steps - k) * most / steps
+    near = np.where(x <= NEAR, x, NEAR * np.exp(np.maximum(x / NEAR - 1.0, 0.0)))
+    return row, np.where(from_left, near, whole[row] - near)
 
 
 def _straight(samples: PathSamples) -> Array:

@@ -76,6 +76,8 @@ class FeedrateProblem:
         for name in ("velocity", "acceleration", "jerk", "feed_sq_max"):
             if not (getattr(self, name) > 0).all():
                 raise ValueError(f"FeedrateProblem.{name}: every value must be positive")
+        if not ((self.margin >= 0) & (self.margin < 1)).all():
+            raise ValueError("FeedrateProblem.margin: every value must be in [0, 1); refine the grid")
         step = np.diff(self.s)
         inner = np.ones(len(step), dtype=bool)
         inner[self.piece[1:-1] - 1] = False

@@ -68,25 +68,31 @@ def circle(radius: float, turn: float, points: int, **fields: Any) -> FeedratePr
     return make_problem(radius * angle, d1, d2, **fields)
 
 
-def random_curve(
-    rng: np.random.Generator, points: int, axes: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Arc length (n,), r' and r'' (n, axes) of a random trigonometric curve on an uneven grid, a few mm to a metre long."""
-    waves = 4
-    size = rng.normal(size=(waves, axes)) / np.arange(1, waves + 1)[:, None]
-    phase = rng.uniform(0.0, 2 * np.pi, (waves, axes))
-    turns = np.arange(1, waves + 1)[:, None] * rng.uniform(0.5, 2.0)
-    t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.8, points - 1))])
-    t *= rng.uniform(1.0, 4.0) / t[-1]
-    angle = turns * t[:, None, None] + phase
-    by_t = (size * turns * np.cos(angle)).sum(axis=1)
-    by_tt = -(size * turns**2 * np.sin(angle)).sum(axis=1)
-    scale = 10.0 ** rng.uniform(0.5, 2.5)
-    speed = np.linalg.norm(by_t, axis=1, keepdims=True)
-    d1 = by_t / speed
-    d2 = (by_tt - (by_tt * d1).sum(axis=1, keepdims=True) * d1) / speed**2 / scale
-    step = np.diff(t) * 0.5 * (speed[1:, 0] + speed[:-1, 0]) * scale
-    return np.concatenate([[0.0], np.cumsum(step)]), d1, d2
+def random_curve(rng: np.random.Generator, points: int, axes: int) -> tuple[FloatArray, ...]:
+    """Arc length (n,), r' and r'' before and after each point (n, axes) of a curve of n - 1 circular arcs that turn by up to 0.1
+    rad each, in planes that drift, with a jump of the curvature now and then; a few mm to a metre long."""
+    size = 10.0 ** rng.uniform(-1.0, 1.0)  # typical step [mm]
+    step = size * rng.uniform(0.2, 1.8, points - 1)
+    tangent = rng.normal(size=axes)
+    tangent /= np.linalg.norm(tangent)
+    bend = np.zeros(axes)
+    d1, d2_left, d2_right = (np.zeros((points, axes)) for _ in range(3))
+    d1[0] = tangent
+    for i in range(points - 1):
+        jump = rng.uniform() < 0.03
+        bend = (0.0 if jump else 0.97) * bend + (0.04 if jump else 0.006) / size * rng.normal(size=axes)
+        bend -= (bend @ tangent) * tangent
+        kappa = np.linalg.norm(bend)
+        normal, angle = bend / kappa, kappa * step[i]
+        d2_right[i] = bend
+        tangent, normal = (
+            np.cos(angle) * tangent + np.sin(angle) * normal,
+            np.cos(angle) * normal - np.sin(angle) * tangent,
+        )
+        bend = kappa * normal
+        d1[i + 1], d2_left[i + 1] = tangent, bend
+    d2_left[0], d2_right[-1] = d2_right[0], d2_left[-1]
+    return np.concatenate([[0.0], np.cumsum(step)]), d1, d2_left, d2_right
 
 
 def random_problem(seed: int) -> FeedrateProblem:
@@ -94,26 +100,24 @@ def random_problem(seed: int) -> FeedrateProblem:
     one non-zero speeds at the ends (which not every problem can join)."""
     rng = np.random.default_rng([20, seed])
     axes = (2, 3, 6)[seed % 3]
-    counts = rng.integers(2, 120, rng.integers(1, 5))
-    parts = [random_curve(rng, max(int(count), 2), axes) for count in counts]
-    s = np.concatenate([part[0] for part in parts])
+    counts = rng.integers(3, 200, rng.integers(1, 4))
+    parts = [random_curve(rng, count, axes) for count in counts]
     piece = np.concatenate([[0], np.cumsum(counts)])
+    s, d1, d2_left, d2_right = (np.concatenate([part[k] for part in parts]) for k in range(4))
     for k in range(1, len(counts)):
         s[piece[k] : piece[k + 1]] += s[piece[k] - 1]
-    d1, d2 = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     points = len(s)
-    # Stretches with a curvature of their own: r'' jumps between them.
-    factor = np.repeat(rng.uniform(0.0, 2.0, points), 1 + rng.integers(0, 60, points))[: points + 1]
-    feed = np.repeat(rng.uniform(10.0, 200.0, points), 1 + rng.integers(0, 100, points))[:points]
-    feed_sq_max = feed**2 * rng.uniform(0.5, 1.0, points)
-    acceleration = 10.0 ** rng.uniform(2.5, 4.0, axes)
-    room = np.minimum(feed_sq_max, 1.0 / (np.abs(d2) / acceleration).max(axis=1))
+    acceleration = 10.0 ** rng.uniform(3.0, 4.0, axes)
+    feed = np.repeat(rng.uniform(20.0, 200.0, points), 1 + rng.integers(0, 100, points))[:points]
+    jump = (np.abs(d2_right - d2_left) / acceleration).max(axis=1)
+    feed_sq_max = np.minimum(feed**2, 1.0 / np.maximum(jump, 1e-12))
+    room = np.minimum(feed_sq_max, 1.0 / (np.abs(d2_left) / acceleration).max(axis=1))
     share = rng.uniform(0.0, 0.3, (2, len(counts))) * (seed % 2)
     return make_problem(
         s,
         d1,
-        d2 * factor[:-1, None],
-        d2 * factor[1:, None],
+        d2_left,
+        d2_right,
         feed_sq_max=feed_sq_max,
         acceleration=acceleration,
         piece=piece,

@@ -15,7 +15,7 @@ A jerk-limited profile rounds the switches off: on a stretch of length L, with l
 which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in all). The second-order
 profile with the acceleration j tau tells when and where things happen; between its events the points are spread in time, every
 `STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
-So a stretch from rest to rest takes some 20 points if it is short, and each tenfold length of cruise only a few more.
+So a stretch from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ from planner.path import PathSamples, insert_points
 # Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit.
 SWITCH_MIN = 1e-9
 
-# Spacing of points for jerk-limited profiles (module text) [tau].
-STEP = 0.5
-NEAR = 2.0
+# Spacing of points for jerk-limited profiles (module text) [tau]; lines, pentagon and zigzag at jerks 2e4 to 2e6 are within 0.15 %
+# of a grid four times finer, with STEP 0.5 and NEAR 2 within 0.8 %, at the same number of points on long lines.
+STEP = 0.25
+NEAR = 1.0
 
 
 def add_switching_points(
@@ -79,7 +80,7 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
     tau = np.zeros(len(samples))
     tau[straight] = np.minimum(a / j, np.cbrt(length / (16.0 * j)))
     margin = samples.margin.copy()
-    margin[straight] = 1.0 - tau[straight] * j / a  # leaves the acceleration j tau
+    margin[straight] = np.maximum(1.0 - tau[straight] * j / a, 0.0)  # leaves the acceleration j tau
     model = replace(samples, margin=margin)
     problem = feedrate_problem(model, machine)
     model = add_switching_points(model, problem, Reachability().solve(problem), machine)

@@ -303,7 +303,7 @@ def _options(settings: JerkLimitedNLP, points: int, equality: Array, rows: int) 
         "N": points - 1,
         "nx": [3] * points,
         "nu": [2] * (points - 1) + [0],
-        "ng": [rows] * (points - 1) + [rows - 1],
+        "ng": [rows] * (points - 1) + [rows - 2],
         "fatrop": {"print_level": 0, "tol": settings.tol, "max_iter": settings.max_iterations},
     }
 

@@ -125,10 +125,15 @@ def _largest(i, x_max, h, d1, d2_left, d2_right, limit, scale, target):
     """Largest x <= x_max on interval i from which some u leads to x_{i+1} in [0, target]."""
     parallel = _parallel(i, x_max, h, d1, d2_right, limit, scale, target)
     x = x_max
-    for k in range(d1.shape[1]):  # rows without u bound x alone
+    for k in range(d1.shape[1]):
         c = limit[k] * scale
-        if abs(d1[i, k]) <= parallel * c:
-            x = min(x, c / abs(d2_right[i, k]))
+        a, b = abs(d1[i, k]), abs(d2_right[i, k])
+        if a <= parallel * c:  # rows without u bound x alone
+            x = min(x, c / b)
+        elif a > 2.0 * h * b:
+            # x <= target + 2 h |u| and a |u| <= c + b x. Newton would get there, but from an x_max far above, where the last digits of
+            # x_max drown the result.
+            x = min(x, (target * a + 2.0 * h * c) / (a - 2.0 * h * b))
         b = d2_left[i + 1, k]
         if abs(d1[i + 1, k] + 2.0 * h * b) <= parallel * c:
             x = min(x, c / abs(b))

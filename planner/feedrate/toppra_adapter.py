@@ -15,15 +15,14 @@ What toppra 0.6 adds silently, in its own unscaled units, and what it would cost
     rows within 1e-10 of parallel      are not intersected; rows are met to 1e-10
     u_i and x_{i+1} - x_i              differ by the lowering above
     MAXU, MAXX = 1e4                   of constants.py act in other wrappers and in feasible sets, not here
-
     a walk of 1e10 (normalised by     along a row ends at "infinity", and a row without u (r'_k = 0) walks so far: the pass fails as
     the row) from the origin           "uncontrollable"; four of our six jobs did until u was given bounds of its own
 
 All of these are absolute, so the adapter chooses the units: the largest u is about 1 and the largest x about `FEED_SQ_SCALE`, so
 large that a slack of 1e-8 is 1e-14 of it and yet far from 1e8. The units are powers of two: scaling rounds nothing. What remains
 of the lowering is 1e-14 of the largest x per point, and u is toppra's own, which keeps the rows.
-Measured on the 200 random problems of the tests against the own kernel: cycle times differ by 3e-8, feeds by 2e-7 at worst; with the largest x at 1
-instead by 3e-5 and 2e-4. On real paths 1e-12.
+Measured on the 200 random problems of the tests against the own kernel: cycle times differ by 3e-8, feeds by 2e-7 at worst; with
+the largest x at 1 instead by 3e-5 and 2e-4. On real paths 1e-12.
 """
 
 from __future__ import annotations

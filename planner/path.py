@@ -7,7 +7,9 @@ length h, fastest x and largest u that the limits allow there)
     e_k = x |r''_mid - (r''_0 + r''_1)/2|  +  u h |r''_1 - r''_0|/2  +  u |r'_mid - (r'_0 + r'_1)/2|        per axis k
 
 (the second term comes from the product of two linear functions). An interval is halved until max_k e_k / a_k is below
-`RESOLUTION`; what remains is kept per interval as `margin`, and the constraints are tightened by it, so that they hold between
+`RESOLUTION`; for solvers of third order the error of the axis jerk at constant speed, relative to its limit, may be `JERK_SHARE`
+times as large, and x is bounded by the jerk limits as well. What remains is kept per interval as `margin`, and the constraints are
+tightened by it, so that they hold between
 grid points and not only at them. Straight stretches need one interval: there g is exactly linear.
 
 Limits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
@@ -42,12 +44,20 @@ from planner.machine import Machine
 RESOLUTION = 2e-3
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
 MARGIN_SAFETY = 1.25
+# The jerk between grid points may be off by so many times `resolution` [-]: 1 %, made good by slowing down (methods/optimal.py).
+JERK_SHARE = 5.0
 # Halvings of one interval at most; 2^-20 of a corner is below a nanometre.
 HALVINGS_MAX = 20
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
 ARC_STEP = np.pi / 8
 # ... and with so many at least, so that a short arc between two stops can start and stop.
 ARC_PARTS_MIN = 4
+# For solvers of third order an interval on an arc lasts at most this share of a/j, the time an axis needs for its acceleration [-].
+ARC_PERIOD = 0.5
+# ... and the first interval after a full stop is what the jerk makes of this share of a/j; from there intervals may be this share
+# of their distance from the stop [-].
+REST_PERIOD = 0.25
+REST_GROWTH = 0.5
 # Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
 FREE_PART_MIN = 1e-9
 
@@ -112,16 +122,25 @@ class PathSamples:
         return np.flatnonzero(inner)
 
 
-def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTION) -> PathSamples:
+def sample_path(
+    path: SmoothPath, machine: Machine, resolution: float = RESOLUTION, *, third_order: bool = False
+) -> PathSamples:
     """Sample a smooth path on an adaptive grid.
 
-    resolution : interpolation error allowed between grid points [share of the acceleration limits]
+    resolution  : interpolation error allowed between grid points [share of the acceleration limits]
+    third_order : the grid is for a solver with jerk limits
 
     Raises InputError if the machine lacks an axis of the path.
     """
     axes = path.toolpath.axes
     table = element_table(path)
     velocity, acceleration = machine.limits("velocity", axes), machine.limits("acceleration", axes)
+    jerk, longest, shortest = np.full(len(axes), np.inf), np.inf, np.inf
+    if third_order:
+        jerk = machine.limits("jerk", axes)
+        delay = float((acceleration / jerk).min())
+        longest = ARC_PERIOD * delay
+        shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
     if machine.normal_acceleration is not None:
         acceleration = np.minimum(acceleration, machine.normal_acceleration)
     element, w0, w1, segment, last = _grid(
@@ -136,14 +155,17 @@ def sample_path(path: SmoothPath, machine: Machine, resolution: float = RESOLUTI
         path.toolpath.feed,
         velocity,
         acceleration,
+        jerk,
         resolution,
+        longest,
+        shortest,
     )
     ends = np.flatnonzero(last)  # the points that close a piece
     piece = np.concatenate([[0], ends + 1])
     stop = np.flatnonzero(path.joint == Joint.STOP)
     feed = path.toolpath.feed
     columns = _evaluate(
-        table.legs, table.corners, element, w0, w1, segment, last, feed, velocity, acceleration
+        table.legs, table.corners, element, w0, w1, segment, last, feed, velocity, acceleration, jerk
     )
     names = (
         "s",
@@ -232,7 +254,7 @@ def _corner_breaks(path: SmoothPath) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _interval_error(points, x, u, h, acceleration):
+def _interval_error(points, x, u, h, acceleration, jerk):
     """max_k e_k / a_k of the module's text, from arc-length derivatives (3, 4, A) at left end, middle and right end."""
     worst = 0.0
     for k in range(points.shape[2]):
@@ -240,17 +262,18 @@ def _interval_error(points, x, u, h, acceleration):
         curve = x * abs(mid - 0.5 * (left + right))
         product = 0.5 * u * h * abs(right - left)
         turn = u * abs(points[1, 1, k] - 0.5 * (points[0, 1, k] + points[2, 1, k]))
-        worst = max(worst, (curve + product + turn) / acceleration[k])
+        bend = x * np.sqrt(x) * abs(points[1, 3, k] - 0.5 * (points[0, 3, k] + points[2, 3, k]))
+        worst = max(worst, (curve + product + turn) / acceleration[k], bend / (JERK_SHARE * jerk[k]))
     return worst
 
 
 @njit(cache=True, error_model="numpy")
-def _fastest(point, feed, velocity, acceleration):
+def _fastest(point, feed, velocity, acceleration, jerk):
     """Bounds (x, u) of feed^2 and of the acceleration along the path that the limits allow at a point (4, A)."""
     feed_max = feed
     u = 0.0
     normal = 0.0
-    kappa_sq = 0.0
+    kappa_sq, slope_sq, a_sq, j_sq = 0.0, 0.0, 0.0, 0.0
     for k in range(point.shape[1]):
         along = abs(point[1, k])
         if along * feed_max > velocity[k]:
@@ -258,14 +281,21 @@ def _fastest(point, feed, velocity, acceleration):
         u += along * acceleration[k]
         normal += abs(point[2, k]) * acceleration[k]
         kappa_sq += point[2, k] * point[2, k]
+        slope_sq += point[3, k] * point[3, k]
+        a_sq += acceleration[k] * acceleration[k]
+        j_sq += jerk[k] * jerk[k]
     x = feed_max * feed_max
-    if normal < x * kappa_sq:  # |r''| x <= sum_k a_k |n_k|, the box' support along the normal
+    if normal < x * kappa_sq:  # kappa x at most sum_k a_k |n_k|, the support of the box along the normal
         x = normal / kappa_sq
+    # the third derivative times v^3 is at most |j| + 3 kappa v |a|, and kappa v^2 at most |a|
+    jerk_max = np.sqrt(j_sq) + 3.0 * np.sqrt(np.sqrt(kappa_sq)) * a_sq**0.75
+    if jerk_max * jerk_max < x * x * x * slope_sq:
+        x = (jerk_max * jerk_max / slope_sq) ** (1.0 / 3.0)
     return x, u
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(legs, corners, element, wa, wb, feed, velocity, acceleration, work, points):
+def _measure(legs, corners, element, wa, wb, feed, velocity, acceleration, jerk, work, points):
     """Evaluate an interval at left end, middle and right end into points (3, 4, A); returns its interpolation error."""
     w_ref = 0.5 * (wa + wb)
     x_ends = 0.0
@@ -274,17 +304,24 @@ def _measure(legs, corners, element, wa, wb, feed, velocity, acceleration, work,
         w = wa if j == 0 else (w_ref if j == 1 else wb)
         element_point(legs, corners, element, w, w_ref, work, points[j])
         speed_here = to_arc_length(points[j])
-        x_here, u_here = _fastest(points[j], feed, velocity, acceleration)
+        x_here, u_here = _fastest(points[j], feed, velocity, acceleration, jerk)
         if j == 1:
             x, u, speed = x_here, u_here, speed_here
         else:
             x_ends = max(x_ends, x_here)
-    return _interval_error(points, min(x, x_ends), u, speed * (wb - wa), acceleration)
+    return _interval_error(points, min(x, x_ends), u, speed * (wb - wa), acceleration, jerk)
 
 
 @njit(cache=True, error_model="numpy")
-def _subdivide(legs, corners, element, wa, wb, feed, velocity, acceleration, resolution, work, points, out):
-    """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number."""
+def _subdivide(
+    legs, corners, element, wa, wb, feed, velocity, acceleration, jerk, resolution, rest, work, points, out
+):
+    """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number.
+
+    rest : distances from the last full stop of wa and wb, of the next stop from the last, and the length of the first interval
+           after a stop; intervals grow in proportion to their distance from the nearer stop
+    """
+    from_a, from_b, to_next, shortest = rest
     stack = np.empty(HALVINGS_MAX + 1)
     stack[0] = wb
     depth = 1
@@ -292,8 +329,15 @@ def _subdivide(legs, corners, element, wa, wb, feed, velocity, acceleration, res
     left = wa
     while depth > 0:
         right = stack[depth - 1]
-        error = _measure(legs, corners, element, left, right, feed, velocity, acceleration, work, points)
-        if error > resolution and depth <= HALVINGS_MAX and count + depth < len(out):
+        error = _measure(
+            legs, corners, element, left, right, feed, velocity, acceleration, jerk, work, points
+        )
+        share = (0.5 * (left + right) - wa) / (wb - wa)
+        away = from_a + (from_b - from_a) * share
+        away = min(away, to_next - away)
+        h = (from_b - from_a) * (right - left) / (wb - wa)
+        coarse = error > resolution or h > max(shortest, REST_GROWTH * away)
+        if coarse and depth <= HALVINGS_MAX and count + depth < len(out):
             stack[depth] = 0.5 * (left + right)
             depth += 1
         else:
@@ -329,10 +373,37 @@ def _grown(array, needed):
 
 
 @njit(cache=True, error_model="numpy")
+def _arc_feed(leg, feed, velocity, acceleration):
+    """A bound of the feed on an arc: programmed, what all axes reach together, and what they can turn with."""
+    v_sq, a_sq = 0.0, 0.0
+    for k in range(len(velocity)):
+        v_sq += velocity[k] * velocity[k]
+        a_sq += acceleration[k] * acceleration[k]
+    return min(feed, np.sqrt(v_sq), np.sqrt(np.sqrt(a_sq) / (leg.radius * leg.rate * leg.rate)))
+
+
+@njit(cache=True, error_model="numpy")
 def _grid(
-    legs, corners, first, offset, d_in, d_out, is_stop, breaks, feed, velocity, acceleration, resolution
+    legs,
+    corners,
+    first,
+    offset,
+    d_in,
+    d_out,
+    is_stop,
+    breaks,
+    feed,
+    velocity,
+    acceleration,
+    jerk,
+    resolution,
+    longest,
+    shortest,
 ):
     """Intervals of the whole path in order; a closing row (w0 = w1) where a piece ends.
+
+    longest  : duration of an interval on arcs at the fastest feed [s]
+    shortest : length of the first interval after a full stop [mm]; both inf for second-order solvers
 
     Returns element, w0, w1, segment (P,) and `last` (P,), True on closing rows.
     """
@@ -345,8 +416,18 @@ def _grid(
     w0, w1 = np.empty(size), np.empty(size)
     last = np.empty(size, np.bool_)
     n = 0
+    since, to_next = (
+        0.0,
+        0.0,
+    )  # distance of the leg's start from the last full stop, and of the next stop from it
     for leg in range(len(legs)):
         length = legs[leg].length
+        if is_stop[leg]:
+            since, to_next = 0.0, 0.0
+            for ahead in range(leg, len(legs)):
+                to_next += legs[ahead].length
+                if is_stop[ahead + 1]:
+                    break
         curved = legs[leg].round
         # The leg's free part, then the corner behind it: spans (curve, wa, wb, seg) cut at the block boundaries.
         for half in range(3):  # 0: free part, 1: corner before its apex, 2: after it
@@ -379,7 +460,9 @@ def _grid(
                     curve = ~k
                 parts = 1
                 if half == 0 and curved:
-                    parts = max(ARC_PARTS_MIN, int(np.ceil(abs(legs[leg].rate) * (wb - wa) / ARC_STEP)))
+                    reach = longest * _arc_feed(legs[leg], feed[seg], velocity, acceleration)
+                    parts = max(abs(legs[leg].rate) * (wb - wa) / ARC_STEP, (wb - wa) / reach, ARC_PARTS_MIN)
+                    parts = int(np.ceil(parts))
                 cut = 0
                 left = wa
                 while left < wb:
@@ -396,9 +479,17 @@ def _grid(
                     count = 1
                     ends[0] = right
                     if half > 0 or curved:
+                        if half == 0:
+                            rest = (since + left, since + right, to_next, shortest)
+                        else:
+                            vertex = since + length
+                            X, Y = shape_at(corners[k], left, left)
+                            from_left = vertex + Y[0] - X[0]
+                            X, Y = shape_at(corners[k], right, right)
+                            rest = (from_left, vertex + Y[0] - X[0], to_next, shortest)
                         count = _subdivide(
-                            legs, corners, curve, left, right, feed[seg], velocity, acceleration, resolution,
-                            work, points, ends,
+                            legs, corners, curve, left, right, feed[seg], velocity, acceleration, jerk, resolution,
+                            rest, work, points, ends,
                         )  # fmt: skip
                     if n + count + 1 > len(w0):
                         element, segment = _grown(element, n + count + 1), _grown(segment, n + count + 1)
@@ -412,6 +503,7 @@ def _grid(
                         w0[n], w1[n] = left, ends[c]
                         left = ends[c]
                         n += 1
+        since += length
         if is_stop[leg + 1]:
             if n + 1 > len(w0):
                 element, segment = _grown(element, n + 1), _grown(segment, n + 1)
@@ -444,7 +536,7 @@ def _effective_curvature(points):
 
 
 @njit(cache=True, error_model="numpy")
-def _evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acceleration):
+def _evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acceleration, jerk):
     """Arc length, position, derivatives and margins at all points; see `PathSamples`."""
     points, axes = len(w0), len(velocity)
     s = np.zeros(points)
@@ -466,7 +558,17 @@ def _evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acc
             fresh = True
             continue
         error = _measure(
-            legs, corners, element[i], w0[i], w1[i], feed[segment[i]], velocity, acceleration, work, ends
+            legs,
+            corners,
+            element[i],
+            w0[i],
+            w1[i],
+            feed[segment[i]],
+            velocity,
+            acceleration,
+            jerk,
+            work,
+            ends,
         )
         margin[i] = MARGIN_SAFETY * error
         kappa_right[i], kappa_left[i + 1] = _effective_curvature(ends)

@@ -43,6 +43,8 @@ class CornerShape(Protocol):
 # A leg whose free part is shorter than this share of it is closed by stretching one of its corners [-]; grid intervals of the
 # size of rounding would otherwise be left between corners that share a leg.
 CLOSE = 1e-4
+# Curvatures are the same below this share of the larger one [-]: printed arc centres are good to 1e-4 of a small radius.
+SAME_CURVATURE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,14 +95,21 @@ class SmoothPath:
         return self.toolpath.theta[self.legs.first]
 
 
-def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> SmoothPath:
+def round_corners(
+    toolpath: Toolpath, machine: Machine, corner: CornerShape, *, blend_tangents: bool = False
+) -> SmoothPath:
     """Blend every corner of the toolpath within its budget.
+
+    blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it; such a corner has
+                     theta = 0, bends off both legs within the tolerance, and has no jump left
 
     Raises InputError if the machine lacks an axis of the toolpath.
     """
     legs = legs_of(toolpath)
     at = legs.first
-    joint = toolpath.joint[at]
+    joint = toolpath.joint[at].copy()
+    if blend_tangents:
+        joint[(joint == Joint.SMOOTH) & _curvature_jumps(toolpath, at)] = Joint.CORNER
     blend = joint == Joint.CORNER
     theta, tol = toolpath.theta[at], toolpath.tolerance[at]
     sin_half = np.sin(theta / 2)
@@ -123,7 +132,9 @@ def round_corners(toolpath: Toolpath, machine: Machine, corner: CornerShape) -> 
     bend = np.maximum(toolpath.curvature[before], toolpath.curvature[after])
     room = np.maximum(BEND_MAX - theta, 0.0)
     wanted = np.minimum(wanted, np.divide(room, bend, out=np.full(len(at), np.inf), where=bend > 0))
-    ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half, 1e-12)
+    bent = np.zeros(len(at))  # what the legs' curvature adds to sin(theta/2) in E(m) = 2 (s + bent) m
+    bent[blend] = 0.5 * curvature[blend] * np.minimum(middle, longest[blend])
+    ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half + bent, 1e-12)
     d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), legs.length)
     stretch = _close_legs(d, legs.length)
 
@@ -156,6 +167,22 @@ def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
     stretch[left, 1] = 1.0 + free[left] / d[left]
     stretch[right + 1, 0] = 1.0 + free[right] / d[right + 1]
     return stretch
+
+
+def _curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
+    """(R+1,) True where the curvature vector differs across the joints `at`."""
+    arcs = toolpath.arcs
+    size = arcs.radius * arcs.rate**2
+    angle = arcs.rate * toolpath.length[toolpath.arc >= 0]
+    vectors = np.zeros((2, *toolpath.start.shape))  # at the start and at the end of every segment
+    curved = toolpath.arc >= 0
+    vectors[0, curved] = -size[:, None] * arcs.e1
+    vectors[1, curved] = -size[:, None] * (
+        np.cos(angle)[:, None] * arcs.e1 + np.sin(angle)[:, None] * arcs.e2
+    )
+    before, after = _neighbours(at, len(toolpath))
+    jump = np.linalg.norm(vectors[0, after] - vectors[1, before], axis=1)
+    return jump > SAME_CURVATURE * np.maximum(toolpath.curvature[before], toolpath.curvature[after])
 
 
 def _neighbours(at: Array, segments: int) -> tuple[Array, Array]:

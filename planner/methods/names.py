@@ -8,6 +8,7 @@ from typing import Protocol
 
 from planner.errors import InputError
 from planner.machine import Machine, load_machine
+from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages
 from planner.methods.stop import StopMethod
@@ -16,7 +17,7 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 
 DEFAULT_MACHINE = "mill"
-METHODS = ("toppra", "stop")
+METHODS = ("optimal", "toppra", "stop")
 
 
 class Method(Protocol):
@@ -71,6 +72,8 @@ def plan(
 def _method(name: str, corner: str, solver: str) -> Method:
     if solver not in SOLVERS:
         raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
+    if name == "optimal":
+        return OptimalMethod(corner=corner)
     if name == "toppra":
         return ToppraMethod(corner=corner, solver=solver)
     if name == "stop":

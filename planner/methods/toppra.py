@@ -74,7 +74,7 @@ class ToppraMethod:
             )
             with stages.stage("report"):
                 corners = corner_table(samples, problem, solution)
-                grid = _history(problem, solution, law)
+                grid = history(problem, solution, law)
         return Plan(
             method="toppra",
             corner=shape.name,
@@ -118,7 +118,8 @@ def _solve(
     return samples, problem, solver.solve(problem)
 
 
-def _history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) -> GridHistory:
+def history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) -> GridHistory:
+    """The profile at the grid points with what limits it there."""
     _, active = constraint_ratios(problem, solution)
     return GridHistory(
         t=law.t,

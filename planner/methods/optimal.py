@@ -1,0 +1,179 @@
+"""Method `optimal`: smoothed path, all limits with jerk, time-optimal by the interior-point kernel.
+
+1. Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
+2. The second-order problem is solved first: it says where straight stretches need grid points (feedrate/jerk_grid.py).
+3. The jerk-limited problem is solved on that grid (feedrate/jerk.py).
+4. Each run between full stops is slowed down by whatever its densely sampled motion exceeds a limit between grid points; usually
+   less than 0.1 %. Slowing down by lam divides speeds by lam, accelerations by lam^2, jerks by lam^3, so it always ends.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from itertools import chain
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.constraints.assemble import feedrate_problem
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.smooth import CornerShape, round_corners
+from planner.feedrate.grid import add_switching_points
+from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.jerk_grid import refine_straights
+from planner.feedrate.reachability import Reachability
+from planner.feedrate.solution import FeedrateSolution
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.methods.closed_form import corner_table
+from planner.methods.plan import Plan
+from planner.methods.stages import Progress, Stages, deliver, stop_time
+from planner.methods.toppra import corner_shape, history
+from planner.nc.program import Program
+from planner.path import PathSamples, sample_path
+from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
+
+# Corners sharper than the first of these turning angles become full stops [rad]: there a corner saves 10 ms (measured: v 100 mm/s,
+# a 2000 mm/s2, j 2e5 mm/s3) and costs five times the grid points. Should a job not be solved, the next ones are tried.
+SHARPEST = tuple(np.deg2rad([120.0, 90.0, 60.0, 30.0, 0.0]))
+# Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
+SLOWING_ROUNDS = 6
+# What is slowed down is slowed down by this much more [-], so that the next round finds nothing.
+SLOWING_MORE = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimalMethod:
+    """Time-optimal planning with jerk limits on rounded corners.
+
+    corner : name of the corner shape, "bezier" or "fir", or a shape with settings of your own
+    solver : a solver of third order
+    """
+
+    corner: str | CornerShape = "bezier"
+    solver: JerkLimited = field(default_factory=JerkLimited)
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program. Raises InputError for what cannot be planned; an unsolved problem is the plan's status."""
+        stages = Stages(progress)
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+            shape = corner_shape(self.corner, machine, toolpath)
+        for sharpest in SHARPEST:
+            with stages.stage("geometry"):
+                path = round_corners(stop_at_corners(toolpath, sharpest), machine, shape, blend_tangents=True)
+                samples = sample_path(path, machine, third_order=True)
+            with stages.stage("solve"):
+                samples, problem, solution = self._solve(samples, machine)
+            if solution.solved:
+                break
+        trajectory = verdict = corners = grid = None
+        if solution.solved:
+            with stages.stage("solve"):
+                motion = Motion(samples=samples, law=law_of_solution(samples, solution))
+                motion = slowed(motion, toolpath, machine)
+            trajectory, verdict = deliver(motion, toolpath, machine, stages)
+            with stages.stage("report"):
+                corners = corner_table(samples, problem, solution)
+                grid = history(problem, solution, motion.law)
+        return Plan(
+            method="optimal",
+            corner=shape.name,
+            solver=solution.solver,
+            program=program,
+            machine=machine,
+            toolpath=toolpath,
+            status=solution.status,
+            sentence=solution.sentence
+            + (
+                f"; full stops at turns over {np.rad2deg(sharpest):.0f} degrees"
+                if sharpest < SHARPEST[0]
+                else ""
+            ),
+            trajectory=trajectory,
+            verdict=verdict,
+            corners=corners,
+            grid=grid,
+            stop_time=stop_time(toolpath, machine),
+            grid_points=len(samples),
+            timings=stages.timings,
+        )
+
+    def _solve(
+        self, samples: PathSamples, machine: Machine
+    ) -> tuple[PathSamples, FeedrateProblem, FeedrateSolution]:
+        for refine in (add_switching_points, _for_jerk):
+            problem = feedrate_problem(samples, machine)
+            second_order = Reachability().solve(problem)
+            if not second_order.solved:
+                return samples, problem, second_order
+            samples = refine(samples, problem, second_order, machine)
+        problem = feedrate_problem(samples, machine)
+        return samples, problem, self.solver.solve(problem)
+
+
+def stop_at_corners(toolpath: Toolpath, sharpest: float) -> Toolpath:
+    """The same path with full stops at the corners that turn by more than `sharpest` [rad]."""
+    sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > sharpest)
+    return dataclasses.replace(toolpath, joint=np.where(sharp, Joint.STOP, toolpath.joint))
+
+
+def slowed(motion: Motion, toolpath: Toolpath, machine: Machine) -> Motion:
+    """The same motion with every run slowed down until its speeds, accelerations and jerks keep all limits, on the samples and
+    densely between them."""
+    for _ in range(SLOWING_ROUNDS):
+        factor = _excess(motion, toolpath, machine)
+        if not (factor > 1.0).any():
+            break
+        motion = _slower(motion, np.where(factor > 1.0, factor * (1.0 + SLOWING_MORE), 1.0))
+    return motion
+
+
+def _slower(motion: Motion, factor: FloatArray) -> Motion:
+    """Every run (G,) slowed down by its factor."""
+    law = motion.law
+    by = factor[law.run]
+    lasting = np.diff(np.append(law.t, law.end))
+    closing = np.append(law.run[1:] != law.run[:-1], True)  # the last piece of a run is its standstill
+    t = law.t[0] + np.concatenate([[0.0], np.cumsum(np.where(closing, lasting, lasting * by))])
+    slower = TimeLaw(
+        t=t[:-1],
+        s=law.s,
+        feed=law.feed / by,
+        acc_s=law.acc_s / by**2,
+        jerk_s=law.jerk_s / by**3,
+        run=law.run,
+        end=float(t[-1]),
+    )
+    return dataclasses.replace(motion, law=slower)
+
+
+def _excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
+    """(G,) by what factor each run has to be slowed down to keep its limits, <= 1 where it keeps them."""
+    axes = toolpath.axes
+    limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
+    programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
+    programmed[toolpath.block] = toolpath.feed
+    factor = np.zeros(len(motion.samples.piece) - 1)
+    for chunk in chain([sample_motion(motion, machine.dt)], dense_motion(motion, machine.dt)):
+        worst = chunk.feed / programmed[chunk.block]
+        motions = (chunk.velocity, chunk.acceleration, chunk.jerk)
+        for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
+            worst = np.maximum(worst, (np.abs(values) / limit).max(axis=1) ** (1.0 / order))
+        at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
+        np.maximum.at(factor, motion.law.run[np.maximum(at, 0)], worst)
+    return factor
+
+
+def _for_jerk(
+    samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution, machine: Machine
+) -> PathSamples:
+    return refine_straights(samples, problem, solution)

@@ -174,7 +174,8 @@ def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> t
     which = problem.feed_sq_bound.copy()
     inner = np.flatnonzero(problem.interval)
     jerk = solution.jerk_s[inner]
-    gained = jerk * np.where(jerk == 0.0, 0.0, solution.duration[inner])  # a rest of second order lasts for ever
+    # Where there is no jerk, no duration is needed: it is infinite where a second-order profile rests at both ends.
+    gained = jerk * np.where(jerk == 0.0, 0.0, solution.duration[inner])
     ends = (
         (inner, u[inner], problem.d2_right, problem.d3_right),
         (inner + 1, u[inner] + gained, problem.d2_left, problem.d3_left),

@@ -1,0 +1,151 @@
+"""Writing a program back with other feeds: F words are put in or replaced, every other byte stays as it is.
+
+An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it.
+So every block that gets a feed gets an F word of its own, in those units. A block that keeps its programmed feed is
+left alone as long as the F word in force is the source's; once one of ours is in force, the programmed feed is written
+out there. F words on lines without a feed move (alone on a line, beside G0) stay, they are what the source says.
+
+Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
+up to 0.1 % longer than asked.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.nc.lexer import Words, split_words
+from planner.nc.program import Kind, Program
+from planner.units import MM_PER_INCH, SECONDS_PER_MINUTE
+
+SIGNIFICANT = 4  # digits of a feed
+# The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
+FEED_MIN = 0.01
+# A feed within this share of the programmed one is the programmed one [-]: the rounding of lengths and times.
+SAME_FEED = 1e-6
+
+_F, _G = ord("F"), ord("G")
+_NUMBER = re.compile(rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*")
+_OURS, _THEIRS = 1, 2  # whose F word a row has
+
+Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
+
+
+def retimed(source: bytes, program: Program, feeds: FloatArray, *, block_delete: bool = True) -> bytes:
+    """The program `source` with new feeds.
+
+    program      : what the reader made of `source`
+    feeds        : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
+                   never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
+    block_delete : as the program was read
+
+    Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
+    """
+    moving = np.flatnonzero((program.kind == Kind.LINE) | (program.kind == Kind.ARC))
+    asked = np.asarray(feeds, dtype=np.float64)
+    if asked.shape != (len(program),):
+        raise ValueError(f"retimed: {asked.shape} feeds for {len(program)} blocks")
+    if (asked < 0).any():
+        raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
+    words = split_words(source, block_delete=block_delete)
+    row = _rows(words, program.line[moving])
+    unit = _unit_before(words)
+    f_word = _f_words(words)
+    programmed = _f_in_force(words, f_word, unit)[row]
+    wanted = np.maximum(asked[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
+
+    slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
+    restored = ~slower & (f_word[row] < 0) & ~_source_rules(len(words.line), f_word, row[slower])[row]
+    edits = [
+        _edit(words, int(r), int(f_word[r]), round_down(value))
+        for r, value in zip(row[slower], wanted[slower], strict=True)
+    ]
+    edits += [
+        _edit(words, int(r), -1, np.format_float_positional(value, trim="-"))
+        for r, value in zip(row[restored], programmed[restored], strict=True)
+    ]
+    return _spliced(source, sorted(edits))
+
+
+def round_down(value: float) -> str:
+    """A positive number in `SIGNIFICANT` digits at most, not above `value`, without exponent: 1234.56 -> "1234"."""
+    place = math.floor(math.log10(value)) + 1 - SIGNIFICANT  # of the last digit
+    digits = math.floor(value * 10.0**-place * (1.0 + 1e-12))  # 0.3 is 0.3, not 0.2999
+    text = f"{digits * 10**place}" if place >= 0 else f"{digits / 10**-place:.{-place}f}".rstrip("0")
+    return text.rstrip(".") if "." in text else text
+
+
+def _rows(words: Words, line: Array) -> Array:
+    """The rows of source lines."""
+    row = np.searchsorted(words.line, line)
+    if len(line) and (row[-1] >= len(words.line) or (words.line[row] != line).any()):
+        raise ValueError("retimed: the program has blocks on lines where the source has no word")
+    return row
+
+
+def _row_of_word(words: Words) -> Array:
+    return np.repeat(np.arange(len(words.line)), np.diff(words.first))
+
+
+def _unit_before(words: Words) -> FloatArray:
+    """(R,) length unit in force before each row [mm]: what its F word is read in."""
+    code = np.rint(words.value * 10.0)
+    switch = np.flatnonzero((words.letter == _G) & ((code == 200.0) | (code == 210.0)))
+    unit = np.append(1.0, np.where(code[switch] == 200.0, MM_PER_INCH, 1.0))
+    return unit[np.searchsorted(_row_of_word(words)[switch], np.arange(len(words.line)))]
+
+
+def _f_words(words: Words) -> Array:
+    """(R,) index of each row's F word, or -1."""
+    f_word = np.full(len(words.line), -1, dtype=np.int64)
+    found = np.flatnonzero(words.letter == _F)
+    f_word[_row_of_word(words)[found]] = found
+    return f_word
+
+
+def _f_in_force(words: Words, f_word: Array, unit: FloatArray) -> FloatArray:
+    """(R,) the source's F in force on each row, in the row's own units; NaN before the first."""
+    rows = np.arange(len(f_word))
+    last = np.maximum.accumulate(np.where(f_word >= 0, rows, -1))
+    given = words.value[f_word[last]] * (unit[last] / unit)
+    return np.where(last >= 0, given, np.nan)
+
+
+def _source_rules(rows: int, f_word: Array, ours: Array) -> Array:
+    """(R,) whether the F word in force is the source's, when the rows `ours` get one of ours."""
+    mark = np.where(f_word >= 0, _THEIRS, 0)
+    mark[ours] = _OURS
+    last = np.maximum.accumulate(np.where(mark > 0, np.arange(rows), -1))
+    return (last < 0) | (mark[last] == _THEIRS)
+
+
+def _edit(words: Words, row: int, f_word: int, number: str) -> Edit:
+    """Replace the number of the row's F word, or append an F word to the row's words."""
+    if f_word >= 0:
+        at = int(words.at[f_word])
+        return at + 1, _end(words, f_word), number.encode()
+    last = int(words.first[row + 1]) - 1
+    at, end = int(words.at[last]), _end(words, last)
+    tight = words.data[at - 1 : at].isalnum() or words.data[at - 1 : at] == b"."  # written X1Y2
+    letter = b"f" if words.data[at : at + 1].islower() else b"F"
+    return end, end, (b"" if tight else b" ") + letter + number.encode()
+
+
+def _end(words: Words, word: int) -> int:
+    """Where the digits of a word end in the source."""
+    after = int(words.at[word]) + 1
+    found = _NUMBER.match(words.data, after)
+    assert found is not None
+    return after + len(found.group().rstrip(b" \t"))
+
+
+def _spliced(source: bytes, edits: Iterable[Edit]) -> bytes:
+    pieces, done = [], 0
+    for start, end, text in edits:
+        pieces += [source[done:start], text]
+        done = end
+    return b"".join([*pieces, source[done:]])

@@ -345,4 +345,6 @@ def minimise(
         gap = advance(x, u, p, slack, lam, dz, dslack, dlam, primal, dual, one_sided)
         shortest = min(primal, dual)
         centering = 0.1 if shortest > 0.9 else (0.3 if shortest > 0.5 else 0.6)
+    if done == iterations:  # the last step has not been looked at yet
+        total, defect = linearise(grid, jerk_max, x, u, p, h, dynamics, gradient, rows, values, jumps)
     return done, gap / total, residual, defect, p, h, lam

@@ -21,7 +21,7 @@ So that all rows of a point depend on that point alone, as fatrop's stages ask f
 of the point as well. A stage is the state (v, a, j_left), the control (j, h), and the gap  state_{i+1} - f(state_i, control_i) = 0;
 fatrop's interface wants exactly this sign and order (gap rows of a stage, then its other rows), ipopt does not mind.
 
-Not convex, and no certificate of a global optimum; from many starting points both solvers end in the same optimum (tests). Every
+Not convex, and no certificate of a global optimum; from many starting points both solvers end in the same optimum. Every
 row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed duration 1), so that the iterates do not
 depend on the unit of length or time.
 

@@ -14,13 +14,16 @@ FloatArray = NDArray[np.float64]
 def freeze(record: object, name: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True) -> Array:
     """Convert field `name` of a frozen dataclass to a contiguous read-only array, in place, and return it.
 
+    An array that has the type already is not copied (trajectories fill gigabytes): the record then shares memory with the
+    caller's array, which the caller must not change any more.
+
     shape  : expected shape; None where any length will do
     finite : refuse NaN and infinity (floating point fields only)
 
     Raises ValueError naming record, field, found and expected.
     """
     given = getattr(record, name)
-    array = np.ascontiguousarray(given, dtype=dtype)
+    array: Array = np.ascontiguousarray(given, dtype=dtype)
     if array is given and array.flags.writeable:
         array = array.view()  # the caller keeps a writable array of its own; ours is not
     where = f"{type(record).__name__}.{name}"

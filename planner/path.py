@@ -205,7 +205,7 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
     ds = s - samples.s[interval]
     w = samples.w0[interval] + ds
 
-    def put(values: Array, new: Array) -> Array:
+    def put(values: Array, new: Array | float) -> Array:
         return np.insert(values, after, new, axis=0)
 
     w0 = put(samples.w0, w)

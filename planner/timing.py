@@ -162,7 +162,7 @@ def _sample_times(end: float, dt: float) -> FloatArray:
             "raise the machine's dt or split the program"
         )
     count = int(np.floor(end / dt * (1 + 1e-12)))
-    times = np.arange(count + 1) * dt
+    times: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
     if count and end - times[-1] <= 1e-6 * dt:
         times[-1] = end
         return times

@@ -33,6 +33,7 @@ class Method(StrEnum):
     """Names of the methods."""
 
     toppra = "toppra"
+    optimal = "optimal"
     stop = "stop"
 
 

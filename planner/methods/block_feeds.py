@@ -12,7 +12,7 @@ and the acceleration constant between them, it is passed at the share tau of the
 
     g (v0 + v1) / 2  =  v0 tau + (v1 - v0) tau^2 / 2.
 
-The error is a part of one period, and what one block gains its neighbour loses. Blocks that have no sample of their
+A joint is missed by less than a period, most where the motion stops there, and what one block gains its neighbour loses. Blocks that have no sample of their
 own are timed by the same formula.
 """
 
@@ -56,9 +56,9 @@ def _joint_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
     joint = np.arange(1, len(toolpath))
     k = np.searchsorted(segment, joint) - 1  # the last sample before the joint
     distance = after[k + 1] - before[k]
-    share = np.divide(
-        along[joint] - before[k], distance, out=np.zeros(len(joint)), where=distance > 0
-    ).clip(0.0, 1.0)
+    share = np.divide(along[joint] - before[k], distance, out=np.zeros(len(joint)), where=distance > 0).clip(
+        0.0, 1.0
+    )
     v0, v1 = feed[k], feed[k + 1]
     root = v0 + np.sqrt(v0**2 + share * (v1**2 - v0**2))
     tau = np.divide(share * (v0 + v1), root, out=share.copy(), where=root > 0)

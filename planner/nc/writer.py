@@ -48,7 +48,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, *, block_delete:
     moving = np.flatnonzero((program.kind == Kind.LINE) | (program.kind == Kind.ARC))
     asked = np.asarray(feeds, dtype=np.float64)
     if asked.shape != (len(program),):
-        raise ValueError(f"retimed: {asked.shape} feeds for {len(program)} blocks")
+        raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
     if (asked < 0).any():
         raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
     words = split_words(source, block_delete=block_delete)

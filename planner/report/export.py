@@ -1,8 +1,8 @@
 """The files of a plan, and the plan in numbers.
 
-`trajectory.parquet`, `.csv` or `.npz` (see `planner.report.trajectory_file`), `summary.json`, and the
-pictures where asked. They appear together or not at all: see `planner.report.replace`. All of them carry the
-same `run_id`.
+`trajectory.parquet`, `.csv` or `.npz` (see `planner.report.trajectory_file`), `planned.ngc` where the program
+came from a file (see `planner.report.planned`), `summary.json`, and the pictures where asked. They appear
+together or not at all: see `planner.report.replace`. Trajectory and summary carry the same `run_id`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.errors import InputError
+from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import LAST, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from planner.verify import Verdict
 
 SUMMARY = LAST
+PLANNED = "planned.ngc"
 PACKAGES = ("numpy", "scipy", "numba", "toppra", "ruckig", "pyarrow")
 
 
@@ -39,22 +41,28 @@ def write_plan(
 ) -> list[str]:
     """Write the files of a solved plan into `directory`, all or nothing; return their names.
 
+    What is left out, and why, is among the `notes` of the summary.
+
     Raises InputError if the directory cannot be written.
     """
     if plan.trajectory is None:
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
     directory = Path(directory)
     run_id = uuid.uuid4().hex
+    program, notes = _planned(plan, directory)
+    kept = {PLANNED} if _is_source(plan, directory / PLANNED) else set()
     try:
-        with replacing(directory, _previous(directory)) as new:
+        with replacing(directory, [name for name in _previous(directory) if name not in kept]) as new:
             about = trajectory_metadata(plan, run_id)
             write_trajectory(new / f"trajectory.{file_format}", plan.trajectory, about)
+            if program is not None:
+                (new / PLANNED).write_bytes(program)
             if plots:
                 from planner.report.plots import write_figures
 
                 write_figures(plan, new)
             names = sorted([SUMMARY, *(file.name for file in new.iterdir())])
-            _write_json(new / SUMMARY, {**summary(plan), "run_id": run_id, "files": names})
+            _write_json(new / SUMMARY, {**summary(plan), "run_id": run_id, "files": names, "notes": notes})
     except OSError as fault:
         raise InputError(
             f"cannot be written: {fault.strerror or fault}; what was there stays", source=str(directory)
@@ -135,6 +143,21 @@ def versions() -> dict[str, str]:
     """Version of this package, of Python, and of the packages that compute."""
     found = {"planner": metadata.version("feedrate-planner"), "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in PACKAGES}
+
+
+def _planned(plan: Plan, directory: Path) -> tuple[bytes | None, list[str]]:
+    """The re-timed program, or None and a note that says why there is none."""
+    if _is_source(plan, directory / PLANNED):
+        return None, [f"{PLANNED} is the program that was planned, and stays as it is"]
+    try:
+        return planned_program(plan), []
+    except LeftOut as why:
+        return None, [f"{PLANNED} is left out: {why}"]
+
+
+def _is_source(plan: Plan, file: Path) -> bool:
+    """Whether the plan's program was read from that file, which must then not be replaced."""
+    return file.exists() and Path(plan.program.source).resolve() == file.resolve()
 
 
 def _uniform(tolerance: FloatArray) -> float | None:

@@ -156,9 +156,9 @@ def test_rounding_down(value: float) -> None:
 
 def test_what_does_not_belong_together_is_refused() -> None:
     program = parse_program("G1 X1 F60\nX2\n")
-    with pytest.raises(ValueError, match="lines of|on lines"):
+    with pytest.raises(ValueError, match="on lines where the source has no word"):
         retimed(b"G1 X1 F60\n", program, np.ones(2))
-    with pytest.raises(ValueError, match="3,"):
+    with pytest.raises(ValueError, match="3 feeds for 2 blocks"):
         retimed(b"G1 X1 F60\nX2\n", program, np.ones(3))
     with pytest.raises(ValueError, match="-1 mm/s"):
         retimed(b"G1 X1 F60\nX2\n", program, np.array([1.0, -1.0]))
@@ -188,7 +188,7 @@ def spelled(text: str, rng: np.random.Generator) -> bytes:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 def test_any_program(seed: int) -> None:
     rng = np.random.default_rng(seed)
     source = spelled(random_program(rng), rng)
@@ -211,7 +211,7 @@ def test_the_control_reads_random_programs_as_we_do(tmp_path: Path) -> None:
         assert_same_motion(result, canon, centre=1e-6)
 
 
-REAL_MAX = 300_000  # bytes: enough of the collection, in seconds
+REAL_MAX = 200_000  # bytes: enough of the collection, in seconds
 
 
 @needs_oracle

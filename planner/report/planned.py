@@ -1,0 +1,63 @@
+"""`planned.ngc`: the program of a plan with the planned feed of every block, read back before it is given out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.methods.block_feeds import block_feeds
+from planner.nc.program import Program
+from planner.nc.reader import parse_program
+from planner.nc.writer import retimed
+
+if TYPE_CHECKING:
+    from planner.methods.plan import Plan
+
+_MOTION = (
+    "kind", "end", "dwell", "line", "path_control", "tolerance",
+    "arc_block", "arc_center", "arc_normal", "arc_sweep",
+)  # fmt: skip
+
+
+class LeftOut(Exception):
+    """There is no re-timed program; the message says why."""
+
+
+def planned_program(plan: Plan) -> bytes:
+    """The plan's program file with an F word per block. Raises LeftOut where that cannot be.
+
+    The file must still be the one that was planned, and the result must read back as the same motion: a line that
+    would grow too long, for example, gives no file rather than a wrong one.
+    """
+    assert plan.trajectory is not None
+    source = Path(plan.program.source)
+    try:
+        data = source.read_bytes()
+    except (OSError, ValueError):
+        raise LeftOut(f"the program was not read from a file, or {source} is no longer there") from None
+    if not _reads_as(data, plan, feeds=True):
+        raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
+    feeds = block_feeds(plan.trajectory, plan.toolpath, len(plan.program))
+    text = retimed(data, plan.program, feeds)
+    if not _reads_as(text, plan, feeds=False):
+        raise LeftOut(f"{source} with F words does not read back as the same motion")
+    return text
+
+
+def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
+    """Whether a program's motion is the one of the plan's program, with or without its feeds."""
+    try:
+        program = parse_program(text, plan.machine)
+    except InputError:
+        return False
+    return _same(program, plan.program, (*_MOTION, "feed") if feeds else _MOTION)
+
+
+def _same(one: Program, other: Program, names: tuple[str, ...]) -> bool:
+    return len(one) == len(other) and all(
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name == "tolerance")
+        for name in names
+    )

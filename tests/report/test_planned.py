@@ -1,0 +1,110 @@
+"""`planned.ngc` among the files of a plan: written where it can be right, left out with a reason where it cannot."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hand_made import SQUARE, make_plan, trajectory_along
+
+from planner.geometry.build import toolpath_from_program
+from planner.machine import load_machine
+from planner.nc.lexer import LINE_MAX
+from planner.nc.reader import parse_program, read_program
+from planner.report.export import write_plan
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Path:
+    path = tmp_path / "job.ngc"
+    path.write_bytes(SQUARE.encode())
+    return path
+
+
+def plan_of(path: Path) -> object:
+    plan = make_plan()
+    plan.program = read_program(path, plan.machine)
+    return plan
+
+
+def notes(out: Path) -> list[str]:
+    return json.loads((out / "summary.json").read_text())["notes"]
+
+
+def test_every_block_has_its_mean_feed(job: Path, tmp_path: Path) -> None:
+    """10 mm in 0.2 s each: 50 mm/s, which is F3000, the programmed feed; at 0.5 s it is F1200."""
+    plan = plan_of(job)
+    names = write_plan(plan, tmp_path / "out")
+    assert "planned.ngc" in names
+    assert (tmp_path / "out" / "planned.ngc").read_bytes() == SQUARE.encode()
+    assert notes(tmp_path / "out") == []
+
+    plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
+    write_plan(plan, tmp_path / "out")
+    text = (tmp_path / "out" / "planned.ngc").read_text()
+    assert text == "G21 G90 G17\nF3000\nG1 X10 F1200\nY10 F1200\nX0 F1200\nY0 F1200\nM2\n"
+
+
+def test_a_program_that_is_no_file(tmp_path: Path) -> None:
+    assert "planned.ngc" not in write_plan(make_plan(), tmp_path / "out")
+    assert "square.ngc is no longer there" in notes(tmp_path / "out")[0]
+
+
+@pytest.mark.parametrize("now", ["G1 X1 F3000\n", SQUARE.replace("3000", "2999"), "", "G1 X\n"])
+def test_a_program_that_has_changed(job: Path, tmp_path: Path, now: str) -> None:
+    plan = plan_of(job)
+    job.write_text(now)
+    assert "planned.ngc" not in write_plan(plan, tmp_path / "out")
+    assert "does not read as the program that was planned" in notes(tmp_path / "out")[0]
+
+
+def test_a_line_that_would_grow_too_long(tmp_path: Path) -> None:
+    job = tmp_path / "job.ngc"
+    job.write_text(SQUARE.replace("Y10", "Y10 (" + "long " * ((LINE_MAX - 8) // 5) + ")"))
+    plan = plan_of(job)
+    plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
+    assert "planned.ngc" not in write_plan(plan, tmp_path / "out")
+    assert "does not read back" in notes(tmp_path / "out")[0]
+
+
+def test_an_old_one_goes_with_its_set(job: Path, tmp_path: Path) -> None:
+    write_plan(plan_of(job), tmp_path / "out")
+    write_plan(make_plan(), tmp_path / "out")
+    assert not (tmp_path / "out" / "planned.ngc").exists()
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_the_program_itself_is_never_replaced(
+    job: Path, tmp_path: Path, elsewhere: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Planning out/planned.ngc into out; by another spelling of its name, too."""
+    out = tmp_path / "out"
+    write_plan(plan_of(job), out)
+    before = (out / "planned.ngc").read_bytes()
+    source = out / "planned.ngc"
+    if elsewhere:
+        monkeypatch.chdir(out)
+        source = Path(os.curdir) / "planned.ngc"
+    plan = plan_of(source)
+    plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
+    assert "planned.ngc" not in write_plan(plan, out)
+    assert (out / "planned.ngc").read_bytes() == before
+    assert "stays as it is" in notes(out)[0]
+
+
+def test_feeds_in_the_file_s_own_units(tmp_path: Path) -> None:
+    """10 inches in 0.5 s are F1200 in inches per minute."""
+    job = tmp_path / "job.ngc"
+    job.write_bytes(b"G20 F9000\r\nG20 F9000 G1 X10 (far)\r\n")
+    machine = load_machine("mill")
+    plan = make_plan()
+    plan.program = read_program(job, machine)
+    plan.toolpath = toolpath_from_program(plan.program, machine)
+    plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
+    write_plan(plan, tmp_path / "out")
+    text = (tmp_path / "out" / "planned.ngc").read_bytes()
+    assert text == b"G20 F9000\r\nG20 F1200 G1 X10 (far)\r\n"
+    np.testing.assert_allclose(parse_program(text).feed, 254 / 0.5, rtol=1e-3)

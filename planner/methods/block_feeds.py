@@ -12,8 +12,8 @@ and the acceleration constant between them, it is passed at the share tau of the
 
     g (v0 + v1) / 2  =  v0 tau + (v1 - v0) tau^2 / 2.
 
-A joint is missed by less than a period, most where the motion stops there, and what one block gains its neighbour loses. Blocks that have no sample of their
-own are timed by the same formula.
+A joint is missed by less than a period, most where the motion stops there, and what one block gains its neighbour
+loses. Blocks that have no sample of their own are timed by the same formula.
 """
 
 from __future__ import annotations

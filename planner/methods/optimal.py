@@ -1,7 +1,7 @@
 """Method `optimal`: smoothed path, all limits with jerk, time-optimal by the interior-point kernel.
 
 1. Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
-2. The second-order problem is solved first: it says where straight stretches need grid points (feedrate/jerk_grid.py).
+2. The second-order problem is solved first: it says where straight stretches need grid points (feedrate/grid.py).
 3. The jerk-limited problem is solved on that grid (feedrate/jerk.py).
 4. Each run between full stops is slowed down by whatever its densely sampled motion exceeds a limit between grid points; usually
    less than 0.1 %. Slowing down by lam divides speeds by lam, accelerations by lam^2, jerks by lam^3, so it always ends.
@@ -19,10 +19,8 @@ from planner.arrays import FloatArray
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import CornerShape, round_corners
-from planner.feedrate.grid import add_switching_points
+from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
-from planner.feedrate.jerk_grid import refine_straights
-from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint, Toolpath
@@ -110,12 +108,7 @@ class OptimalMethod:
     def _solve(
         self, samples: PathSamples, machine: Machine
     ) -> tuple[PathSamples, FeedrateProblem, FeedrateSolution]:
-        for refine in (add_switching_points, _for_jerk):
-            problem = feedrate_problem(samples, machine)
-            second_order = Reachability().solve(problem)
-            if not second_order.solved:
-                return samples, problem, second_order
-            samples = refine(samples, problem, second_order, machine)
+        samples = refine_for_jerk(samples, machine)
         problem = feedrate_problem(samples, machine)
         return samples, problem, self.solver.solve(problem)
 
@@ -171,9 +164,3 @@ def _excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, motion.law.run[np.maximum(at, 0)], worst)
     return factor
-
-
-def _for_jerk(
-    samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution, machine: Machine
-) -> PathSamples:
-    return refine_straights(samples, problem, solution)

@@ -1,0 +1,114 @@
+"""The interior-point kernel: closed forms, limits at the grid points, windows, and the second-order optimum as its limit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner.constraints.assemble import feedrate_problem
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.grid import refine_for_jerk
+from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.reachability import Reachability
+from planner.feedrate.rest_to_rest import rest_to_rest_times
+from planner.geometry.build import toolpath_from_program
+from planner.path import sample_path
+
+
+def third_order(program, machine):
+    """The feedrate problem of a job on a grid for jerk limits."""
+    toolpath = toolpath_from_program(program, machine)
+    samples = sample_path(
+        round_corners(toolpath, machine, BezierCorner(), blend_tangents=True), machine, third_order=True
+    )
+    return feedrate_problem(refine_for_jerk(samples, machine), machine)
+
+
+@pytest.mark.parametrize("length", [1e-3, 0.05, 1.0, 30.0, 500.0])
+def test_a_line_from_rest_to_rest_takes_the_closed_form(length):
+    problem = third_order(problems.polyline([[0, 0], [length, 0]]), problems.machine())
+    one = np.ones(1)
+    closed = rest_to_rest_times(length * one, 100 * one, 2000 * one, 2e5 * one)[0]
+    found = JerkLimited().solve(problem).require().cycle_time
+    assert (
+        closed * (1 - 1e-6) <= found <= closed * 1.005
+    )  # the grid does not hit the switches of the optimum exactly
+
+
+@pytest.mark.parametrize("name", ["pentagon", "zigzag", "five points", "arcs"])
+def test_limits_and_kinematics_hold_at_the_grid_points(name):
+    problem = third_order(problems.all_jobs()[name], problems.machine())
+    solution = JerkLimited().solve(problem).require()
+    inner = np.flatnonzero(problem.interval)
+    v, a, j, h = np.sqrt(solution.feed_sq), solution.acc_s, solution.jerk_s[inner], solution.duration[inner]
+    v0, a0 = v[inner], a[inner]
+    ds = problem.s[inner + 1] - problem.s[inner]
+    np.testing.assert_allclose(v0 * h + a0 * h**2 / 2 + j * h**3 / 6, ds, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(v0 + a0 * h + j * h**2 / 2, v[inner + 1], atol=1e-5)
+    np.testing.assert_allclose(a0 + j * h, a[inner + 1], atol=1e-6 * 2000)
+    assert (solution.feed_sq <= problem.feed_sq_max * (1 + 1e-6)).all()
+    for points, d2, d3 in (
+        (inner, problem.d2_right, problem.d3_right),
+        (inner + 1, problem.d2_left, problem.d3_left),
+    ):
+        d1, d2, d3 = problem.d1[points], d2[points], d3[points]
+        feed, acc = v[points, None], a[points, None]
+        assert np.abs(d1 * acc + d2 * feed**2).max() <= 2000 * (1 + 1e-6)
+        assert np.abs(d1 * j[:, None] + 3 * d2 * feed * acc + d3 * feed**3).max() <= 2e5 * (1 + 1e-6)
+
+
+def test_windows_give_the_profile_of_one_piece():
+    problem = third_order(problems.zigzag(), problems.machine())
+    whole = JerkLimited(window=100_000).solve(problem).require()
+    windows = JerkLimited(window=1500).solve(problem).require()
+    assert windows.cycle_time == pytest.approx(whole.cycle_time, rel=1e-4)  # the solver's own gap
+    np.testing.assert_allclose(np.sqrt(windows.feed_sq), np.sqrt(whole.feed_sq), atol=0.01 * 100)
+
+
+def test_a_loose_jerk_gives_nearly_the_second_order_time():
+    machine = problems.machine(jerk=5e6)
+    problem = third_order(problems.pentagon(), machine)
+    third = JerkLimited().solve(problem).require().cycle_time
+    second = Reachability().solve(problem).require().cycle_time
+    assert second * (1 - 1e-3) <= third <= second * 1.02
+
+
+def test_a_tighter_jerk_is_never_faster():
+    times = [
+        JerkLimited()
+        .solve(third_order(problems.pentagon(), problems.machine(jerk=jerk)))
+        .require()
+        .cycle_time
+        for jerk in (1e6, 2e5, 5e4)
+    ]
+    assert times == sorted(times)
+
+
+def test_prices_are_the_derivatives_of_the_time():
+    machine = problems.machine()
+    problem = third_order(problems.pentagon(), machine)
+    solution = JerkLimited(tol=1e-6).solve(problem).require()
+    assert solution.prices is not None
+    for name in ("acceleration", "jerk"):
+        limit = getattr(problem, name)
+        times = [
+            JerkLimited(tol=1e-6)
+            .solve(dataclasses.replace(problem, **{name: limit * by}))
+            .require()
+            .cycle_time
+            for by in (0.99, 1.01)
+        ]
+        along = (times[1] - times[0]) / 0.02  # d T / d log(limit), all axes together
+        assert (getattr(solution.prices, name) * limit).sum() == pytest.approx(along, rel=0.05)
+
+
+def test_iterations_run_out_with_a_status_and_nothing_else():
+    problem = third_order(problems.pentagon(), problems.machine())
+    solution = JerkLimited(iterations=3).solve(problem)
+    assert not solution.solved
+    assert "did not converge" in solution.sentence
+    assert np.isnan(solution.feed_sq).all()

@@ -19,7 +19,12 @@ FEED = 100.0  # programmed feed of the jobs [mm/s], F6000
 
 
 def machine(
-    *, velocity: float = 100.0, acceleration: float = 2000.0, jerk: float = 2e5, tolerance: float = 0.05, **more
+    *,
+    velocity: float = 100.0,
+    acceleration: float = 2000.0,
+    jerk: float = 2e5,
+    tolerance: float = 0.05,
+    **more,
 ) -> Machine:
     """The machine on which peers were compared: v 100, a 2000, j 2e5 on every axis, eps 0.05 mm, dt 1 ms."""
     axis = Axis(velocity=velocity, acceleration=acceleration, jerk=jerk)

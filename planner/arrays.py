@@ -11,7 +11,9 @@ Array = NDArray[Any]
 FloatArray = NDArray[np.float64]
 
 
-def freeze(record: object, name: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True) -> Array:
+def freeze(
+    record: object, name: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True
+) -> Array:
     """Convert field `name` of a frozen dataclass to a contiguous read-only array, in place, and return it.
 
     An array that has the type already is not copied (trajectories fill gigabytes): the record then shares memory with the

@@ -103,7 +103,9 @@ class Machine(_Record):
                 raise ValueError(f"tools: '{tool}' is not a tool number; write e.g. 1 = 25.0")
         return self
 
-    def limits(self, quantity: Literal["velocity", "acceleration", "jerk"], axes: tuple[str, ...]) -> FloatArray:
+    def limits(
+        self, quantity: Literal["velocity", "acceleration", "jerk"], axes: tuple[str, ...]
+    ) -> FloatArray:
         """Limits of `axes` for one quantity, (A,), in mm or rad.
 
         Raises InputError if the machine lacks one of the axes.
@@ -164,7 +166,8 @@ def _read(path: Path) -> str:
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())
         raise InputError(
-            f"machine file not found; give a TOML file or one of the built-in machines: {names}", source=str(path)
+            f"machine file not found; give a TOML file or one of the built-in machines: {names}",
+            source=str(path),
         ) from fault
     except (OSError, UnicodeDecodeError) as fault:
         raise InputError(f"machine file cannot be read: {fault}", source=str(path)) from fault

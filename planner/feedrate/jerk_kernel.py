@@ -134,11 +134,23 @@ def linearise(grid, jerk_max, x, u, p, h, dynamics, gradient, rows, values, jump
         mean = 0.5 * (v0 + v1)
         m0 = 0.25 / v0 if v0 > 0.0 else 0.0
         m1 = 0.25 / v1 if v1 > 0.0 and not last else 0.0
-        if i == 0 or last:  # at rest: stay where the kinematics have a solution, p ds < 3 vm^2; a constant jerk has 8/9 of it
+        if (
+            i == 0 or last
+        ):  # at rest: stay where the kinematics have a solution, p ds < 3 vm^2; a constant jerk has 8/9 of it
             g = p[i] * step / (3.0 * DOMAIN * mean * mean)
             c = -2.0 * g / mean
             cp = step / (3.0 * DOMAIN * mean * mean)
-            _put(rows, values, i, r + 1, c * (m0 + m1 * e0), c * m1 * e1, cp + c * m1 * e2, g + c * m1 * e3, 1.0)
+            _put(
+                rows,
+                values,
+                i,
+                r + 1,
+                c * (m0 + m1 * e0),
+                c * m1 * e1,
+                cp + c * m1 * e2,
+                g + c * m1 * e3,
+                1.0,
+            )
             continue
         middle = mean - 0.125 * p[i] * t
         m = 2.0 * middle / (0.5 * (x_max[i] + x_max[i + 1]))
@@ -341,7 +353,9 @@ def minimise(
         if not riccati(dynamics, hessian, gradient, 0.0, gains):
             residual = np.inf
             break
-        primal, dual = direction(dynamics, gains, x, rows, values, slack, lam, mu, one_sided, dz, dslack, dlam)
+        primal, dual = direction(
+            dynamics, gains, x, rows, values, slack, lam, mu, one_sided, dz, dslack, dlam
+        )
         gap = advance(x, u, p, slack, lam, dz, dslack, dlam, primal, dual, one_sided)
         shortest = min(primal, dual)
         centering = 0.1 if shortest > 0.9 else (0.3 if shortest > 0.5 else 0.6)

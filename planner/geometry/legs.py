@@ -17,7 +17,6 @@ from numba import njit
 from planner.arrays import Array, FloatArray, freeze
 from planner.geometry.toolpath import Joint, Toolpath
 
-
 # Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
 JOINED_ANGLE = 1e-7
 

@@ -6,6 +6,12 @@ A block's feed is its programmed length over its planned time, so that
 
 exactly, but for blocks whose quotient is above the programmed feed (the motion cuts corners, its path is shorter).
 
+Why the mean and not the highest feed in the block: run by LinuxCNC 2.9 (axes at 100 mm/s and 2000 mm/s2, 0.05 mm), jerk-limited
+plans with mean feeds take 0.7 % more (circle of chords), 0.4 % less (spiral) and 4 % less (dense relief) than planned, with the
+highest feeds 0.3 % more, 3 % less and 44 % less: such a control has no jerk limit of its own, and the F words are what keeps it
+near the plan. On few long blocks, where the control's own ramps come on top, the mean costs 18 % (polygon, zig-zag), the highest
+feed 5 %.
+
 The motion passes a joint between two samples, k the last before it. Along the programmed path the joint divides the
 distance between the two samples; with g = the share of it that lies before the joint, v0 and v1 the feeds at both samples
 and the acceleration constant between them, it is passed at the share tau of the period that solves

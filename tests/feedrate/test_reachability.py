@@ -41,7 +41,8 @@ def test_trapezoid(length: float, v: float, a: float, turn: float) -> None:
         [0.0, *switches, length], d1, np.zeros_like(d1), feed_sq_max=v * v, acceleration=limits
     )
     exact = length / v + v / a if 2.0 * ramp < length else 2.0 * np.sqrt(length / a)
-    assert plan(problem).cycle_time == pytest.approx(exact, rel=1e-9)
+    # a ramp of 6e-6 mm at the end of 513 mm is good to the rounding of 513: 1e-8 of it, 2e-9 of the time
+    assert plan(problem).cycle_time == pytest.approx(exact, rel=1e-8)
 
 
 def test_switching_points_give_the_optimum() -> None:

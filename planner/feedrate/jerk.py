@@ -56,7 +56,7 @@ class JerkLimited:
 
     tol: float = 1e-4
     iterations: int = 120
-    window: int = 4_000
+    window: int = 200_000
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
         """Jerk-limited profile of all pieces; ends must be at rest. Failures are a status."""

@@ -21,6 +21,7 @@ LAYERS = (
     "planner.nc",
     "planner.geometry",
     "planner.corners",
+    "planner.path_grid",
     "planner.path",
     "planner.constraints",
     "planner.feedrate",

@@ -47,7 +47,9 @@ def main() -> None:
         row |= {"program": file.name, "wall_s": round(time.perf_counter() - began, 2)}
         rows.append(row)
         print(file.name, json.dumps(row)[:200], flush=True)
-    write_results(options.name, {"method": options.method, "programs": rows}, _table(rows))
+        write_results(
+            options.name, {"method": options.method, "programs": rows}, _table(rows)
+        )  # a kill loses nothing
 
 
 def _run(pipe: Any, file: str, machine: str, method: str) -> None:

@@ -20,6 +20,7 @@ from planner.errors import NotSolvedError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
+AT_REST = 1e-12  # an axis with a smaller share of the direction does not limit; below the rounding of unit vectors [-]
 PHASES = 7  # a jerk-limited move from rest to rest
 
 
@@ -82,7 +83,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
     v, a, j = (
-        (machine.limits(q, axes) / np.maximum(direction, 1e-300)).min(axis=1)
+        (machine.limits(q, axes) / np.maximum(direction, AT_REST)).min(axis=1)
         for q in ("velocity", "acceleration", "jerk")
     )
     curved = toolpath.arc >= 0

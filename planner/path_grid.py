@@ -358,5 +358,8 @@ def evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acce
             d2_left[i + 1, k], d3_left[i + 1, k] = right[2, k], right[3, k]
         fresh = False
         w_ref = 0.5 * (w0[i] + w1[i])
-        s[i + 1] = s[i] + element_length(legs, corners, element[i], w0[i], w1[i], w_ref, left)
+        h = element_length(legs, corners, element[i], w0[i], w1[i], w_ref, left)
+        s[i + 1] = max(
+            s[i] + h, np.nextafter(s[i], np.inf)
+        )  # metres into a job h may be below the last digit of s
     return s, position, d1, d2_left, d2_right, d3_left, d3_right, margin, kappa_left, kappa_right

@@ -30,6 +30,9 @@ def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
     feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])
     collected.tighten("feed", np.minimum(feed_sq[left], feed_sq[right]))
     per_axis, axis = bounds.axis_velocity(samples.d1, machine.limits("velocity", axes))
+    per_axis = per_axis * (
+        1.0 - np.maximum(samples.margin[left], samples.margin[right])
+    )  # r' turns between the points
     for k, letter in enumerate(axes):
         collected.tighten(f"velocity.{letter}", np.where(axis == k, per_axis, np.inf))
     budget = _remaining_budget(samples, machine)

@@ -121,6 +121,8 @@ def round_corners(
     reachable = normal_acceleration_of_axes(
         limits, toolpath.tangent_end[before], toolpath.tangent_start[after]
     )
+    # Between arcs the normal at the apex is not the bisector at the vertex: the largest over all directions bounds it.
+    reachable = np.where(curvature > 0, np.linalg.norm(limits), reachable)
     if machine.normal_acceleration is not None:
         reachable = np.minimum(reachable, machine.normal_acceleration)
     rate = error_rate(machine)

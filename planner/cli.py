@@ -42,6 +42,7 @@ class Corner(StrEnum):
 
     bezier = "bezier"
     fir = "fir"
+    kinematic = "kinematic"
 
 
 class Solver(StrEnum):

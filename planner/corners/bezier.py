@@ -59,6 +59,10 @@ class BezierCorner:
         sigma1 = 4.0 - 3.0 / self.sigma2 if self.sigma1 is None else self.sigma1
         return (sigma1**2 * self.sigma2) ** (-1 / 3), (sigma1 * self.sigma2**2) ** (-1 / 3)
 
+    def at(self, change: FloatArray) -> BezierCorner:
+        """The weights are the same at every corner."""
+        return self
+
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
         """Tangent length d [mm] for the middle value m [mm]."""
         return middle / self.MIDDLE

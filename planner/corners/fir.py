@@ -55,6 +55,10 @@ class FirCorner:
         times = sorted((feed / a, a / j))
         return cls(T1=times[1], T2=times[0], feed_max=feed)
 
+    def at(self, change: FloatArray) -> FirCorner:
+        """The filters are the same at every corner."""
+        return self
+
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
         """Middle value m = V R(Tk/2) [mm] for the tangent length d = V R(Tk) [mm]."""
         V = np.minimum(feed, self.feed_max)
@@ -74,10 +78,8 @@ class FirCorner:
         return rows
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w where two pieces meet: T2, T1, Tk - T2, Tk - T1, and the middle."""
-        Tk = params[3]
-        times = (self.T2, self.T1, Tk - self.T2, Tk - self.T1)
-        return tuple(sorted({0.5} | {t / Tk for t in times if 0 < t < Tk}))
+        """Parameters w where two pieces meet."""
+        return fir_breaks(params)
 
     def ramp(self, t: FloatArray) -> FloatArray:
         """Ramp response R(t) [s], t in [0, Td]."""
@@ -110,6 +112,12 @@ class FirCorner:
             if np.abs(step).max(initial=0.0) <= 1e-15 * delay:
                 break
         return np.where(value >= delay / 2, delay, t)
+
+
+def fir_breaks(params: FloatArray) -> tuple[float, ...]:
+    """Parameters w where two pieces of a corner (V, T1, T2, Tk) meet: T2, T1, Tk - T2, Tk - T1, and the middle."""
+    _, T1, T2, Tk = params
+    return tuple(sorted({0.5} | {float(t / Tk) for t in (T2, T1, Tk - T2, Tk - T1) if 0 < t < Tk}))
 
 
 def overlap_time(eps: float, V: float, sin_half: float, T1: float, T2: float) -> float:

@@ -25,17 +25,23 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
 
-class CornerShape(Protocol):
-    """A family of corners: how tangent length d and middle value m belong together (see corners/blend.py)."""
-
-    name: str
-    shape: Shape
+class CornerFamily(Protocol):
+    """Corners at n given joints: how tangent length d and middle value m belong together (see corners/blend.py)."""
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray: ...
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+
+
+class CornerShape(Protocol):
+    """A shape of corners; `at` tells it by how much the direction of each axis changes at the joints, (n, A)."""
+
+    name: str
+    shape: Shape
+
+    def at(self, change: FloatArray) -> CornerFamily: ...
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]: ...
 
@@ -130,20 +136,22 @@ def round_corners(
     longest = legs.length[np.clip([np.arange(len(at)) - 1, np.arange(len(at))], 0, len(legs) - 1)].min(axis=0)
     wanted = np.zeros(len(at))
     middle = middle_from_tolerance(allocate(tol, reachable, rate), sin_half, curvature)[blend]
-    wanted[blend] = np.minimum(corner.reach(middle, feed[blend]), longest[blend])
+    bent = np.zeros(len(at))  # what the legs' curvature adds to sin(theta/2) in E(m) = 2 (s + bent) m
+    bent[blend] = 0.5 * curvature[blend] * np.minimum(middle, longest[blend])
+    across = np.abs(toolpath.tangent_start[after] - toolpath.tangent_end[before]) + 2.0 * bent[:, None]
+    corners = corner.at(across[blend])
+    wanted[blend] = np.minimum(corners.reach(middle, feed[blend]), longest[blend])
     bend = np.maximum(toolpath.curvature[before], toolpath.curvature[after])
     room = np.maximum(BEND_MAX - theta, 0.0)
     wanted = np.minimum(wanted, np.divide(room, bend, out=np.full(len(at), np.inf), where=bend > 0))
-    bent = np.zeros(len(at))  # what the legs' curvature adds to sin(theta/2) in E(m) = 2 (s + bent) m
-    bent[blend] = 0.5 * curvature[blend] * np.minimum(middle, longest[blend])
     ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half + bent, 1e-12)
     d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), legs.length)
     stretch = _close_legs(d, legs.length)
 
     params = np.zeros((len(at), 4))
-    params[blend] = corner.params(d[blend], feed[blend])
+    params[blend] = corners.params(d[blend], feed[blend])
     tol_ap = np.zeros(len(at))
-    middle = corner.middle(d, feed)[blend] * stretch[blend].max(axis=1)
+    middle = corners.middle(d[blend], feed[blend]) * stretch[blend].max(axis=1)
     tol_ap[blend] = error_from_middle(middle, sin_half[blend], curvature[blend])
     return SmoothPath(
         toolpath=toolpath,

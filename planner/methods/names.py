@@ -49,7 +49,7 @@ def plan(
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : "toppra", "stop", or a method with settings of your own
-    corner    : "bezier" or "fir"; ignored by "stop"
+    corner    : "bezier", "fir" or "kinematic"; ignored by "stop"
     solver    : "reachability" or "toppra"; ignored by "stop"
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done

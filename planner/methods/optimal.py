@@ -46,7 +46,7 @@ SLOWING_MORE = 1e-5
 class OptimalMethod:
     """Time-optimal planning with jerk limits on rounded corners.
 
-    corner : name of the corner shape, "bezier" or "fir", or a shape with settings of your own
+    corner : name of the corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : a solver of third order
     """
 

@@ -13,6 +13,7 @@ from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
 from planner.corners.fir import FirCorner
+from planner.corners.kinematic import KinematicCorner
 from planner.corners.smooth import CornerShape, round_corners
 from planner.errors import InputError
 from planner.feedrate.grid import add_switching_points
@@ -34,7 +35,7 @@ from planner.nc.program import Program
 from planner.path import PathSamples, sample_path
 from planner.timing import Motion, TimeLaw, law_of_solution
 
-CORNERS = ("bezier", "fir")
+CORNERS = ("bezier", "fir", "kinematic")
 SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
 
 
@@ -42,7 +43,7 @@ SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": 
 class ToppraMethod:
     """Second-order time-optimal planning on rounded corners.
 
-    corner : name of the corner shape, "bezier" or "fir", or a shape with settings of your own
+    corner : name of the corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
     """
 
@@ -100,6 +101,8 @@ def corner_shape(corner: str | CornerShape, machine: Machine, toolpath: Toolpath
         return BezierCorner()
     if corner == "fir":
         return FirCorner.from_machine(machine, toolpath.axes)
+    if corner == "kinematic":
+        return KinematicCorner.from_machine(machine, toolpath.axes)
     if isinstance(corner, str):
         raise InputError(f"no corner shape '{corner}'; there are {', '.join(CORNERS)}")
     return corner

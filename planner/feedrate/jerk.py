@@ -5,13 +5,17 @@ Minimise the time subject to all second-order limits of `FeedrateProblem` and to
     | r'_k j + 3 r''_k v u + r'''_k v^3 | <= j_k                      at both ends of every interval,
 
 with constant jerk j along the path on every interval, the same transcription as nlp.py, so that both can be compared on one grid.
-The step is in jerk_kernel.py, the start in jerk_start.py. One iteration linearises dynamics and rows at the current profile,
-solves the barrier problem's linear-quadratic model exactly and goes as far as slacks and multipliers stay positive; infeasible
-starts are allowed. 17 to 35 iterations, whatever the size.
+The problem's second-order model is in jerk_rows.py, the step in jerk_kernel.py, the start in jerk_start.py. One iteration models
+the Lagrangian at the current profile, minimises the barrier problem's linear-quadratic model exactly and goes as far as slacks,
+multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever the size.
 
-**Windows.** A long piece is solved in windows of `window` intervals. Each window ends in a full stop, which is only a way to end
-it: its first part is kept as far as the stop cannot be felt, three ways to brake before it, and the next window starts from the
-state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
+**Windows.** A long piece is solved in windows of about `window` intervals. Each window ends in a full stop, which is only a way to
+end it: its first part is kept as far as the stop cannot be felt, three ways to brake before it, and the next window starts from
+the state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
+
+**Fall-backs.** A window that does not converge from the smooth start is tried from the plain one, then in smaller windows. Where
+even a small one fails the profile stops: at the end of the window before, if the motion comes from there, or after the plain start,
+which always keeps the limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
 
 **Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece down by lam >= 1
 divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and keeps the kinematics exact; with the smallest lam that
@@ -21,17 +25,19 @@ satisfies every row the profile is feasible, always. Its cost, lam - 1, is in th
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate import jerk_kernel as kernel
-from planner.feedrate.jerk_start import smooth_start
+from planner.feedrate.jerk_rows import Grid, empty_model, linearise
+from planner.feedrate.jerk_start import plain_start, smooth_start
 from planner.feedrate.solution import FeedrateSolution, Prices, Status
 
-ROWS_PER_AXIS = 3  # acceleration, jerk at both ends; one more where r'' jumps
+START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-]
+JOIN_ROUNDS = 20  # to bring it onto the exact kinematics; 3 to 6 are the rule
 SLACK_MIN = 1e-2  # of the first slacks [-]
 START_GAP = 0.1  # complementarity of the start, share of the time per row
 RESIDUAL = 1e-6  # of the rows at the end, share of the limits [-]
@@ -41,8 +47,13 @@ RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as 
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
 BRAKING_WAYS = 3.0  # how far a window's stop must be from what is kept, in ways to brake [-]
 OVERLAP_SHARE = 0.8  # at most this share of a window is kept [-]
+END_SHARE = 0.25  # a window ends where the grid is finest in this last part of it [-]: a stop needs points
+SMALLEST_WINDOW = 100  # intervals: a smaller window that does not converge is not divided any further
+DIVISION = 5  # into so many smaller windows one that does not converge is divided
+INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
 GAP_FLOOR = 0.1  # the barrier stays above this share of the gap asked for [-]
+PLACES_NAMED = 3  # in a sentence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +66,7 @@ class JerkLimited:
     """
 
     tol: float = 1e-4
-    iterations: int = 120
+    iterations: int = 100
     window: int = 200_000
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
@@ -63,18 +74,26 @@ class JerkLimited:
         began = time.perf_counter()
         if problem.feed_sq_start.any() or problem.feed_sq_end.any():
             raise ValueError("JerkLimited: pieces must start and end at rest")
-        profile = _Profile(problem)
-        for g in range(len(problem.piece) - 1):
-            trouble = self._solve_piece(profile, problem.piece[g], problem.piece[g + 1] - 1)
-            if trouble:
-                at = problem.s[problem.piece[g]]
-                sentence = f"piece {g} (from s = {at:.6g} mm): {trouble}"
-                took = time.perf_counter() - began
-                return FeedrateSolution.failed(problem, Status.ITERATION_LIMIT, sentence, repr(self), took)
+        short = np.flatnonzero(np.diff(problem.piece) <= INTERVALS_MIN)
+        if len(short):
+            at = problem.s[problem.piece[short[0]]]
+            sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
+            return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
+        profile = _Profile(problem, self)
+        for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True):
+            profile.solve_piece(int(first), int(beyond) - 1)
         slower = profile.slow_down()
+        sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk"
+        if profile.stops:
+            places = ", ".join(f"{problem.s[k]:.6g}" for k in profile.stops[:PLACES_NAMED])
+            more = ", ..." if len(profile.stops) > PLACES_NAMED else ""
+            sentence += (
+                f", except {len(profile.stops)} full stops where the method did not converge, at s = {places}{more} mm: "
+                "coarsen the path where points nearly coincide, refine it where the feed changes much between points"
+            )
         return FeedrateSolution(
-            status=Status.OPTIMAL,
-            sentence=f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk",
+            status=Status.ACCEPTABLE if profile.stops else Status.OPTIMAL,
+            sentence=sentence,
             solver=repr(self),
             feed_sq=profile.x,
             acc_s=profile.u,
@@ -86,31 +105,11 @@ class JerkLimited:
             prices=profile.prices(),
         )
 
-    def _solve_piece(self, profile: _Profile, first: int, last: int) -> str:
-        """Solve the points first..last in windows; returns what went wrong, or nothing."""
-        begin, size = first, self.window
-        while True:
-            end = min(begin + size, last)
-            found = profile.solve_window(begin, end, self)
-            if found is None:
-                return (
-                    "the interior-point method did not converge; coarsen the path where points nearly coincide, "
-                    "or use method toppra"
-                )
-            keep = end if end == last else profile.unfelt(begin, end, found)
-            if keep <= begin:  # the window is shorter than the way to brake
-                size *= 2
-                continue
-            profile.keep(begin, keep, found)
-            if keep == last:
-                return ""
-            begin, size = keep, self.window
 
-
-def _jumps(grid: kernel.Grid) -> bool:
-    """True if r'' jumps by more than rounding at an inner point."""
+def _jumps(grid: Grid) -> int:
+    """1 if r'' jumps by more than rounding at an inner point."""
     left, right = grid.d2_left[1:-1], grid.d2_right[1:-1]
-    return bool((np.abs(left - right).max(axis=1) > JUMP_ROUNDING * np.abs(right).max(axis=1)).any())
+    return int((np.abs(left - right).max(axis=1) > JUMP_ROUNDING * np.abs(right).max(axis=1)).any())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -124,31 +123,126 @@ class _Window:
     lam: FloatArray
     time_unit: float
 
+    def after(self, point: int) -> _Window:
+        """The part from a point on."""
+        own = slice(point, None)
+        return replace(
+            self,
+            x=self.x[own],
+            u=self.u[own],
+            jerk=self.jerk[own],
+            duration=self.duration[own],
+            lam=self.lam[own],
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Scaled:
+    """A window's problem in units of its own: fastest feed 1, largest acceleration 1."""
+
+    grid: Grid
+    jerk_max: FloatArray
+    jumps: int
+    feed: float
+    time: float
+
+    @property
+    def rows(self) -> int:
+        """Rows per interval."""
+        return (3 + self.jumps) * len(self.jerk_max) + 2
+
+    def slowed(
+        self, x: FloatArray, u: FloatArray, p: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A profile slow enough to keep its limits with `START_ROOM` to spare."""
+        p = np.diff(u) if p is None else p
+        n, axes = len(p), len(self.jerk_max)
+        model, h = empty_model(n, self.rows), np.empty(n)
+        lam = np.zeros((n, self.rows, 2))
+        linearise(self.grid, self.jerk_max, x, u, p, h, lam, np.zeros(n), model, self.jumps)
+        worst = np.abs(model.values).max(axis=0)
+        jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
+        worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
+        slower = max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM))
+        return x / slower**2, u / slower**2, p / slower**2
+
+    def window(self, x: FloatArray, u: FloatArray, p: FloatArray, h: FloatArray, lam: FloatArray) -> _Window:
+        """A profile in the problem's units."""
+        feed, t = self.feed, self.time
+        return _Window(
+            x=x * feed**2, u=u * feed / t, jerk=p / h * feed / t**2, duration=h * t, lam=lam, time_unit=t
+        )
+
 
 class _Profile:
     """The profile of all points as it grows, window by window."""
 
-    def __init__(self, problem: FeedrateProblem):
+    def __init__(self, problem: FeedrateProblem, solver: JerkLimited):
         self.problem = problem
+        self.solver = solver
         points, axes = problem.d1.shape
         self.x, self.u = np.zeros(points), np.zeros(points)
         self.jerk, self.duration = np.zeros(points), np.zeros(points)
         self.price_acceleration, self.price_jerk = np.zeros(axes), np.zeros(axes)
         self.price_feed_sq = np.zeros(points)
         self.iterations = 0
-        self._tail = (np.zeros(0), np.zeros(0))
+        self.stops: list[int] = []  # points where the profile rests because nothing better was found
+        self._rest: _Window | None = None  # what the window before knew of the way ahead, down to its stop
         margin = problem.margin.copy()
         margin[problem.piece[1:] - 1] = 0.0
         before = np.concatenate([[0.0], margin[:-1]])
         self.acceleration = problem.acceleration * (1.0 - np.maximum(margin, before))[:, None]
 
-    def solve_window(self, begin: int, end: int, solver: JerkLimited) -> _Window | None:
-        """Solve the points begin..end, from the state at `begin` to rest at `end`."""
+    def solve_piece(self, first: int, last: int) -> None:
+        """Solve the points first..last in windows."""
+        begin, size, divided = first, self.solver.window, False
+        while begin < last:
+            end = self._window_end(begin, size, last)
+            found = self._solve_window(begin, end)
+            if found is None:
+                divided = True
+                if end - begin > SMALLEST_WINDOW:
+                    size = max((end - begin) // DIVISION, SMALLEST_WINDOW)
+                    continue
+                begin = self._stop(begin, end)
+            else:
+                keep = end if end == last else self._unfelt(begin, end, found)
+                if keep <= begin:  # the window is shorter than the way to brake
+                    if not divided:
+                        size *= 2
+                        continue
+                    keep = end
+                    self.stops.append(end)
+                self._keep(begin, keep, found)
+                begin = keep
+            size, divided = self.solver.window, False
+
+    def _window_end(self, begin: int, size: int, last: int) -> int:
+        """The last point of a window: where the grid is finest near its end."""
+        earliest = begin + size - int(END_SHARE * size)
+        if last - begin <= size + INTERVALS_MIN:
+            return last
+        s = self.problem.s
+        spread = s[earliest + 1 : begin + size + 2] - s[earliest - 1 : begin + size]
+        return earliest + int(np.argmin(spread))
+
+    def _stop(self, begin: int, end: int) -> int:
+        """Where no window converges: down to the last window's stop, or from rest with the plain start; returns where it ends."""
+        if self._rest is not None and self.x[begin] > 0.0:
+            end = begin + len(self._rest.x) - 1
+            self._keep(begin, end, self._rest)
+        else:
+            self._keep(begin, end, self._plain_window(begin, end))
+        self.stops.append(end)
+        return end
+
+    def _scaled(self, begin: int, end: int) -> _Scaled:
+        """The points begin..end in units of their own."""
         problem, own = self.problem, slice(begin, end + 1)
-        feed = np.sqrt(problem.feed_sq_max[own].max())
-        t = feed / problem.acceleration.max()
+        feed = float(np.sqrt(problem.feed_sq_max[own].max()))
+        t = float(feed / problem.acceleration.max())
         length = feed * t
-        grid = kernel.Grid(
+        grid = Grid(
             ds=np.diff(problem.s[own]) / length,
             x_max=problem.feed_sq_max[own] / feed**2,
             d1=problem.d1[own],
@@ -158,39 +252,60 @@ class _Profile:
             d3_right=problem.d3_right[own] * length**2,
             acceleration=self.acceleration[own] * t / feed,
         )
-        x, u = self._guess(begin, end)
-        x, u = x / feed**2, u * t / feed
-        done, gap, residual, defect, p, h, lam = kernel.minimise(
-            grid,
-            problem.jerk * t * t / feed,
-            x,
-            u,
-            0.0,
-            _jumps(grid),
-            solver.tol,
-            solver.iterations,
-            SLACK_MIN,
-            START_GAP,
-            RESIDUAL,
-            DEFECT,
-            GAP_FLOOR,
-        )
-        self.iterations = max(self.iterations, done)
-        if not (gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED):
-            return None
-        return _Window(
-            x=x * feed**2, u=u * feed / t, jerk=p / h * feed / t**2, duration=h * t, lam=lam, time_unit=t
-        )
+        return _Scaled(grid=grid, jerk_max=problem.jerk * t * t / feed, jumps=_jumps(grid), feed=feed, time=t)
 
-    def _guess(self, begin: int, end: int) -> tuple[FloatArray, FloatArray]:
-        """Where to start a window from: slow and smooth, and what the window before knew, where that is faster."""
+    def _solve_window(self, begin: int, end: int) -> _Window | None:
+        """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
+        scaled = self._scaled(begin, end)
+        for start in (self._smooth, self._plain)[: 1 if self.x[begin] > 0.0 else 2]:
+            x, u, p = start(begin, end, scaled)
+            done, gap, residual, defect, h, lam = kernel.minimise(
+                scaled.grid,
+                scaled.jerk_max,
+                x,
+                u,
+                p,
+                scaled.jumps,
+                self.solver.tol,
+                self.solver.iterations,
+                SLACK_MIN,
+                START_GAP,
+                RESIDUAL,
+                DEFECT,
+                GAP_FLOOR,
+            )
+            self.iterations = max(self.iterations, done)
+            if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
+                return scaled.window(x, u, p, h, lam)
+        return None
+
+    def _smooth(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The smooth start on exact kinematics, slow enough for all limits; and what the window before knew, where it is faster."""
+        feed, t = scaled.feed, scaled.time
         x, u = smooth_start(self.problem, begin, end)
-        if begin not in self.problem.piece:
-            tail_x, tail_u = (tail[: len(x)] for tail in self._tail)
-            faster = np.flatnonzero(tail_x > x[: len(tail_x)])
+        x, u, _ = scaled.slowed(x / feed**2, u * t / feed)
+        before = self._rest if self.x[begin] > 0.0 else None
+        if before is not None:
+            known = min(len(x), len(before.x))
+            tail_x, tail_u = before.x[:known] / feed**2, before.u[:known] * t / feed
+            faster = np.flatnonzero(tail_x > x[:known])
             x[faster], u[faster] = tail_x[faster], tail_u[faster]
-            x[0], u[0] = self.x[begin], self.u[begin]
-        return x, u
+            x[0], u[0] = tail_x[0], tail_u[0]
+        p = np.diff(u)
+        kernel.join(scaled.grid, x, u, p, JOIN_ROUNDS, DEFECT)
+        return scaled.slowed(x, u, p) if before is None else (x, u, p)
+
+    def _plain(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The plain start, slow enough for all limits."""
+        return scaled.slowed(*plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)])))
+
+    def _plain_window(self, begin: int, end: int) -> _Window:
+        """The plain start as a profile: feasible, and slow."""
+        scaled = self._scaled(begin, end)
+        x, u, p = self._plain(begin, end, scaled)
+        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
+        h = 2.0 * scaled.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * scaled.grid.ds / 3.0, 0.0)))
+        return scaled.window(x, u, p, h, np.zeros((len(p), scaled.rows, 2)))
 
     def _price(self, begin: int, count: int, found: _Window) -> None:
         """Add the multipliers of the kept intervals to the prices; a scaled row g <= 1 costs lam per unit of its limit."""
@@ -206,7 +321,7 @@ class _Profile:
         self.price_feed_sq[point] -= (at_point + between) / limit[point]
         self.price_feed_sq[point + 1] -= between / limit[point + 1]
 
-    def unfelt(self, begin: int, end: int, found: _Window) -> int:
+    def _unfelt(self, begin: int, end: int, found: _Window) -> int:
         """Last point of a window from which its end is far beyond the way to brake."""
         problem = self.problem
         a, j = problem.acceleration.min(), problem.jerk.min()
@@ -215,16 +330,13 @@ class _Profile:
         free = free[free <= OVERLAP_SHARE * (end - begin)]
         return begin + int(free[-1]) if len(free) else begin
 
-    def keep(self, begin: int, end: int, found: _Window) -> None:
+    def _keep(self, begin: int, end: int, found: _Window) -> None:
         """Take over the intervals begin..end of a window and the state at `end`."""
         count = end - begin
         self.x[begin : end + 1], self.u[begin : end + 1] = found.x[: count + 1], found.u[: count + 1]
         self.jerk[begin:end], self.duration[begin:end] = found.jerk[:count], found.duration[:count]
-        self._tail = (
-            found.x[count:],
-            found.u[count:],
-        )  # what comes after, down to the window's stop: the next guess
         self._price(begin, count, found)
+        self._rest = found.after(count)
 
     def slow_down(self) -> float:
         """Slow every piece until all rows hold at its grid points; returns the largest factor."""

@@ -1,4 +1,6 @@
-"""A smooth, slow profile to start the jerk-limited solver from.
+"""Profiles to start the jerk-limited solver from.
+
+`smooth_start` is close to the optimum on most paths:
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.
@@ -8,6 +10,10 @@
    the acceleration is the difference quotient over the same window. Twice, for a continuous acceleration.
 
 Every step is linear in the number of points. The result need not be feasible; on real jobs it nearly always is.
+
+`plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that acceleration for about
+a quarter of the way, constant speed after one interval of transition, and the same backwards from the end. Every interval has
+constant jerk, so that the kinematics are exact, and slowed down enough it keeps any limits.
 """
 
 from __future__ import annotations
@@ -21,6 +27,8 @@ from planner.constraints.problem import FeedrateProblem
 ACCELERATION_SHARE = 0.4  # of the limits, for the second-order profile underneath [-]
 NORMAL_SHARE = 0.7  # of the acceleration limits, for the caps [-]
 JERK_SHARE = 0.5  # of the jerk limits, for the caps and the first motion from rest [-]
+DOMAIN_SHARE = 0.9  # of the kinematics' domain; a start with constant jerk uses 8/9 [-]
+PLAIN_SHARE = 0.25  # of the way, on which the plain start accelerates, and again brakes [-]
 CAP_SHARE = 0.8  # of all other bounds on feed^2 [-]
 WINDOW_SLOPE = 0.5  # the averaging window grows and shrinks at most so fast along the path [-]
 FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between the ends [-]
@@ -41,7 +49,32 @@ def smooth_start(problem: FeedrateProblem, begin: int, end: int) -> tuple[FloatA
     caps[0] = caps[-1] = 0.0
     x = _accelerating(caps, rate, np.diff(s))
     jerk, delay = JERK_SHARE * problem.jerk.min(), (problem.acceleration / problem.jerk).max()
-    return _smooth(s, x, jerk, delay)
+    x, u = _smooth(s, x, jerk, delay)
+    _keep_kinematics(x, u, np.diff(s))
+    return x, u
+
+
+def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Feed^2 and acceleration (n + 1,) over the points s of a piece with n >= 4 intervals, in units with fastest speed 1."""
+    n = len(s) - 1
+    x, u = np.zeros(n + 1), np.zeros(n + 1)
+    tops = []
+    for ds, last in ((np.diff(s), n // 2), (np.diff(s)[::-1], n - n // 2)):
+        quarter = int(np.searchsorted(np.cumsum(ds), PLAIN_SHARE * (s[-1] - s[0])))
+        i = min(max(quarter, 1), last - 1)  # transition on the interval after point i
+        rising = 1.5 * ds[0] + 2.0 * np.concatenate(
+            [[0.0], np.cumsum(ds[1:i])]
+        )  # x at points 1..i of unit acceleration
+        v = np.sqrt(rising[-1])
+        top = (
+            v + 0.75 * (np.sqrt(v * v + 4.0 * ds[i] / 3.0) - v)
+        ) ** 2  # with jerk -1/h for the time h of that interval
+        tops.append((i, rising / top, top))
+    (i, rising, top), (k, falling, end_top) = tops
+    x[1:-1] = 1.0
+    x[1 : i + 1], u[1 : i + 1] = rising, 1.0 / top
+    x[n - k : n], u[n - k : n] = falling[::-1], -1.0 / end_top
+    return x, u
 
 
 def _smooth(s: FloatArray, x: FloatArray, jerk: float, delay: float) -> tuple[FloatArray, FloatArray]:
@@ -61,6 +94,7 @@ def _smooth(s: FloatArray, x: FloatArray, jerk: float, delay: float) -> tuple[Fl
         x, u = np.where(wide, mean, x), np.where(wide, rise, 0.0)
     x = np.maximum(x, FEED_SQ_MIN * x.max())
     x[0] = x[-1] = u[0] = u[-1] = 0.0
+    u[1], u[-2] = x[1] / (1.5 * ds[0]), -x[-2] / (1.5 * ds[-1])  # constant jerk from rest
     return x, u
 
 
@@ -91,3 +125,16 @@ def _accelerating(caps, rate, ds):
     for i in range(len(ds) - 1, -1, -1):
         x[i] = min(x[i], x[i + 1] + 2.0 * min(rate[i], rate[i + 1]) * ds[i])
     return x
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_kinematics(x, u, ds):
+    """Change u (N+1,) until every interval has a cubic that joins its ends: (u1 - u0) ds <= 3 vm^2 (jerk_rows.py), from both
+    ends towards the fastest point."""
+    top = np.argmax(x)
+    for i in range(top):
+        vm = 0.5 * (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
+        u[i + 1] = min(u[i + 1], u[i] + 3.0 * DOMAIN_SHARE * vm * vm / ds[i])
+    for i in range(len(ds) - 1, top - 1, -1):
+        vm = 0.5 * (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
+        u[i] = max(u[i], u[i + 1] - 3.0 * DOMAIN_SHARE * vm * vm / ds[i])

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from random_problems import make_problem
 
 from benchmarks import problems
 from planner.constraints.assemble import feedrate_problem
@@ -15,6 +16,7 @@ from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.rest_to_rest import rest_to_rest_times
+from planner.feedrate.solution import Status, constraint_ratios
 from planner.geometry.build import toolpath_from_program
 from planner.path import sample_path
 
@@ -106,9 +108,21 @@ def test_prices_are_the_derivatives_of_the_time():
         assert (getattr(solution.prices, name) * limit).sum() == pytest.approx(along, rel=0.05)
 
 
-def test_iterations_run_out_with_a_status_and_nothing_else():
+def test_without_convergence_the_profile_stops_more_often_and_says_where():
     problem = third_order(problems.pentagon(), problems.machine())
     solution = JerkLimited(iterations=3).solve(problem)
-    assert not solution.solved
-    assert "did not converge" in solution.sentence
+    assert solution.status is Status.ACCEPTABLE
+    assert "full stops where the method did not converge, at s = " in solution.sentence
+    ratio, _ = constraint_ratios(problem, solution)
+    assert ratio.max() <= 1 + 1e-6
+    best = JerkLimited().solve(problem)
+    assert best.status is Status.OPTIMAL
+    assert best.cycle_time < solution.cycle_time
+
+
+def test_a_piece_with_too_few_intervals_is_refused():
+    problem = make_problem([0.0, 1.0, 2.0], np.ones((3, 1)), np.zeros((3, 1)))
+    solution = JerkLimited().solve(problem)
+    assert solution.status is Status.INFEASIBLE
+    assert "fewer than 4 intervals" in solution.sentence
     assert np.isnan(solution.feed_sq).all()

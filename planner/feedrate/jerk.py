@@ -13,7 +13,7 @@ multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever 
 end it: its first part is kept as far as the stop cannot be felt, three ways to brake before it, and the next window starts from
 the state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
 
-**Fall-backs.** A window that does not converge from the smooth start is tried from the plain one, then in smaller windows. Where
+**Fall-backs.** A window that does not converge from the envelope is tried from the plain one, then in smaller windows. Where
 even a small one fails the profile stops: at the end of the window before, if the motion comes from there, or after the plain start,
 which always keeps the limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
 
@@ -33,11 +33,13 @@ from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate import jerk_kernel as kernel
 from planner.feedrate.jerk_rows import Grid, empty_model, linearise
-from planner.feedrate.jerk_start import plain_start, smooth_start
+from planner.feedrate.jerk_start import envelope, plain_start
 from planner.feedrate.solution import FeedrateSolution, Prices, Status
 
-START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-]
-JOIN_ROUNDS = 20  # to bring it onto the exact kinematics; 3 to 6 are the rule
+START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-] ...
+SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
+TRACKING_ROUNDS = 20  # at most, of the first profile; 3 to 6 are the rule
+TRACKED = 0.1  # a round that changes no x by more than this share has done it [-]
 SLACK_MIN = 1e-2  # of the first slacks [-]
 START_GAP = 0.1  # complementarity of the start, share of the time per row
 RESIDUAL = 1e-6  # of the rows at the end, share of the limits [-]
@@ -152,10 +154,9 @@ class _Scaled:
         return (3 + self.jumps) * len(self.jerk_max) + 2
 
     def slowed(
-        self, x: FloatArray, u: FloatArray, p: FloatArray | None = None
+        self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """A profile slow enough to keep its limits with `START_ROOM` to spare."""
-        p = np.diff(u) if p is None else p
+        """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
         n, axes = len(p), len(self.jerk_max)
         model, h = empty_model(n, self.rows), np.empty(n)
         lam = np.zeros((n, self.rows, 2))
@@ -163,7 +164,7 @@ class _Scaled:
         worst = np.abs(model.values).max(axis=0)
         jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
         worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
-        slower = max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM))
+        slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
         return x / slower**2, u / slower**2, p / slower**2
 
     def window(self, x: FloatArray, u: FloatArray, p: FloatArray, h: FloatArray, lam: FloatArray) -> _Window:
@@ -257,7 +258,7 @@ class _Profile:
     def _solve_window(self, begin: int, end: int) -> _Window | None:
         """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
         scaled = self._scaled(begin, end)
-        for start in (self._smooth, self._plain)[: 1 if self.x[begin] > 0.0 else 2]:
+        for start in (self._tracked, self._plain)[: 1 if self.x[begin] > 0.0 else 2]:
             x, u, p = start(begin, end, scaled)
             done, gap, residual, defect, h, lam = kernel.minimise(
                 scaled.grid,
@@ -279,25 +280,32 @@ class _Profile:
                 return scaled.window(x, u, p, h, lam)
         return None
 
-    def _smooth(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The smooth start on exact kinematics, slow enough for all limits; and what the window before knew, where it is faster."""
-        feed, t = scaled.feed, scaled.time
-        x, u = smooth_start(self.problem, begin, end)
-        x, u, _ = scaled.slowed(x / feed**2, u * t / feed)
+    def _tracked(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The envelope tracked by a motion, not much faster than the limits allow; from a window before, its way ahead is tracked
+        where that is faster."""
+        asked = envelope(self.problem, begin, end) / scaled.feed**2
+        plain_x, plain_u = plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)]))
         before = self._rest if self.x[begin] > 0.0 else None
-        if before is not None:
-            known = min(len(x), len(before.x))
-            tail_x, tail_u = before.x[:known] / feed**2, before.u[:known] * t / feed
-            faster = np.flatnonzero(tail_x > x[:known])
-            x[faster], u[faster] = tail_x[faster], tail_u[faster]
-            x[0], u[0] = tail_x[0], tail_u[0]
-        p = np.diff(u)
-        kernel.join(scaled.grid, x, u, p, JOIN_ROUNDS, DEFECT)
-        return scaled.slowed(x, u, p) if before is None else (x, u, p)
+        jerk = float(scaled.jerk_max.min())
+        for change_max in (TRACKED, np.inf):  # what cannot be tracked closely is at least approached
+            x, u = plain_x * asked.max(), plain_u * asked.max()
+            if before is not None:
+                known = min(len(x), len(before.x))
+                ahead, rate = before.x[:known] / scaled.feed**2, before.u[:known] * scaled.time / scaled.feed
+                faster = np.flatnonzero(ahead > asked[:known])
+                asked[faster] = ahead[faster]
+                faster = np.flatnonzero(ahead > x[:known])
+                x[faster], u[faster] = ahead[faster], rate[faster]
+                x[0], u[0] = ahead[0], rate[0]
+            p = np.diff(u)
+            if kernel.track(scaled.grid, jerk, asked, x, u, p, TRACKING_ROUNDS, change_max, DEFECT) <= DEFECT:
+                break
+        return scaled.slowed(x, u, p, SLOWER_MAX) if before is None else (x, u, p)
 
     def _plain(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The plain start, slow enough for all limits."""
-        return scaled.slowed(*plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)])))
+        x, u = plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)]))
+        return scaled.slowed(x, u, np.diff(u))
 
     def _plain_window(self, begin: int, end: int) -> _Window:
         """The plain start as a profile: feasible, and slow."""

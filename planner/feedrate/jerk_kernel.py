@@ -212,14 +212,13 @@ def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual, one_si
 
 
 @njit(cache=True, error_model="numpy")
-def join(grid, x, u, p, rounds, defect_max):
-    """Move a profile x, u (N+1,), p (N,) onto the exact kinematics, as little as possible: Gauss-Newton on the squares of
-    dx/x and dp ds/x; both ends stay. Returns the defect that is left."""
+def track(grid, jerk, asked, x, u, p, rounds, change_max, defect_max):
+    """Move a motion x, u (N+1,), p (N,) towards the feed^2 asked for: Gauss-Newton on the time integral of (dx/x)^2 J + j^2/J,
+    with the jerk j of the result and a jerk J of the machine's size. Both ends stay. Returns the defect that is left."""
     n = len(p)
     ds, lam, pi = grid.ds, np.zeros((n, 0, 2)), np.zeros(n)
     model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 6)), np.zeros((n + 1, 3)), np.zeros(n)
-    asked = x.copy()
-    worst = np.inf
+    worst, change = np.inf, 1e300  # a first round always
     for _ in range(rounds):
         worst = 0.0
         for i in range(n):
@@ -227,15 +226,18 @@ def join(grid, x, u, p, rounds, defect_max):
             worst = max(worst, found[11])
             for k in range(4):
                 model.dynamics[i, k] = found[k]
-            size = max(asked[i], asked[i + 1])
-            weight = 1.0 / (asked[i] * asked[i]) if i > 0 else 0.0
-            model.convex[i, 0], model.convex[i, 5] = weight, (ds[i] / size) ** 2
-            model.gradient[i, 0] = weight * (x[i] - asked[i])
-        if worst <= defect_max or not riccati(model, 0.0, gains):
+            span = found[4] * jerk
+            weight = span / (asked[i] * asked[i]) if i > 0 else 0.0
+            model.convex[i, 0], model.convex[i, 5] = weight, 1.0 / span
+            model.gradient[i, 0], model.gradient[i, 2] = weight * (x[i] - asked[i]), p[i] / span
+        if (worst <= defect_max and change <= change_max) or not riccati(model, 0.0, gains):
             break
         primal, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, 0, dz, lam, lam, dpi)
         primal = within_domain(ds, x, p, dz, primal)
+        change = 0.0
         for i in range(n):
+            if i > 0:
+                change = max(change, abs(dz[i, 0]) / x[i])
             x[i] += primal * dz[i, 0]
             u[i] += primal * dz[i, 1]
             p[i] += primal * dz[i, 2]

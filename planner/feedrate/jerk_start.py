@@ -1,15 +1,11 @@
 """Profiles to start the jerk-limited solver from.
 
-`smooth_start` is close to the optimum on most paths:
+`envelope` is what the solver starts from, after a tracking controller (jerk_kernel.join) has turned it into a motion:
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.
 2. The fastest profile under these caps that accelerates and brakes along the path with a share of what the axes have.
 3. Near rest the motion can only grow like a constant jerk from standstill: s = j t^3/6 gives x = j^(2/3) (6 s)^(4/3) / 4.
-4. Averaging x over a window of the length v tau that the motion covers in the time tau = a/j takes to build up its acceleration;
-   the acceleration is the difference quotient over the same window. Twice, for a continuous acceleration.
-
-Every step is linear in the number of points. The result need not be feasible; on real jobs it nearly always is.
 
 `plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that acceleration for about
 a quarter of the way, constant speed after one interval of transition, and the same backwards from the end. Every interval has
@@ -27,31 +23,31 @@ from planner.constraints.problem import FeedrateProblem
 ACCELERATION_SHARE = 0.4  # of the limits, for the second-order profile underneath [-]
 NORMAL_SHARE = 0.7  # of the acceleration limits, for the caps [-]
 JERK_SHARE = 0.5  # of the jerk limits, for the caps and the first motion from rest [-]
-DOMAIN_SHARE = 0.9  # of the kinematics' domain; a start with constant jerk uses 8/9 [-]
+
 PLAIN_SHARE = 0.25  # of the way, on which the plain start accelerates, and again brakes [-]
 CAP_SHARE = 0.8  # of all other bounds on feed^2 [-]
-WINDOW_SLOPE = 0.5  # the averaging window grows and shrinks at most so fast along the path [-]
 FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between the ends [-]
 
 
-def smooth_start(problem: FeedrateProblem, begin: int, end: int) -> tuple[FloatArray, FloatArray]:
-    """Feed^2 [mm2/s2] and acceleration [mm/s2] along the path at the points begin..end, from rest to rest."""
+def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
+    """Feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
     own = slice(begin, end + 1)
     curve = np.maximum(np.abs(problem.d2_left[own]), np.abs(problem.d2_right[own])) / problem.acceleration
     slope = np.maximum(np.abs(problem.d3_left[own]), np.abs(problem.d3_right[own])) / problem.jerk
     with np.errstate(divide="ignore"):
         by_acceleration = NORMAL_SHARE / curve.max(axis=1)
         by_jerk = (JERK_SHARE / slope.max(axis=1)) ** (2 / 3)
-    s = problem.s[own] - problem.s[begin]
     along = np.abs(problem.d1[own]) / problem.acceleration
     rate = ACCELERATION_SHARE / along.max(axis=1)
     caps = np.minimum(CAP_SHARE * problem.feed_sq_max[own], np.minimum(by_acceleration, by_jerk))
     caps[0] = caps[-1] = 0.0
-    x = _accelerating(caps, rate, np.diff(s))
-    jerk, delay = JERK_SHARE * problem.jerk.min(), (problem.acceleration / problem.jerk).max()
-    x, u = _smooth(s, x, jerk, delay)
-    _keep_kinematics(x, u, np.diff(s))
-    return x, u
+    ds = np.diff(problem.s[own])
+    to_end = np.minimum(problem.s[own] - problem.s[begin], problem.s[end] - problem.s[own])
+    jerk = JERK_SHARE * problem.jerk.min()
+    x = np.minimum(_accelerating(caps, rate, ds), jerk ** (2 / 3) * (6.0 * to_end) ** (4 / 3) / 4.0)
+    x = np.maximum(x, FEED_SQ_MIN * x.max())
+    x[0] = x[-1] = 0.0
+    return x
 
 
 def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -77,45 +73,6 @@ def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
     return x, u
 
 
-def _smooth(s: FloatArray, x: FloatArray, jerk: float, delay: float) -> tuple[FloatArray, FloatArray]:
-    """One piece from rest to rest: steps 3 and 4 of the module's text."""
-    ds, whole = np.diff(s), s[-1]
-    to_end = np.minimum(s, whole - s)
-    x = np.minimum(x, jerk ** (2 / 3) * (6.0 * to_end) ** (4 / 3) / 4.0)
-    u = np.zeros_like(x)
-    for _ in range(2):
-        window = np.minimum(_slope_limited(np.sqrt(x) * delay, ds), to_end)
-        wide = window > 1e-12 * whole
-        safe = np.where(wide, window, 1.0)
-        before, after = s - window / 2, s + window / 2
-        area = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * ds)])
-        mean = (_integral(after, s, x, area, ds) - _integral(before, s, x, area, ds)) / safe
-        rise = (np.interp(after, s, x) - np.interp(before, s, x)) / (2.0 * safe)
-        x, u = np.where(wide, mean, x), np.where(wide, rise, 0.0)
-    x = np.maximum(x, FEED_SQ_MIN * x.max())
-    x[0] = x[-1] = u[0] = u[-1] = 0.0
-    u[1], u[-2] = x[1] / (1.5 * ds[0]), -x[-2] / (1.5 * ds[-1])  # constant jerk from rest
-    return x, u
-
-
-def _integral(at: FloatArray, s: FloatArray, x: FloatArray, area: FloatArray, ds: FloatArray) -> FloatArray:
-    """Integral of the piecewise linear x from 0 to `at`."""
-    k = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(ds) - 1)
-    d = at - s[k]
-    return area[k] + d * (x[k] + 0.5 * d * (x[k + 1] - x[k]) / ds[k])
-
-
-@njit(cache=True, error_model="numpy")
-def _slope_limited(w, ds):
-    """The largest function below w (N+1,) whose slope stays within `WINDOW_SLOPE`."""
-    out = w.copy()
-    for i in range(len(ds)):
-        out[i + 1] = min(out[i + 1], out[i] + WINDOW_SLOPE * ds[i])
-    for i in range(len(ds) - 1, -1, -1):
-        out[i] = min(out[i], out[i + 1] + WINDOW_SLOPE * ds[i])
-    return out
-
-
 @njit(cache=True, error_model="numpy")
 def _accelerating(caps, rate, ds):
     """The largest x (N+1,) below the caps with |dx/ds| <= 2 rate."""
@@ -125,16 +82,3 @@ def _accelerating(caps, rate, ds):
     for i in range(len(ds) - 1, -1, -1):
         x[i] = min(x[i], x[i + 1] + 2.0 * min(rate[i], rate[i + 1]) * ds[i])
     return x
-
-
-@njit(cache=True, error_model="numpy")
-def _keep_kinematics(x, u, ds):
-    """Change u (N+1,) until every interval has a cubic that joins its ends: (u1 - u0) ds <= 3 vm^2 (jerk_rows.py), from both
-    ends towards the fastest point."""
-    top = np.argmax(x)
-    for i in range(top):
-        vm = 0.5 * (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
-        u[i + 1] = min(u[i + 1], u[i] + 3.0 * DOMAIN_SHARE * vm * vm / ds[i])
-    for i in range(len(ds) - 1, top - 1, -1):
-        vm = 0.5 * (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
-        u[i] = max(u[i], u[i + 1] - 3.0 * DOMAIN_SHARE * vm * vm / ds[i])

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numba import njit
@@ -72,12 +73,44 @@ class TimeLaw:
         freeze(self, "run", np.int64, (pieces,))
 
 
+class MotionInTime(Protocol):
+    """A motion that can be evaluated at any time, in pieces on which everything is smooth."""
+
+    @property
+    def t(self) -> FloatArray:
+        """(L,) start of each piece [s], non-decreasing."""
+        ...
+
+    @property
+    def end(self) -> float:
+        """End of the last piece [s]."""
+        ...
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
+        ...
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """A planned motion as a function of time: where the path goes, and when."""
+    """A planned motion along a path: where the path goes, and when."""
 
     samples: PathSamples
     law: TimeLaw
+
+    @property
+    def t(self) -> FloatArray:
+        """(L,) start of each piece of the law [s]."""
+        return self.law.t
+
+    @property
+    def end(self) -> float:
+        """End of the motion [s]."""
+        return self.law.end
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at ascending times (T,) [s]."""
+        return _trajectory(self, times, dt)
 
 
 def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw:
@@ -129,24 +162,24 @@ def law_of_phases(samples: PathSamples, duration: FloatArray, jerk_s: FloatArray
     )
 
 
-def sample_motion(motion: Motion, dt: float) -> Trajectory:
+def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
     """The motion at the interpolation period dt [s], last partial period included."""
-    return _trajectory(motion, _sample_times(motion.law.end, dt), dt)
+    return motion.at(_sample_times(motion.end, dt), dt)
 
 
-def dense_motion(motion: Motion, dt: float) -> Iterator[Trajectory]:
-    """The motion between its samples at dt [s]: half-way between them, and near both ends and in the middle of every piece of
-    the law, in chunks.
+def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
+    """The motion between its samples at dt [s]: half-way between them, and near both ends and in the middle of every piece,
+    in chunks.
 
     On a piece all speeds and accelerations are smooth and nearly linear, so that their extremes show there.
     """
-    edges = np.append(motion.law.t, motion.law.end)
+    edges = np.append(motion.t, motion.end)
     begin, end = edges[:-1], edges[1:]
     inside = [near * begin + (1.0 - near) * end for near in (1.0 - DENSE_EDGE, 0.5, DENSE_EDGE)]
-    halves = np.arange(0.5 * dt, motion.law.end, dt)
-    times = np.unique(np.concatenate([[0.0], *inside, halves, [motion.law.end]]))
+    halves = np.arange(0.5 * dt, motion.end, dt)
+    times = np.unique(np.concatenate([[0.0], *inside, halves, [motion.end]]))
     for first in range(0, len(times), CHUNK):
-        yield _trajectory(motion, times[first : first + CHUNK + 1], dt)
+        yield motion.at(times[first : first + CHUNK + 1], dt)
 
 
 def _dwells(samples: PathSamples) -> FloatArray:

@@ -27,6 +27,7 @@ LAYERS = (
     "planner.feedrate",
     "planner.trajectory",
     "planner.timing",
+    "planner.axis_motion",
     "planner.verify",
     "planner.methods",
     "planner.report",

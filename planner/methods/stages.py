@@ -11,7 +11,7 @@ import numpy as np
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.timing import Motion, dense_motion, sample_motion
+from planner.timing import MotionInTime, dense_motion, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
@@ -42,7 +42,11 @@ class Stages:
 
 
 def deliver(
-    motion: Motion, toolpath: Toolpath, machine: Machine, stages: Stages, not_limited: tuple[str, ...] = ()
+    motion: MotionInTime,
+    toolpath: Toolpath,
+    machine: Machine,
+    stages: Stages,
+    not_limited: tuple[str, ...] = (),
 ) -> tuple[Trajectory, Verdict]:
     """Sample a motion at the interpolation period and have it judged, between the samples too."""
     with stages.stage("sample"):

@@ -40,10 +40,6 @@ START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-
 SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
 TRACKING_ROUNDS = 20  # at most, of the first profile; 3 to 6 are the rule
 TRACKED = 0.1  # a round that changes no x by more than this share has done it [-]
-SLACK_MIN = 1e-2  # of the first slacks [-]
-START_GAP = 0.1  # complementarity of the start, share of the time per row
-RESIDUAL = 1e-6  # of the rows at the end, share of the limits [-]
-DEFECT = 1e-9  # of the kinematics at the end, share of the largest feed [-]
 GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
@@ -54,7 +50,6 @@ SMALLEST_WINDOW = 100  # intervals: a smaller window that does not converge is n
 DIVISION = 5  # into so many smaller windows one that does not converge is divided
 INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
-GAP_FLOOR = 0.1  # the barrier stays above this share of the gap asked for [-]
 PLACES_NAMED = 3  # in a sentence
 
 
@@ -69,7 +64,7 @@ class JerkLimited:
 
     tol: float = 1e-4
     iterations: int = 100
-    window: int = 200_000
+    window: int = 5_000
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
         """Jerk-limited profile of all pieces; ends must be at rest. Failures are a status."""
@@ -269,11 +264,6 @@ class _Profile:
                 scaled.jumps,
                 self.solver.tol,
                 self.solver.iterations,
-                SLACK_MIN,
-                START_GAP,
-                RESIDUAL,
-                DEFECT,
-                GAP_FLOOR,
             )
             self.iterations = max(self.iterations, done)
             if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
@@ -298,7 +288,7 @@ class _Profile:
                 x[faster], u[faster] = ahead[faster], rate[faster]
                 x[0], u[0] = ahead[0], rate[0]
             p = np.diff(u)
-            if kernel.track(scaled.grid, jerk, asked, x, u, p, TRACKING_ROUNDS, change_max, DEFECT) <= DEFECT:
+            if kernel.track(scaled.grid, jerk, asked, x, u, p, TRACKING_ROUNDS, change_max) <= kernel.DEFECT:
                 break
         return scaled.slowed(x, u, p, SLOWER_MAX) if before is None else (x, u, p)
 

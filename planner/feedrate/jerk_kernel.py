@@ -1,9 +1,9 @@
 """The interior-point step behind `JerkLimited` (jerk.py), in numba: weigh, factorise, step. All in scaled units.
 
 Each row of jerk_rows.py has slacks s and multipliers lam. Eliminating their Newton steps adds lam/s times the row's square to the
-Hessian; what remains is a linear-quadratic control problem with two states and one control, solved by a Riccati recursion. The
-last two controls are fixed by the two conditions at the end. The Hessian is that of the Lagrangian; where it is not convex along
-the recursion, the interval's rows and dynamics count as linear.
+Hessian; what remains is the linear-quadratic problem of jerk_riccati.py. The Hessian is that of the Lagrangian; where it is not
+convex, the curvature of rows and dynamics counts less, or not at all. Steps are predictor-corrector (Mehrotra 1992): the step
+without a barrier says how far the barrier may fall, and its second-order terms are made up for.
 """
 
 from __future__ import annotations
@@ -11,15 +11,22 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from planner.feedrate.jerk_riccati import offsets, riccati, slope
 from planner.feedrate.jerk_rows import empty_model, kinematics, linearise
 
 HESSIAN_MIN = 1e-12  # keeps the reduced Hessian positive where no row is near; far below any row's weight [-]
+SLACK_MIN = 1e-2  # of the first slacks [-]
+START_GAP = 0.1  # complementarity of the start, share of the time per row
+RESIDUAL = 1e-6  # of the rows at the end, share of the limits [-]
+DEFECT = 1e-9  # of the kinematics at the end, share of the largest feed [-]
+GAP_FLOOR = 0.1  # the barrier stays above this share of the gap asked for [-]
 STEP_TO_BOUNDARY = 0.995  # share of the way to the nearest bound that a step may take [-]
 DOMAIN_EDGE = 0.98  # share of the kinematics' domain that a step may reach; the rows ask for less [-]
 STEP_MIN = 1e-3  # shorter steps are not shortened any further [-]
-CHANGE_MAX = 0.4  # while some x changes by more than this share, the barrier stays [-]
+PREDICTED_MIN = 0.1  # a shorter predictor step says nothing about second-order terms [-]
+SIGMA_MAX = 0.9  # the barrier falls by at least this factor ... [-]
+CHANGE_MAX = 0.4  # while some x changes by more than this share, the barrier stays; far from the solution it must not fall first [-]
 SHARE_MIN = 0.05  # a smaller share of the curvature is none [-]
-PIVOT_MIN = 1e-6  # of the positive parts: smallest reduced Hessian taken for convex [-]
 FEED_SQ_SHRINK = 0.9  # largest share of x that one step may take away [-]
 
 
@@ -63,78 +70,35 @@ def weigh(model, slack, lam, mu, one_sided):
 
 
 @njit(cache=True, error_model="numpy")
-def riccati(model, share, gains):
-    """Feedback dp_i = K0 dx_i + K1 du_i + K2 of the linear-quadratic problem with dx_N = du_N = 0.
-
-    share : of the curvature of rows and dynamics that counts [-]
-    gains : (N, 6) out, K0 K1 K2 and the cost to go from point i: P_xx, P_xu and its gradient g_x
-
-    Returns False if there is no minimum.
-    """
-    dynamics, gradient, convex, curved = model.dynamics, model.gradient, model.convex, model.curved
-    n = len(dynamics)
-    # End: du_{N-1} + dp_{N-1} = 0, and the x-dynamics of the last interval with dx_N = 0 fix dp_{N-2}.
-    a0, a1, a2, a3 = dynamics[n - 1, 0], dynamics[n - 1, 1], dynamics[n - 1, 2], dynamics[n - 1, 3]
-    b0, b1, b2, b3 = dynamics[n - 2, 0], dynamics[n - 2, 1], dynamics[n - 2, 2], dynamics[n - 2, 3]
-    pivot = a0 * b2 + a1 - a2
-    k0, k1, k2 = -a0 * b0 / pivot, -(a0 * b1 + a1 - a2) / pivot, -(a0 * b3 + a3) / pivot
-    gains[n - 2, 0], gains[n - 2, 1], gains[n - 2, 2] = k0, k1, k2
-    gains[n - 1, 0], gains[n - 1, 1], gains[n - 1, 2] = 0.0, -1.0, 0.0
-    hs, gs = convex[n - 1] + share * curved[n - 1], gradient[n - 1]
-    pxx, pxu, puu = hs[0], hs[1] - hs[2], hs[3] - 2.0 * hs[4] + hs[5]
-    gx, gu = gs[0], gs[1] - gs[2]
-    gains[n - 1, 3], gains[n - 1, 4], gains[n - 1, 5] = pxx, pxu, gx
-    hs, gs = convex[n - 2] + share * curved[n - 2], gradient[n - 2]
-    x0, x1, x2 = b0 + b2 * k0, b1 + b2 * k1, b3 + b2 * k2  # dx_{N-1} of (dx, du, 1)
-    u0, u1, u2 = k0, 1.0 + k1, k2
-    sx, su = pxx * x2 + pxu * u2 + gx, pxu * x2 + puu * u2 + gu
-    nxx = pxx * x0 * x0 + 2.0 * pxu * x0 * u0 + puu * u0 * u0 + hs[0] + 2.0 * hs[2] * k0 + hs[5] * k0 * k0
-    nxu = pxx * x0 * x1 + pxu * (x0 * u1 + x1 * u0) + puu * u0 * u1
-    nxu += hs[1] + hs[2] * k1 + hs[4] * k0 + hs[5] * k0 * k1
-    nuu = pxx * x1 * x1 + 2.0 * pxu * x1 * u1 + puu * u1 * u1 + hs[3] + 2.0 * hs[4] * k1 + hs[5] * k1 * k1
-    gx = x0 * sx + u0 * su + gs[0] + gs[2] * k0 + hs[2] * k2 + hs[5] * k0 * k2
-    gu = x1 * sx + u1 * su + gs[1] + gs[2] * k1 + hs[4] * k2 + hs[5] * k1 * k2
-    pxx, pxu, puu = nxx, nxu, nuu
-    gains[n - 2, 3], gains[n - 2, 4], gains[n - 2, 5] = pxx, pxu, gx
-    for i in range(n - 3, -1, -1):
-        b0, b1, b2, b3 = dynamics[i, 0], dynamics[i, 1], dynamics[i, 2], dynamics[i, 3]
-        px, pu = pxx * b2 + pxu, pxu * b2 + puu  # P B, B = (b2, 1)
-        h0, h1, h2 = (
-            convex[i, 0] + share * curved[i, 0],
-            convex[i, 1] + share * curved[i, 1],
-            convex[i, 2] + share * curved[i, 2],
-        )
-        h3, h4, h5 = (
-            convex[i, 3] + share * curved[i, 3],
-            convex[i, 4] + share * curved[i, 4],
-            convex[i, 5] + share * curved[i, 5],
-        )
-        forward = b2 * px + pu
-        curve = h5 + forward
-        if not curve > PIVOT_MIN * (convex[i, 5] + abs(forward)):
-            return False
-        gs = gradient[i]
-        cx, cu = h2 + b0 * px, h4 + b1 * px + pu
-        sx, su = pxx * b3 + gx, pxu * b3 + gu
-        push = gs[2] + b2 * sx + su
-        gains[i, 0], gains[i, 1], gains[i, 2] = -cx / curve, -cu / curve, -push / curve
-        nxx = h0 + b0 * b0 * pxx - cx * cx / curve
-        nxu = h1 + b0 * (pxx * b1 + pxu) - cx * cu / curve
-        nuu = h3 + b1 * (pxx * b1 + pxu) + pxu * b1 + puu - cu * cu / curve
-        gx, gu = gs[0] + b0 * sx - cx * push / curve, gs[1] + b1 * sx + su - cu * push / curve
-        pxx, pxu, puu = nxx, nxu, nuu
-        gains[i, 3], gains[i, 4], gains[i, 5] = pxx, pxu, gx
-    return True
+def correct(model, slack, lam, mu, bending, one_sided, dslack, dlam):
+    """Second half of a predictor-corrector step: with the predicted steps of slacks and multipliers (overwritten by their
+    products, the targets' second-order terms) add the barrier mu to the gradient."""
+    gradient, rows = model.gradient, model.rows
+    n, count, _ = slack.shape
+    for i in range(n):
+        for r in range(count):
+            push = 0.0
+            for side in range(2 if r < one_sided else 1):
+                bent = bending * dslack[i, r, side] * dlam[i, r, side]
+                dlam[i, r, side] = bent
+                push += (1.0 - 2.0 * side) * (mu - bent) / slack[i, r, side]
+            gradient[i, 0] += push * rows[i, r, 0]
+            gradient[i, 1] += push * rows[i, r, 1]
+            gradient[i, 2] += push * rows[i, r, 2]
 
 
 @njit(cache=True, error_model="numpy")
-def _slope(model, share, dz, i):
-    """Gradient of interval i's part of the quadratic model after the step."""
-    h, dx, du, dp = model.convex[i] + share * model.curved[i], dz[i, 0], dz[i, 1], dz[i, 2]
-    x = model.gradient[i, 0] + h[0] * dx + h[1] * du + h[2] * dp
-    u = model.gradient[i, 1] + h[1] * dx + h[3] * du + h[4] * dp
-    p = model.gradient[i, 2] + h[2] * dx + h[4] * du + h[5] * dp
-    return x, u, p
+def complementarity(slack, lam, dslack, dlam, primal, dual, one_sided):
+    """Sum of slack times multiplier after a step."""
+    n, count, _ = slack.shape
+    gap = 0.0
+    for i in range(n):
+        for r in range(count):
+            for side in range(2 if r < one_sided else 1):
+                gap += (slack[i, r, side] + primal * dslack[i, r, side]) * (
+                    lam[i, r, side] + dual * dlam[i, r, side]
+                )
+    return gap
 
 
 @njit(cache=True, error_model="numpy")
@@ -151,7 +115,7 @@ def direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack,
         if i < n - 1:  # the multipliers of the last two intervals come last
             step = dynamics[i, 0] * dx + dynamics[i, 1] * du + dynamics[i, 2] * dp + dynamics[i, 3]
             dz[i + 1, 0], dz[i + 1, 1] = step, du + dp
-            ahead = gains[i + 1, 3] * step + gains[i + 1, 4] * (du + dp) + gains[i + 1, 5]
+            ahead = gains[i + 1, 3] * step + gains[i + 1, 4] * (du + dp) + gains[i + 1, 7]
             dpi[i] = costate[i, 0] * (ahead + costate[i, 1]) - pi[i]
             if step < -FEED_SQ_SHRINK * x[i + 1]:
                 primal = min(primal, -FEED_SQ_SHRINK * x[i + 1] / step)
@@ -161,14 +125,14 @@ def direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack,
                 sign = 1.0 - 2.0 * side
                 s, y = slack[i, r, side], lam[i, r, side]
                 move = 1.0 - sign * (values[i, r] + along) - s
-                push = (mu - y * move) / s - y
+                push = (mu - dlam[i, r, side] - y * move) / s - y
                 dslack[i, r, side], dlam[i, r, side] = move, push
                 if move < -STEP_TO_BOUNDARY * s:
                     primal = min(primal, -STEP_TO_BOUNDARY * s / move)
                 if push < -STEP_TO_BOUNDARY * y:
                     dual = min(dual, -STEP_TO_BOUNDARY * y / push)
-    last_x, last_u, last_p = _slope(model, share, dz, n - 1)
-    _, _, before_p = _slope(model, share, dz, n - 2)
+    last_x, last_u, last_p = slope(model, share, dz, n - 1)
+    _, _, before_p = slope(model, share, dz, n - 2)
     b2 = dynamics[n - 2, 2]
     pivot = dynamics[n - 1, 0] * b2 + dynamics[n - 1, 1] - dynamics[n - 1, 2]
     ahead = -(before_p + last_x * b2 + last_u - last_p) / pivot
@@ -212,12 +176,12 @@ def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual, one_si
 
 
 @njit(cache=True, error_model="numpy")
-def track(grid, jerk, asked, x, u, p, rounds, change_max, defect_max):
+def track(grid, jerk, asked, x, u, p, rounds, change_max):
     """Move a motion x, u (N+1,), p (N,) towards the feed^2 asked for: Gauss-Newton on the time integral of (dx/x)^2 J + j^2/J,
     with the jerk j of the result and a jerk J of the machine's size. Both ends stay. Returns the defect that is left."""
     n = len(p)
     ds, lam, pi = grid.ds, np.zeros((n, 0, 2)), np.zeros(n)
-    model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 6)), np.zeros((n + 1, 3)), np.zeros(n)
+    model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 8)), np.zeros((n + 1, 3)), np.zeros(n)
     worst, change = np.inf, 1e300  # a first round always
     for _ in range(rounds):
         worst = 0.0
@@ -230,8 +194,9 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max, defect_max):
             weight = span / (asked[i] * asked[i]) if i > 0 else 0.0
             model.convex[i, 0], model.convex[i, 5] = weight, 1.0 / span
             model.gradient[i, 0], model.gradient[i, 2] = weight * (x[i] - asked[i]), p[i] / span
-        if (worst <= defect_max and change <= change_max) or not riccati(model, 0.0, gains):
+        if (worst <= DEFECT and change <= change_max) or not riccati(model, 0.0, gains):
             break
+        offsets(model, 0.0, gains)
         primal, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, 0, dz, lam, lam, dpi)
         primal = within_domain(ds, x, p, dz, primal)
         change = 0.0
@@ -245,9 +210,7 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max, defect_max):
 
 
 @njit(cache=True, error_model="numpy")
-def minimise(
-    grid, jerk_max, x, u, p, jumps, tol, iterations, slack_min, start_gap, residual_max, defect_max, gap_floor
-):
+def minimise(grid, jerk_max, x, u, p, jumps, tol, iterations):
     """Solve one window in place, from the profile x, u (N+1,), p (N,) to the optimal one; x_0, u_0, x_N = u_N = 0 are given.
 
     Returns iterations used, relative gap, residual of rows and of dynamics, durations (N,), multipliers (N, R, 2).
@@ -257,38 +220,50 @@ def minimise(
     count = one_sided + 2
     h, pi, dpi = np.empty(n), np.zeros(n), np.zeros(n)
     model = empty_model(n, count)
-    gains, dz = np.empty((n, 6)), np.zeros((n + 1, 3))
+    gains, dz = np.empty((n, 8)), np.zeros((n + 1, 3))
     slack, lam = np.ones((n, count, 2)), np.zeros((n, count, 2))
     dslack, dlam = np.zeros((n, count, 2)), np.zeros((n, count, 2))
     total, _ = linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps)
     pairs = n * (one_sided + count)
-    mu = start_gap * total / n
+    mu = START_GAP * total / n
     for i in range(n):
         for r in range(count):
             for side in range(2):
-                slack[i, r, side] = max(1.0 - (1.0 - 2.0 * side) * model.values[i, r], slack_min)
+                slack[i, r, side] = max(1.0 - (1.0 - 2.0 * side) * model.values[i, r], SLACK_MIN)
                 lam[i, r, side] = mu / slack[i, r, side]
     share = 1.0
-    gap, centering, residual, defect, done = mu * pairs, 0.2, np.inf, np.inf, iterations
+    gap, hold, residual, defect, done = mu * pairs, 0.0, np.inf, np.inf, iterations
     for it in range(iterations):
         total, defect = linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps)
-        mu = max(centering * gap, gap_floor * tol * total) / pairs
-        residual = weigh(model, slack, lam, mu, one_sided)
-        if gap <= tol * total and residual <= residual_max and defect <= defect_max:
+        residual = weigh(model, slack, lam, 0.0, one_sided)
+        if gap <= tol * total and residual <= RESIDUAL and defect <= DEFECT:
             done = it
             break
         share = min(4.0 * share, 1.0)
         while not riccati(model, share, gains):
             if share == 0.0:
-                break
+                return it, gap / total, np.inf, np.inf, h, lam
             share = 0.25 * share if share > SHARE_MIN else 0.0
+        offsets(model, share, gains)
+        dlam[:] = 0.0
+        primal, dual = direction(
+            model, share, gains, x, slack, lam, pi, 0.0, one_sided, dz, dslack, dlam, dpi
+        )
+        left = complementarity(slack, lam, dslack, dlam, primal, dual, one_sided) / gap
+        mu = (
+            max(
+                hold * gap if hold > 0.0 else min(left * left * left, SIGMA_MAX) * gap,
+                GAP_FLOOR * tol * total,
+            )
+            / pairs
+        )
+        bending = 1.0 if min(primal, dual) > PREDICTED_MIN else 0.0
+        correct(model, slack, lam, mu, bending, one_sided, dslack, dlam)
+        offsets(model, share, gains)
         primal, dual = direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack, dlam, dpi)
         primal = within_domain(grid.ds, x, p, dz, primal)
         gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual, one_sided)
-        shortest = min(primal, dual)
-        centering = 0.1 if shortest > 0.9 else (0.3 if shortest > 0.5 else 0.6)
-        if change > CHANGE_MAX:
-            centering = 1.0
+        hold = 1.0 if change > CHANGE_MAX else 0.0
     if done == iterations:  # the last step has not been looked at yet
         total, defect = linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps)
     return done, gap / total, residual, defect, h, lam

@@ -34,6 +34,7 @@ class Method(StrEnum):
 
     toppra = "toppra"
     optimal = "optimal"
+    kinematic = "kinematic"
     stop = "stop"
 
 
@@ -134,7 +135,9 @@ def plan(
     job: Job,
     machine: MachineOption = None,
     method: Annotated[Method, typer.Option(help="how to plan")] = Method.toppra,
-    corner: Annotated[Corner, typer.Option(help="shape of the rounded corners")] = Corner.bezier,
+    corner: Annotated[
+        Corner, typer.Option(help="shape of the rounded corners, for toppra and optimal")
+    ] = Corner.bezier,
     solver: Annotated[
         Solver, typer.Option(help="of method toppra: our kernel, or the package toppra for comparison")
     ] = Solver.reachability,

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from planner.errors import InputError
 from planner.machine import Machine, load_machine
+from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages
@@ -17,7 +18,7 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 
 DEFAULT_MACHINE = "mill"
-METHODS = ("optimal", "toppra", "stop")
+METHODS = ("optimal", "toppra", "kinematic", "stop")
 
 
 class Method(Protocol):
@@ -48,9 +49,9 @@ def plan(
 
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
-    method    : "toppra", "stop", or a method with settings of your own
-    corner    : "bezier", "fir" or "kinematic"; ignored by "stop"
-    solver    : "reachability" or "toppra"; ignored by "stop"
+    method    : a name of `METHODS`, or a method with settings of your own
+    corner    : "bezier", "fir" or "kinematic"; for "toppra" and "optimal"
+    solver    : "reachability" or "toppra"; for "toppra"
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
@@ -76,6 +77,8 @@ def _method(name: str, corner: str, solver: str) -> Method:
         return OptimalMethod(corner=corner)
     if name == "toppra":
         return ToppraMethod(corner=corner, solver=solver)
+    if name == "kinematic":
+        return KinematicMethod()
     if name == "stop":
         return StopMethod()
     raise InputError(f"no method '{name}'; there are {', '.join(METHODS)}")

@@ -1,0 +1,107 @@
+"""Arcs as chords, for motions that consist of straight legs and corners.
+
+A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices rise linearly along arc
+and chord alike. The sagitta is a stated share of the arc's tolerance, and what it is, is taken off the tolerance at the joints of
+the chords: with corners rounded inside the polygon, both together stay within the tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
+from planner.geometry.toolpath import Joint, Toolpath
+
+# A chord turns by at most this much [rad]: of an arc no larger than the tolerance eight chords are left.
+CHORD_ANGLE_MAX = np.pi / 4
+
+
+def chord_angle(radius: FloatArray, sagitta: FloatArray) -> FloatArray:
+    """Angle [rad] by which a chord with the `sagitta` [mm] turns on an arc of `radius` [mm]."""
+    # acos(1 - x) = 2 asin(sqrt(x/2)), which keeps its digits for small x
+    return np.minimum(4.0 * np.arcsin(np.sqrt(np.minimum(sagitta / (2.0 * radius), 1.0))), CHORD_ANGLE_MAX)
+
+
+def arc_sagitta(toolpath: Toolpath, share: float) -> tuple[Array, FloatArray]:
+    """How many chords each segment is cut into (M,), 1 for lines, and how far they leave it at most (M,) [mm]."""
+    arcs, curved = toolpath.arcs, toolpath.arc >= 0
+    count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
+    row = toolpath.arc[curved]
+    budget = share * np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved]
+    sweep = np.abs(arcs.rate[row]) * toolpath.length[curved]
+    count[curved] = np.maximum(1, np.ceil(sweep / chord_angle(arcs.radius[row], budget) * (1.0 - 1e-9)))
+    sagitta[curved] = 2.0 * arcs.radius[row] * np.sin(sweep / count[curved] / 4.0) ** 2
+    return count, sagitta
+
+
+def chorded(toolpath: Toolpath, share: float, whole: Array) -> Toolpath:
+    """The same path with its arcs cut into chords, but for the arcs `whole` (M,), which get a full stop at both ends.
+
+    share : sagitta over tolerance, 0 < share < 1
+    """
+    count, sagitta = arc_sagitta(toolpath, share)
+    count[whole], sagitta[whole] = 1, 0.0
+    cut = (toolpath.arc >= 0) & ~whole
+    segment = np.repeat(np.arange(len(toolpath)), count)
+    first = np.cumsum(count) - count
+    part = np.arange(len(segment)) - first[segment]
+    start = toolpath.start[segment].copy()
+    inner = np.flatnonzero(part > 0)
+    at = segment[inner]
+    along = toolpath.length[at] * part[inner] / count[at]
+    start[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(toolpath, at, along)
+    end = np.vstack([start[1:], toolpath.end[-1:]])
+    straight = toolpath.arc[segment] < 0
+    chord = cut[segment]
+    length = toolpath.length[segment].copy()
+    length[chord] = np.linalg.norm(end - start, axis=1)[chord]
+    tangent_start, tangent_end = toolpath.tangent_start[segment].copy(), toolpath.tangent_end[segment].copy()
+    tangent_start[chord] = tangent_end[chord] = (end - start)[chord] / length[chord, None]
+
+    theta = np.zeros(len(segment) + 1)
+    theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
+    joint = np.full(len(segment) + 1, Joint.CORNER, np.uint8)
+    joint[first], joint[-1] = toolpath.joint[:-1], Joint.STOP
+    bends = np.append(cut, False) | np.insert(cut, 0, False)  # joints of the program with a chord at one side
+    turned = first[(bends[:-1] & (toolpath.joint[:-1] == Joint.SMOOTH))]
+    joint[turned] = Joint.CORNER
+    joint[(joint == Joint.CORNER) & (theta < COLLINEAR_ANGLE)] = Joint.SMOOTH
+    stop = np.append(whole, False) | np.insert(whole, 0, False)
+    joint[np.append(first, len(segment))[stop]] = Joint.STOP
+
+    tolerance, dwell = np.zeros(len(segment) + 1), np.zeros(len(segment) + 1)
+    tolerance[:-1] = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
+    tolerance[first], tolerance[-1] = toolpath.tolerance[:-1], toolpath.tolerance[-1]
+    left = np.append(sagitta[segment], 0.0)
+    tolerance -= np.maximum(left, np.insert(left[:-1], 0, 0.0))
+    dwell[first], dwell[-1] = toolpath.dwell[:-1], toolpath.dwell[-1]
+    return dataclasses.replace(
+        toolpath,
+        start=start,
+        end=end,
+        length=length,
+        feed=toolpath.feed[segment],
+        rapid=toolpath.rapid[segment],
+        block=toolpath.block[segment],
+        line=toolpath.line[segment],
+        arc=np.where(straight | chord, -1, toolpath.arc[segment]),
+        tangent_start=tangent_start,
+        tangent_end=tangent_end,
+        curvature=np.where(chord, 0.0, toolpath.curvature[segment]),
+        joint=joint,
+        theta=theta,
+        tolerance=tolerance,
+        dwell=dwell,
+    )
+
+
+def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
+    """Points (n, A) at the parameters x (n,) [mm] of the arcs `segment` (n,), relative to their centres."""
+    arcs, row = toolpath.arcs, toolpath.arc[segment]
+    angle = arcs.rate[row] * x
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    circle = arcs.radius[row][:, None] * (cos * arcs.e1[row] + sin * arcs.e2[row])
+    return circle + arcs.drift[row] * x[:, None]

@@ -1,0 +1,257 @@
+"""Method `kinematic`: paper 003's jerk-limited corners between straight legs, and a look-ahead over their speeds.
+
+1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where that is faster.
+2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry acceleration, entry
+   deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the vertex itself at that step.
+3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full stop, so that the whole
+   is fastest (feedrate/look_ahead.py).
+4. Legs and corners are pieces of constant jerk of every axis (feedrate/corner_pieces.py): the motion itself, nothing is sampled.
+
+A stretch between full stops that is not faster than stopping at every block is run as method `stop` runs it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.axis_motion import AxisMotion
+from planner.corners import kinematic as corner
+from planner.corners.allocation import (
+    error_rate,
+    normal_acceleration_max,
+    normal_acceleration_of_axes,
+)
+from planner.errors import InputError
+from planner.feedrate.candidates import candidates, fitted, leg_limits
+from planner.feedrate.corner_pieces import along_axes, pieces_of
+from planner.feedrate.look_ahead import Kind, Legs, Passage, look_ahead
+from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
+from planner.feedrate.solution import Status
+from planner.geometry.build import COLLINEAR_ANGLE, toolpath_from_program
+from planner.geometry.chords import arc_sagitta, chorded
+from planner.geometry.legs import Legs as PathLegs
+from planner.geometry.legs import legs_of
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.methods.closed_form import CornerTable
+from planner.methods.plan import Plan
+from planner.methods.stages import Progress, Stages, deliver, stop_time
+from planner.nc.program import PathControl, Program
+
+# Share of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill their
+# chords: those leave the vertex by 2/3 to 1 of the sagitta.
+CHORD_SHARE = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class KinematicMethod:
+    """Kinematic corners with look-ahead.
+
+    start_stop    : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at
+                    the vertex where no axis steps by more. Steps break the limits of acceleration and jerk, which the verdict then
+                    reports without judging
+    short_segment : paper 003's factor k, 0 < k <= 1, on the speed that a leg can reach; 1 uses short legs completely
+    """
+
+    start_stop: float = 0.0
+    short_segment: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start_stop < np.inf:
+            raise InputError(f"start_stop = {self.start_stop} mm/s; it must be finite and not negative")
+        if not 0 < self.short_segment <= 1:
+            raise InputError(f"short_segment = {self.short_segment}; allowed are 0 < k <= 1")
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program. Raises InputError for what cannot be planned."""
+        stages = Stages(progress)
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+            exact = program.path_control[toolpath.block] != PathControl.BLEND
+        with stages.stage("solve"):
+            course = self._course(toolpath, machine, exact)
+            motion = _motion(course, toolpath.axes)
+        stepping = bool((course.turns & (course.passage.kind == Kind.PASS)).any())
+        trajectory, verdict = deliver(
+            motion, toolpath, machine, stages, not_limited=("acceleration", "jerk") if stepping else ()
+        )
+        with stages.stage("report"):
+            corners = _corner_table(course, machine)
+        return Plan(
+            method="kinematic",
+            corner="kinematic",
+            solver="look-ahead",
+            program=program,
+            machine=machine,
+            toolpath=toolpath,
+            status=Status.OPTIMAL,
+            sentence=_sentence(course),
+            trajectory=trajectory,
+            verdict=verdict,
+            corners=corners,
+            grid=None,
+            stop_time=stop_time(toolpath, machine),
+            grid_points=len(course.path) + 1,
+            timings=stages.timings,
+        )
+
+    def _course(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Course:
+        """Look ahead over the program, arcs as chords where that is faster; `exact` (M,) blocks keep to the path."""
+        curved = toolpath.arc >= 0
+        whole = curved & (exact | _faster_whole(toolpath, machine))
+        while True:
+            course = self._look_ahead(toolpath, machine, whole)
+            slow = curved & ~whole & _slower_than_stops(course, toolpath, machine)
+            if not slow.any():
+                return course
+            whole |= slow
+
+    def _look_ahead(self, toolpath: Toolpath, machine: Machine, whole: Array) -> _Course:
+        lines = chorded(toolpath, CHORD_SHARE, whole)
+        change = np.flatnonzero((lines.joint[1:-1] == Joint.SMOOTH) & (lines.feed[1:] != lines.feed[:-1])) + 1
+        joint = lines.joint.copy()
+        joint[change] = Joint.CORNER  # of angle 0: where the programmed feed changes a leg ends
+        lines = dataclasses.replace(lines, joint=joint)
+        path = legs_of(lines)
+        legs = leg_limits(path, lines, machine)
+        free = candidates(path, lines, legs, machine, self.start_stop)
+        fitting = [fitted(way, legs) for way in free]
+        passage, time = look_ahead(legs, fitting, self.short_segment)
+        return _Course(
+            lines=lines, path=path, legs=legs, free=free, fitting=fitting, passage=passage, time=time
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Course:
+    """A program laid out as legs and corners: n legs, n+1 joints.
+
+    lines   : the toolpath with its arcs as chords
+    free    : the candidates by themselves
+    fitting : the candidates that fit on their legs
+    passage : what was chosen
+    time    : (n+1,) when each joint's corner is over, standstills not counted [s]
+    """
+
+    lines: Toolpath
+    path: PathLegs
+    legs: Legs
+    free: list[Passage]
+    fitting: list[Passage]
+    passage: Passage
+    time: FloatArray
+
+    @property
+    def turns(self) -> Array:
+        """(n+1,) True where there is a corner to be taken."""
+        at = self.path.first
+        return (self.lines.joint[at] == Joint.CORNER) & (self.lines.theta[at] >= COLLINEAR_ANGLE)
+
+
+def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
+    """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners between these."""
+    arc = np.flatnonzero(toolpath.arc >= 0)
+    whole = np.zeros(len(toolpath), bool)
+    count, _ = arc_sagitta(toolpath, CHORD_SHARE)
+    chord = toolpath.length[arc] / count[arc]
+    bend = np.minimum(toolpath.curvature[arc] * chord, np.pi)
+    a, j = (machine.limits(q, toolpath.axes).max() / bend for q in ("acceleration", "jerk"))
+    speed = np.minimum(corner.speed_from_approach(chord / 2, a, j), toolpath.feed[arc])
+    limits = (limit[arc] for limit in block_limits(toolpath, machine))
+    whole[arc] = toolpath.length[arc] / speed > rest_to_rest_times(toolpath.length[arc], *limits)
+    return whole
+
+
+def _slower_than_stops(course: _Course, toolpath: Toolpath, machine: Machine) -> Array:
+    """(M,) True for the segments between two full stops that take longer than if every block ran from rest to rest."""
+    lines, at = course.lines, course.path.first
+    stop = np.flatnonzero(lines.joint[at] == Joint.STOP)
+    lasting = np.diff(course.time[stop])
+    first = np.searchsorted(toolpath.block, lines.block[np.minimum(at[stop], len(lines) - 1)])
+    first[-1] = len(toolpath)
+    times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
+    return np.repeat(lasting > np.add.reduceat(times, first[:-1]), np.diff(first))
+
+
+def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
+    pieces = pieces_of(
+        course.passage, course.legs, course.path, course.lines.dwell[course.path.first], _turning(course)
+    )
+    position, velocity, acceleration, jerk = along_axes(pieces, course.path, course.lines)
+    end = np.cumsum(pieces.duration)
+    return AxisMotion(
+        axes=axes,
+        t=np.insert(end[:-1], 0, 0.0),
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        block=course.lines.block[pieces.segment],
+        line=course.lines.line[pieces.segment],
+        end=float(end[-1]),
+    )
+
+
+def _turning(course: _Course) -> FloatArray:
+    """(n,) turning of the legs [rad/mm], 0 on straight ones."""
+    return np.abs(course.path.table["rate"])
+
+
+def _corner_table(course: _Course, machine: Machine) -> CornerTable:
+    """The corners that are run through, at their apexes."""
+    kind, V, p, q = (getattr(course.passage, name) for name in ("kind", "V", "p", "q"))
+    k = np.flatnonzero((kind == Kind.ZERO) | (kind == Kind.ENTRY))
+    lines, at, u = course.lines, course.path.first[k], course.path.table["direction"]
+    V, p, q, zero = V[k], p[k], q[k], kind[k] == Kind.ZERO
+    theta, tol = lines.theta[at], lines.tolerance[at]
+    s, c = np.sin(theta / 2), np.cos(theta / 2)
+    T1, _ = corner.phase_times(V, p, q)
+    length = np.where(zero, corner.approach(V, p, q), corner.entry_length(V, p, q))
+    middle = np.where(zero, corner.middle(V, p, q), length / 8)
+    normal = np.where(zero, 2 * s * V / T1, s * corner.entry_acceleration(V, p, q))
+    speed = c * V * np.where(zero, 1.0, 0.5)
+    reachable = normal_acceleration_of_axes(machine.limits("acceleration", lines.axes), u[k - 1], u[k])
+    reachable = np.minimum(reachable, machine.normal_acceleration or np.inf)
+    largest = normal_acceleration_max(tol, 2 * s * middle, reachable, error_rate(machine))
+    return CornerTable(
+        line=lines.line[at - 1],
+        theta=theta,
+        d_in=length,
+        d_out=length,
+        tol_ap=2 * s * middle,
+        kappa_max=normal / speed**2,
+        feed_closed_form=speed * np.sqrt(largest / normal),
+        feed_planned=speed,
+        limited_by=_limited_by(course, k),
+    )
+
+
+def _limited_by(course: _Course, k: Array) -> Array:
+    """What keeps each of the corners k from being taken faster."""
+    V, kind = course.passage.V[k], course.passage.kind[k]
+    said = np.full(len(k), "look-ahead", dtype=object)
+    for free, fitting in zip(course.free, course.fitting, strict=True):
+        mine = free.kind[k] == kind
+        said[mine & (fitting.V[k] == V)] = "leg length"
+        said[mine & (free.V[k] == V)] = "tolerance"
+    said[np.minimum(course.legs.v[k - 1], course.legs.v[k]) == V] = "feed"
+    return said.astype(str)
+
+
+def _sentence(course: _Course) -> str:
+    turns, kind = course.turns, course.passage.kind
+    stops = int((turns & (kind == Kind.STOP)).sum())
+    if not turns.any():
+        return "there is no corner between full stops; every stretch is run in the shortest time"
+    text = f"{int(turns.sum()) - stops} corners are run through"
+    return text + (f", {stops} are full stops because that is faster" if stops else "")

@@ -25,6 +25,7 @@ satisfies every row the profile is feasible, always. Its cost, lam - 1, is in th
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,8 +67,13 @@ class JerkLimited:
     iterations: int = 100
     window: int = 5_000
 
-    def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Jerk-limited profile of all pieces; ends must be at rest. Failures are a status."""
+    def solve(
+        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
+    ) -> FeedrateSolution:
+        """Jerk-limited profile of all pieces; ends must be at rest. Failures are a status.
+
+        progress : called with the share of the points that is done
+        """
         began = time.perf_counter()
         if problem.feed_sq_start.any() or problem.feed_sq_end.any():
             raise ValueError("JerkLimited: pieces must start and end at rest")
@@ -76,7 +82,7 @@ class JerkLimited:
             at = problem.s[problem.piece[short[0]]]
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
-        profile = _Profile(problem, self)
+        profile = _Profile(problem, self, progress)
         for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True):
             profile.solve_piece(int(first), int(beyond) - 1)
         slower = profile.slow_down()
@@ -173,9 +179,12 @@ class _Scaled:
 class _Profile:
     """The profile of all points as it grows, window by window."""
 
-    def __init__(self, problem: FeedrateProblem, solver: JerkLimited):
+    def __init__(
+        self, problem: FeedrateProblem, solver: JerkLimited, progress: Callable[[float], None] | None
+    ):
         self.problem = problem
         self.solver = solver
+        self._progress = progress
         points, axes = problem.d1.shape
         self.x, self.u = np.zeros(points), np.zeros(points)
         self.jerk, self.duration = np.zeros(points), np.zeros(points)
@@ -334,6 +343,8 @@ class _Profile:
         self.x[begin : end + 1], self.u[begin : end + 1] = found.x[: count + 1], found.u[: count + 1]
         self.jerk[begin:end], self.duration[begin:end] = found.jerk[:count], found.duration[:count]
         self._price(begin, count, found)
+        if self._progress is not None:
+            self._progress(end / len(self.problem))
         self._rest = found.after(count)
 
     def slow_down(self) -> float:

@@ -17,29 +17,25 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import CornerShape, round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
-from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.build import toolpath_from_program
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.closed_form import corner_table
 from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.methods.toppra import corner_shape, history
 from planner.nc.program import Program
-from planner.path import PathSamples, sample_path
+from planner.path import sample_path
 from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
 
-# Corners sharper than the first of these turning angles become full stops [rad]: there a corner saves 10 ms (measured: v 100 mm/s,
-# a 2000 mm/s2, j 2e5 mm/s3) and costs five times the grid points. Should a job not be solved, the next ones are tried.
-SHARPEST = tuple(np.deg2rad([120.0, 90.0, 60.0, 30.0, 0.0]))
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
-# What is slowed down is slowed down by this much more [-], so that the next round finds nothing.
+# What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
 SLOWING_MORE = 1e-5
+EXCESS_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,14 +61,12 @@ class OptimalMethod:
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
             shape = corner_shape(self.corner, machine, toolpath)
-        for sharpest in SHARPEST:
-            with stages.stage("geometry"):
-                path = round_corners(stop_at_corners(toolpath, sharpest), machine, shape, blend_tangents=True)
-                samples = sample_path(path, machine, third_order=True)
-            with stages.stage("solve"):
-                samples, problem, solution = self._solve(samples, machine)
-            if solution.solved:
-                break
+            path = round_corners(toolpath, machine, shape, blend_tangents=True)
+            samples = sample_path(path, machine, third_order=True)
+        with stages.stage("solve") as report:
+            samples = refine_for_jerk(samples, machine)
+            problem = feedrate_problem(samples, machine)
+            solution = self.solver.solve(problem, report)
         trajectory = verdict = corners = grid = None
         if solution.solved:
             with stages.stage("solve"):
@@ -90,12 +84,7 @@ class OptimalMethod:
             machine=machine,
             toolpath=toolpath,
             status=solution.status,
-            sentence=solution.sentence
-            + (
-                f"; full stops at turns over {np.rad2deg(sharpest):.0f} degrees"
-                if sharpest < SHARPEST[0]
-                else ""
-            ),
+            sentence=solution.sentence,
             trajectory=trajectory,
             verdict=verdict,
             corners=corners,
@@ -105,28 +94,16 @@ class OptimalMethod:
             timings=stages.timings,
         )
 
-    def _solve(
-        self, samples: PathSamples, machine: Machine
-    ) -> tuple[PathSamples, FeedrateProblem, FeedrateSolution]:
-        samples = refine_for_jerk(samples, machine)
-        problem = feedrate_problem(samples, machine)
-        return samples, problem, self.solver.solve(problem)
-
-
-def stop_at_corners(toolpath: Toolpath, sharpest: float) -> Toolpath:
-    """The same path with full stops at the corners that turn by more than `sharpest` [rad]."""
-    sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > sharpest)
-    return dataclasses.replace(toolpath, joint=np.where(sharp, Joint.STOP, toolpath.joint))
-
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine) -> Motion:
     """The same motion with every run slowed down until its speeds, accelerations and jerks keep all limits, on the samples and
     densely between them."""
     for _ in range(SLOWING_ROUNDS):
         factor = _excess(motion, toolpath, machine)
-        if not (factor > 1.0).any():
+        slow = factor > 1.0 + EXCESS_ROUNDING
+        if not slow.any():
             break
-        motion = _slower(motion, np.where(factor > 1.0, factor * (1.0 + SLOWING_MORE), 1.0))
+        motion = _slower(motion, np.where(slow, factor * (1.0 + SLOWING_MORE), 1.0))
     return motion
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.cli_pulses import pulses
 from planner.errors import InputError, NotSolvedError
 
 if TYPE_CHECKING:
@@ -281,6 +282,9 @@ def info(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -
         _show(info_table(found))
     if found.unsupported:
         raise typer.Exit(BAD_INPUT)
+
+
+app.command()(_guarded(pulses))
 
 
 @machine_app.command("list")

@@ -28,9 +28,11 @@ LAYERS = (
     "planner.trajectory",
     "planner.timing",
     "planner.axis_motion",
+    "planner.pulses",
     "planner.verify",
     "planner.methods",
     "planner.report",
+    "planner.cli_pulses",
     "planner.cli",
 )
 # The judge sees the path, the machine and the samples, and no code of those it judges.

@@ -1,0 +1,94 @@
+"""The command `planner pulses`: step and direction pulses of a trajectory file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planner.errors import InputError
+
+if TYPE_CHECKING:
+    from planner.pulses import AxisPulses
+
+
+def pulses(
+    trajectory: Annotated[
+        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
+    ],
+    steps: Annotated[
+        str, typer.Option(metavar="x=400,y=400", help="pulses per mm of each axis (rotary axes: per degree)")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="write the pulses (.parquet, .csv)")
+    ] = None,
+    max_frequency: Annotated[
+        float | None, typer.Option(metavar="HZ", help="pulses per second that the drives take")
+    ] = None,
+    pulse_width: Annotated[
+        float | None, typer.Option(metavar="US", help="shortest high and low time of the step signal [us]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of a table")] = False,
+) -> None:
+    """Step and direction pulses of a trajectory, less than one pulse off at every instant.
+
+    Where they follow faster than the drives take them nothing is written, and the exit code is 1.
+    """
+    from planner.pulses import Drive, overrun, pulses_of
+    from planner.report.pulse_file import write_pulses
+    from planner.report.trajectory_file import read_trajectory
+
+    wanted = parse_steps(steps)
+    drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
+    read = read_trajectory(trajectory)
+    trains = pulses_of(read.trajectory, wanted)
+    faults = overrun(trains, drive)
+    if output is not None and not faults:
+        about: dict[str, Any] = {
+            name: value for name, value in read.metadata.items() if name in ("run_id", "program")
+        }
+        write_pulses(output, trains, about)
+    if as_json:
+        typer.echo(json.dumps({"axes": _figures(trains), "faults": faults}, indent=2, allow_nan=False))
+    else:
+        for axis, figures in _figures(trains).items():
+            rate = figures["highest_frequency_hz"]
+            typer.echo(
+                f"{axis}: {figures['pulses']:,} pulses, {figures['direction_changes']:,} changes of direction"
+                + (f", at most {rate:,.0f} per second" if rate is not None else "")
+            )
+        for fault in faults:
+            typer.echo(fault, err=True)
+        if output is not None and not faults:
+            typer.echo(str(output))
+    if faults:
+        raise typer.Exit(1)
+
+
+def parse_steps(text: str) -> dict[str, float]:
+    """Axes and numbers of `x=400,y=400`. Raises InputError naming the part that is not one."""
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        axis, equals, value = (word.strip() for word in part.partition("="))
+        try:
+            number = float(value)
+        except ValueError:
+            number = -1.0
+        if not equals or len(axis) != 1 or not number > 0 or axis.lower() in found:
+            raise InputError(f"--steps: '{part}'; write each axis once, as in x=400,y=400")
+        found[axis.lower()] = number
+    return found
+
+
+def _figures(trains: tuple[AxisPulses, ...]) -> dict[str, dict[str, Any]]:
+    return {
+        train.axis: {
+            "steps": train.steps,
+            "pulses": len(train),
+            "direction_changes": train.changes,
+            "highest_frequency_hz": train.frequency_max,
+        }
+        for train in trains
+    }

@@ -1,0 +1,72 @@
+"""Pulse files: one row per pulse, all axes in the order of time.
+
+    t [s], axis (its letter), direction (+1, -1), count (of that axis after the pulse, 0 at the start), line (of the NC program)
+
+as Parquet (`.parquet`; the schema's key `planner` holds pulses per mm and the trajectory's `run_id` as JSON) or CSV (`.csv`). The file
+appears as a whole: it is written beside its place, forced to disk and renamed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import uuid
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.pulses import AxisPulses
+
+SUFFIXES = (".parquet", ".csv")
+
+
+def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
+    """Write the pulses with `about` as their metadata. Raises InputError for another suffix or a place that cannot be written."""
+    path = Path(path)
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
+    new = path.with_name(f".{path.name}.planner-{uuid.uuid4().hex[:12]}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _write(new, path.suffix, trains, about)
+        with new.open("rb+") as file:
+            os.fsync(file.fileno())
+        new.replace(path)
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(path)) from fault
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    time = np.concatenate([train.time for train in trains])
+    order = np.argsort(time, kind="stable")
+    which = np.concatenate([np.full(len(train), k, np.int8) for k, train in enumerate(trains)])[order]
+    table = pa.table(
+        {
+            "t": time[order],
+            "axis": pa.DictionaryArray.from_arrays(which, [train.axis for train in trains]).cast(pa.string()),
+            "direction": np.concatenate([train.direction for train in trains])[order],
+            "count": np.concatenate([train.count for train in trains])[order],
+            "line": np.concatenate([train.line for train in trains])[order],
+        }
+    )
+    if suffix == ".csv":
+        with path.open("wb") as file:
+            file.write((",".join(table.column_names) + "\n").encode())
+            csv.write_csv(table, file, csv.WriteOptions(include_header=False, quoting_style="none"))
+        return
+    text = json.dumps(about | {"steps": {train.axis: train.steps for train in trains}}, allow_nan=False)
+    parquet.write_table(
+        table.replace_schema_metadata({"planner": text}),
+        path,
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=["axis", "direction", "line"],
+        use_byte_stream_split=["t"],
+    )

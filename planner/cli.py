@@ -35,6 +35,7 @@ class Method(StrEnum):
 
     toppra = "toppra"
     optimal = "optimal"
+    bezier = "bezier"
     kinematic = "kinematic"
     stop = "stop"
 

@@ -39,6 +39,9 @@ REFINE_STEPS = 12
 CUBE_ROOT_ROUNDING = 4e-5
 # Distance of the outer samples of a piece of the law from its ends [share of the piece].
 DENSE_EDGE = 0.05
+# Pieces shorter than this get no samples of their own [s]: the rounding of times puts them into their neighbours, and what happens
+# there moves nothing (2e5 mm/s3 for 1e-9 s are 1e-13 mm/s).
+SHORTEST_PIECE = 1e-9
 # More samples than this are refused: with three axes they fill 14 GB.
 SAMPLES_MAX = 1e8
 # Samples per chunk of a finely sampled motion: 20 MB with three axes.
@@ -135,30 +138,50 @@ def law_of_phases(samples: PathSamples, duration: FloatArray, jerk_s: FloatArray
     duration : (G, F) durations of the F phases of each move [s]
     jerk_s   : (G, F) jerk along the path in each phase [mm/s3]
     """
+    moves = len(duration)
+    return law_of_moves(
+        samples, np.arange(moves), samples.s[samples.piece[:-1]], np.zeros(moves), duration, jerk_s
+    )
+
+
+def law_of_moves(
+    samples: PathSamples,
+    run: Array,
+    s: FloatArray,
+    feed: FloatArray,
+    duration: FloatArray,
+    jerk_s: FloatArray,
+) -> TimeLaw:
+    """The time law of M moves that meet without acceleration along the path, dwells included.
+
+    run      : (M,) piece of the path that each move belongs to, non-decreasing; every piece has one
+    s, feed  : (M,) where each move begins [mm], and its speed there [mm/s]
+    duration : (M, F) durations of its F phases [s]
+    jerk_s   : (M, F) jerk along the path in each phase [mm/s3]
+    """
     moves, phases = duration.shape
-    dwell = _dwells(samples)
-    lasting = np.concatenate([duration, dwell[1:, None]], axis=1)
-    jerk = np.concatenate([jerk_s, np.zeros((moves, 1))], axis=1)
-    s, feed, acc = (np.zeros((moves, phases + 1)) for _ in range(3))
-    s[:, 0] = samples.s[samples.piece[:-1]]
-    for f in range(phases):
+    state = np.zeros((3, moves, phases))  # s, feed, acc_s at the start of each phase
+    state[0, :, 0], state[1, :, 0] = s, feed
+    for f in range(phases - 1):
         dt, j = duration[:, f], jerk_s[:, f]
-        s[:, f + 1] = s[:, f] + dt * (feed[:, f] + dt * (acc[:, f] / 2 + dt * j / 6))
-        feed[:, f + 1] = np.maximum(feed[:, f] + dt * (acc[:, f] + dt * j / 2), 0.0)
-        acc[:, f + 1] = acc[:, f] + dt * j
-    s[:, -1], feed[:, -1], acc[:, -1] = (
-        samples.s[samples.piece[1:] - 1],
-        0.0,
-        0.0,
-    )  # exact where rounding left a trace
+        now_s, now_feed, now_acc = state[:, :, f]
+        state[0, :, f + 1] = now_s + dt * (now_feed + dt * (now_acc / 2 + dt * j / 6))
+        state[1, :, f + 1] = np.maximum(now_feed + dt * (now_acc + dt * j / 2), 0.0)
+        state[2, :, f + 1] = now_acc + dt * j
+    lasting = duration > 0.0
+    of_run = np.repeat(run, lasting.sum(axis=1))
+    # Behind the last move of every piece its standstill, exactly where the piece ends.
+    dwell = _dwells(samples)
+    close = np.searchsorted(of_run, np.arange(len(samples.piece) - 1), side="right")
+    times = np.insert(duration[lasting], close, dwell[1:])
     return TimeLaw(
-        t=dwell[0] + np.concatenate([[0.0], np.cumsum(lasting)[:-1]]),
-        s=s.ravel(),
-        feed=feed.ravel(),
-        acc_s=acc.ravel(),
-        jerk_s=jerk.ravel(),
-        run=np.repeat(np.arange(moves), phases + 1),
-        end=float(dwell[0] + lasting.sum()),
+        t=dwell[0] + np.concatenate([[0.0], np.cumsum(times)[:-1]]),
+        s=np.insert(state[0][lasting], close, samples.s[samples.piece[1:] - 1]),
+        feed=np.insert(state[1][lasting], close, 0.0),
+        acc_s=np.insert(state[2][lasting], close, 0.0),
+        jerk_s=np.insert(jerk_s[lasting], close, 0.0),
+        run=np.insert(of_run, close, np.arange(len(close))),
+        end=float(dwell[0] + times.sum()),
     )
 
 
@@ -174,7 +197,8 @@ def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
     On a piece all speeds and accelerations are smooth and nearly linear, so that their extremes show there.
     """
     edges = np.append(motion.t, motion.end)
-    begin, end = edges[:-1], edges[1:]
+    lasting = np.diff(edges) > SHORTEST_PIECE
+    begin, end = edges[:-1][lasting], edges[1:][lasting]
     inside = [near * begin + (1.0 - near) * end for near in (1.0 - DENSE_EDGE, 0.5, DENSE_EDGE)]
     halves = np.arange(0.5 * dt, motion.end, dt)
     times = np.unique(np.concatenate([[0.0], *inside, halves, [motion.end]]))

@@ -102,12 +102,18 @@ class SmoothPath:
 
 
 def round_corners(
-    toolpath: Toolpath, machine: Machine, corner: CornerShape, *, blend_tangents: bool = False
+    toolpath: Toolpath,
+    machine: Machine,
+    corner: CornerShape,
+    *,
+    blend_tangents: bool = False,
+    free: float = 0.0,
 ) -> SmoothPath:
     """Blend every corner of the toolpath within its budget.
 
     blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it; such a corner has
                      theta = 0, bends off both legs within the tolerance, and has no jump left
+    free           : share of every leg that its corners leave free [-], for motions that change their speed between corners only
 
     Raises InputError if the machine lacks an axis of the toolpath.
     """
@@ -133,7 +139,8 @@ def round_corners(
         reachable = np.minimum(reachable, machine.normal_acceleration)
     rate = error_rate(machine)
 
-    longest = legs.length[np.clip([np.arange(len(at)) - 1, np.arange(len(at))], 0, len(legs) - 1)].min(axis=0)
+    usable = (1.0 - free) * legs.length
+    longest = usable[np.clip([np.arange(len(at)) - 1, np.arange(len(at))], 0, len(legs) - 1)].min(axis=0)
     wanted = np.zeros(len(at))
     middle = middle_from_tolerance(allocate(tol, reachable, rate), sin_half, curvature)[blend]
     bent = np.zeros(len(at))  # what the legs' curvature adds to sin(theta/2) in E(m) = 2 (s + bent) m
@@ -145,7 +152,7 @@ def round_corners(
     room = np.maximum(BEND_MAX - theta, 0.0)
     wanted = np.minimum(wanted, np.divide(room, bend, out=np.full(len(at), np.inf), where=bend > 0))
     ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half + bent, 1e-12)
-    d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), legs.length)
+    d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), usable)
     stretch = _close_legs(d, legs.length)
 
     params = np.zeros((len(at), 4))

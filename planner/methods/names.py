@@ -8,6 +8,7 @@ from typing import Protocol
 
 from planner.errors import InputError
 from planner.machine import Machine, load_machine
+from planner.methods.bezier import BezierMethod
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
@@ -18,7 +19,7 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 
 DEFAULT_MACHINE = "mill"
-METHODS = ("optimal", "toppra", "kinematic", "stop")
+METHODS = ("optimal", "toppra", "bezier", "kinematic", "stop")
 
 
 class Method(Protocol):
@@ -77,6 +78,8 @@ def _method(name: str, corner: str, solver: str) -> Method:
         return OptimalMethod(corner=corner)
     if name == "toppra":
         return ToppraMethod(corner=corner, solver=solver)
+    if name == "bezier":
+        return BezierMethod()
     if name == "kinematic":
         return KinematicMethod()
     if name == "stop":

@@ -3,8 +3,9 @@
 600 interpolation periods of 10 ms (the paper's), X the long axis. Every period an axis should send f T pulses; the variants are
 
     no carry      n = floor(f T) on both axes, what is left over is forgotten
-    eq. 11-12     n'_x = floor(T f_x), T'_x = n'_x/f_x;  dT = T'_x - n'_y/f_y as printed, T_y = T'_x + dT(before), n'_y = floor(f_y T_y):
-                  the remainder does not contain the one before. (Printed with V_y n'_y for T'_x, (12) would add no pulse at all.)
+    eq. 11-12     n'_x = floor(T f_x), T'_x = n'_x/f_x;  dT = T'_x - n'_y/f_y as printed, T_y = T'_x + dT of the period before,
+                  n'_y = floor(f_y T_y): the remainder does not contain the one before. (With V_y n'_y in the place of T'_x, as (12)
+                  is printed, no pulse would be added at all.)
     seconds       the same with dT = T_y - n'_y/f_y, the accumulated remainder, still as a time
     pulses        n_k = floor(c_k) - floor(c_{k-1}) with c = the sum of f T, on both axes
 

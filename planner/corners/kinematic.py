@@ -60,7 +60,7 @@ def phase_times(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> tuple[Floa
     alpha, eta : largest accelerations [mm/s2] and jerks [mm/s3] per unit of direction change
     """
     T1 = np.maximum(V / alpha, np.sqrt(V / eta))
-    return T1, V / (eta * T1)
+    return T1, np.minimum(V / (eta * T1), T1)  # the same where only jerk limits, but for rounding
 
 
 def approach(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:

@@ -117,7 +117,7 @@ def _jumps(grid: Grid) -> int:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Window:
-    """A solved window in the problem's units; `lam` are the multipliers of its scaled rows."""
+    """A solved window in the problem's units; `lam` (N, R, 2) are the multipliers of its scaled rows' upper and lower sides."""
 
     x: FloatArray
     u: FloatArray
@@ -144,7 +144,7 @@ class _Scaled:
     """A window's problem in units of its own: fastest feed 1, largest acceleration 1."""
 
     grid: Grid
-    jerk_max: FloatArray
+    per_jerk: FloatArray
     jumps: int
     feed: float
     time: float
@@ -152,16 +152,16 @@ class _Scaled:
     @property
     def rows(self) -> int:
         """Rows per interval."""
-        return (3 + self.jumps) * len(self.jerk_max) + 2
+        return (3 + self.jumps) * len(self.per_jerk) + 2
 
     def slowed(
         self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
-        n, axes = len(p), len(self.jerk_max)
+        n, axes = len(p), len(self.per_jerk)
         model, h = empty_model(n, self.rows), np.empty(n)
-        lam = np.zeros((n, self.rows, 2))
-        linearise(self.grid, self.jerk_max, x, u, p, h, lam, np.zeros(n), model, self.jumps)
+        lam = np.zeros((n, 2 * self.rows - 2))
+        linearise(self.grid, self.per_jerk, x, u, p, h, lam, np.zeros(n), model, self.jumps)
         worst = np.abs(model.values).max(axis=0)
         jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
         worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
@@ -170,9 +170,11 @@ class _Scaled:
 
     def window(self, x: FloatArray, u: FloatArray, p: FloatArray, h: FloatArray, lam: FloatArray) -> _Window:
         """A profile in the problem's units."""
+        sides = np.zeros((len(p), self.rows, 2))
+        sides[:, :, 0], sides[:, : self.rows - 2, 1] = lam[:, : self.rows], lam[:, self.rows :]
         feed, t = self.feed, self.time
         return _Window(
-            x=x * feed**2, u=u * feed / t, jerk=p / h * feed / t**2, duration=h * t, lam=lam, time_unit=t
+            x=x * feed**2, u=u * feed / t, jerk=p / h * feed / t**2, duration=h * t, lam=sides, time_unit=t
         )
 
 
@@ -255,9 +257,11 @@ class _Profile:
             d2_right=problem.d2_right[own] * length,
             d3_left=problem.d3_left[own] * length**2,
             d3_right=problem.d3_right[own] * length**2,
-            acceleration=self.acceleration[own] * t / feed,
+            per_acceleration=feed / t / self.acceleration[own],
         )
-        return _Scaled(grid=grid, jerk_max=problem.jerk * t * t / feed, jumps=_jumps(grid), feed=feed, time=t)
+        return _Scaled(
+            grid=grid, per_jerk=feed / (t * t) / problem.jerk, jumps=_jumps(grid), feed=feed, time=t
+        )
 
     def _solve_window(self, begin: int, end: int) -> _Window | None:
         """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
@@ -266,7 +270,7 @@ class _Profile:
             x, u, p = start(begin, end, scaled)
             done, gap, residual, defect, h, lam = kernel.minimise(
                 scaled.grid,
-                scaled.jerk_max,
+                scaled.per_jerk,
                 x,
                 u,
                 p,
@@ -285,7 +289,7 @@ class _Profile:
         asked = envelope(self.problem, begin, end) / scaled.feed**2
         plain_x, plain_u = plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)]))
         before = self._rest if self.x[begin] > 0.0 else None
-        jerk = float(scaled.jerk_max.min())
+        jerk = float(1.0 / scaled.per_jerk.max())
         for change_max in (TRACKED, np.inf):  # what cannot be tracked closely is at least approached
             x, u = plain_x * asked.max(), plain_u * asked.max()
             if before is not None:
@@ -312,7 +316,7 @@ class _Profile:
         x, u, p = self._plain(begin, end, scaled)
         vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
         h = 2.0 * scaled.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * scaled.grid.ds / 3.0, 0.0)))
-        return scaled.window(x, u, p, h, np.zeros((len(p), scaled.rows, 2)))
+        return scaled.window(x, u, p, h, np.zeros((len(p), 2 * scaled.rows - 2)))
 
     def _price(self, begin: int, count: int, found: _Window) -> None:
         """Add the multipliers of the kept intervals to the prices; a scaled row g <= 1 costs lam per unit of its limit."""

@@ -30,83 +30,92 @@ SHARE_MIN = 0.05  # a smaller share of the curvature is none [-]
 FEED_SQ_SHRINK = 0.9  # largest share of x that one step may take away [-]
 
 
-@njit(cache=True, error_model="numpy")
-def weigh(model, slack, lam, mu, one_sided):
-    """Add the rows' barriers to the model's convex Hessian and gradient; returns the largest residual of the rows."""
+@njit(cache=True, error_model="numpy", fastmath=True)
+def weigh(model, slack, lam):
+    """Add the rows' weights to the model's convex Hessian and gradient, without a barrier; returns their largest residual."""
     gradient, rows, values, hessian = model.gradient, model.rows, model.values, model.convex
     n, count = values.shape
+    lower = slack.shape[1] - count
+    weights, pushes = np.empty(count), np.empty(count)
     worst = 0.0
     for i in range(n):
-        hxx, hxu, hxp, huu, hup, hpp = 0.0, 0.0, 0.0, HESSIAN_MIN, 0.0, HESSIAN_MIN
         for r in range(count):
-            g = values[i, r]
-            residual = g + slack[i, r, 0] - 1.0
-            w = lam[i, r, 0] / slack[i, r, 0]
-            push = mu / slack[i, r, 0] + w * residual
+            residual = values[i, r] + slack[i, r] - 1.0
+            weights[r] = lam[i, r] / slack[i, r]
+            pushes[r] = weights[r] * residual
             worst = max(worst, abs(residual))
-            if r < one_sided:
-                residual = slack[i, r, 1] - g - 1.0
-                w1 = lam[i, r, 1] / slack[i, r, 1]
-                push -= mu / slack[i, r, 1] + w1 * residual
-                worst = max(worst, abs(residual))
-                w += w1
-            a, b, c = rows[i, r, 0], rows[i, r, 1], rows[i, r, 2]
+        for r in range(lower):
+            residual = slack[i, count + r] - values[i, r] - 1.0
+            w = lam[i, count + r] / slack[i, count + r]
+            weights[r] += w
+            pushes[r] -= w * residual
+            worst = max(worst, abs(residual))
+        hxx, hxu, hxp, huu, hup, hpp = 0.0, 0.0, 0.0, HESSIAN_MIN, 0.0, HESSIAN_MIN
+        gx, gu, gp = 0.0, 0.0, 0.0
+        for r in range(count):
+            a, b, c, w = rows[i, 0, r], rows[i, 1, r], rows[i, 2, r], weights[r]
             hxx += w * a * a
             hxu += w * a * b
             hxp += w * a * c
             huu += w * b * b
             hup += w * b * c
             hpp += w * c * c
-            gradient[i, 0] += push * a
-            gradient[i, 1] += push * b
-            gradient[i, 2] += push * c
+            gx += pushes[r] * a
+            gu += pushes[r] * b
+            gp += pushes[r] * c
         hessian[i, 0] += hxx
         hessian[i, 1] += hxu
         hessian[i, 2] += hxp
         hessian[i, 3] += huu
         hessian[i, 4] += hup
         hessian[i, 5] += hpp
+        gradient[i, 0] += gx
+        gradient[i, 1] += gu
+        gradient[i, 2] += gp
     return worst
 
 
-@njit(cache=True, error_model="numpy")
-def correct(model, slack, lam, mu, bending, one_sided, dslack, dlam):
-    """Second half of a predictor-corrector step: with the predicted steps of slacks and multipliers (overwritten by their
-    products, the targets' second-order terms) add the barrier mu to the gradient."""
+@njit(cache=True, error_model="numpy", fastmath=True)
+def correct(model, slack, mu, bending, dslack, dlam):
+    """Second half of a predictor-corrector step: add the barrier mu to the gradient, less the predicted steps' second-order terms
+    dslack dlam, which replace dlam."""
     gradient, rows = model.gradient, model.rows
-    n, count, _ = slack.shape
+    n, _, count = rows.shape
+    lower = slack.shape[1] - count
+    pushes = np.empty(count)
     for i in range(n):
         for r in range(count):
-            push = 0.0
-            for side in range(2 if r < one_sided else 1):
-                bent = bending * dslack[i, r, side] * dlam[i, r, side]
-                dlam[i, r, side] = bent
-                push += (1.0 - 2.0 * side) * (mu - bent) / slack[i, r, side]
-            gradient[i, 0] += push * rows[i, r, 0]
-            gradient[i, 1] += push * rows[i, r, 1]
-            gradient[i, 2] += push * rows[i, r, 2]
-
-
-@njit(cache=True, error_model="numpy")
-def complementarity(slack, lam, dslack, dlam, primal, dual, one_sided):
-    """Sum of slack times multiplier after a step."""
-    n, count, _ = slack.shape
-    gap = 0.0
-    for i in range(n):
+            bent = bending * dslack[i, r] * dlam[i, r]
+            dlam[i, r] = bent
+            pushes[r] = (mu - bent) / slack[i, r]
+        for r in range(lower):
+            bent = bending * dslack[i, count + r] * dlam[i, count + r]
+            dlam[i, count + r] = bent
+            pushes[r] -= (mu - bent) / slack[i, count + r]
+        gx, gu, gp = 0.0, 0.0, 0.0
         for r in range(count):
-            for side in range(2 if r < one_sided else 1):
-                gap += (slack[i, r, side] + primal * dslack[i, r, side]) * (
-                    lam[i, r, side] + dual * dlam[i, r, side]
-                )
-    return gap
+            gx += pushes[r] * rows[i, 0, r]
+            gu += pushes[r] * rows[i, 1, r]
+            gp += pushes[r] * rows[i, 2, r]
+        gradient[i, 0] += gx
+        gradient[i, 1] += gu
+        gradient[i, 2] += gp
 
 
-@njit(cache=True, error_model="numpy")
-def direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack, dlam, dpi):
-    """Newton step (dx, du, dp) in dz (N+1, 3), of slacks, multipliers and costates; returns the two step lengths."""
+@njit(cache=True, error_model="numpy", fastmath=True)
+def direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi):
+    """Newton step (dx, du, dp) in dz (N+1, 3), of slacks, multipliers and costates.
+
+    dlam : (N, M) in, the second-order terms to make up for; out, the step
+
+    Returns the two step lengths and the complementarity sum(slack * lam) after them.
+    """
     dynamics, rows, values, costate = model.dynamics, model.rows, model.values, model.costate
     n, count = values.shape
-    primal, dual = 1.0, 1.0
+    lower = slack.shape[1] - count
+    after = np.empty(count)
+    primal, nearest, nearest_dual = 1.0, 0.0, 0.0
+    mixed, mixed_dual, product, now = 0.0, 0.0, 0.0, 0.0
     dz[0, 0] = dz[0, 1] = 0.0
     for i in range(n):
         dx, du = dz[i, 0], dz[i, 1]
@@ -120,17 +129,36 @@ def direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack,
             if step < -FEED_SQ_SHRINK * x[i + 1]:
                 primal = min(primal, -FEED_SQ_SHRINK * x[i + 1] / step)
         for r in range(count):
-            along = rows[i, r, 0] * dx + rows[i, r, 1] * du + rows[i, r, 2] * dp
-            for side in range(2 if r < one_sided else 1):
-                sign = 1.0 - 2.0 * side
-                s, y = slack[i, r, side], lam[i, r, side]
-                move = 1.0 - sign * (values[i, r] + along) - s
-                push = (mu - dlam[i, r, side] - y * move) / s - y
-                dslack[i, r, side], dlam[i, r, side] = move, push
-                if move < -STEP_TO_BOUNDARY * s:
-                    primal = min(primal, -STEP_TO_BOUNDARY * s / move)
-                if push < -STEP_TO_BOUNDARY * y:
-                    dual = min(dual, -STEP_TO_BOUNDARY * y / push)
+            after[r] = values[i, r] + rows[i, 0, r] * dx + rows[i, 1, r] * du + rows[i, 2, r] * dp
+        for r in range(count):
+            s, y = slack[i, r], lam[i, r]
+            move = 1.0 - after[r] - s
+            share_s = move / s
+            push = (mu - dlam[i, r]) / s - y * (1.0 + share_s)
+            dslack[i, r], dlam[i, r] = move, push
+            nearest, nearest_dual = min(nearest, share_s), min(nearest_dual, push / y)
+            mixed, mixed_dual, product, now = (
+                mixed + move * y,
+                mixed_dual + s * push,
+                product + move * push,
+                now + s * y,
+            )
+        for r in range(lower):
+            s, y = slack[i, count + r], lam[i, count + r]
+            move = 1.0 + after[r] - s
+            share_s = move / s
+            push = (mu - dlam[i, count + r]) / s - y * (1.0 + share_s)
+            dslack[i, count + r], dlam[i, count + r] = move, push
+            nearest, nearest_dual = min(nearest, share_s), min(nearest_dual, push / y)
+            mixed, mixed_dual, product, now = (
+                mixed + move * y,
+                mixed_dual + s * push,
+                product + move * push,
+                now + s * y,
+            )
+    if -nearest > STEP_TO_BOUNDARY:
+        primal = min(primal, -STEP_TO_BOUNDARY / nearest)
+    dual = -STEP_TO_BOUNDARY / nearest_dual if -nearest_dual > STEP_TO_BOUNDARY else 1.0
     last_x, last_u, last_p = slope(model, share, dz, n - 1)
     _, _, before_p = slope(model, share, dz, n - 2)
     b2 = dynamics[n - 2, 2]
@@ -139,7 +167,7 @@ def direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack,
     dpi[n - 1] = ahead - pi[n - 1]
     ahead = last_x + ahead * dynamics[n - 1, 0]
     dpi[n - 2] = costate[n - 2, 0] * (ahead + costate[n - 2, 1]) - pi[n - 2]
-    return primal, dual
+    return primal, dual, now + primal * mixed + dual * mixed_dual + primal * dual * product
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,10 +183,10 @@ def within_domain(ds, x, p, dz, primal):
     return primal
 
 
-@njit(cache=True, error_model="numpy")
-def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual, one_sided):
+@njit(cache=True, error_model="numpy", fastmath=True)
+def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual):
     """Take the step; returns the complementarity sum(slack * lam) and the largest relative change of x."""
-    n, count, _ = slack.shape
+    n, sides = slack.shape
     gap, change = 0.0, 0.0
     for i in range(n):
         if i > 0:
@@ -167,11 +195,10 @@ def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual, one_si
         u[i] += primal * dz[i, 1]
         p[i] += primal * dz[i, 2]
         pi[i] += dual * dpi[i]
-        for r in range(count):
-            for side in range(2 if r < one_sided else 1):
-                slack[i, r, side] += primal * dslack[i, r, side]
-                lam[i, r, side] += dual * dlam[i, r, side]
-                gap += slack[i, r, side] * lam[i, r, side]
+        for r in range(sides):
+            slack[i, r] += primal * dslack[i, r]
+            lam[i, r] += dual * dlam[i, r]
+            gap += slack[i, r] * lam[i, r]
     return gap, change
 
 
@@ -180,7 +207,7 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max):
     """Move a motion x, u (N+1,), p (N,) towards the feed^2 asked for: Gauss-Newton on the time integral of (dx/x)^2 J + j^2/J,
     with the jerk j of the result and a jerk J of the machine's size. Both ends stay. Returns the defect that is left."""
     n = len(p)
-    ds, lam, pi = grid.ds, np.zeros((n, 0, 2)), np.zeros(n)
+    ds, lam, pi = grid.ds, np.zeros((n, 0)), np.zeros(n)
     model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 8)), np.zeros((n + 1, 3)), np.zeros(n)
     worst, change = np.inf, 1e300  # a first round always
     for _ in range(rounds):
@@ -197,7 +224,7 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max):
         if (worst <= DEFECT and change <= change_max) or not riccati(model, 0.0, gains):
             break
         offsets(model, 0.0, gains)
-        primal, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, 0, dz, lam, lam, dpi)
+        primal, _, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, dz, lam, lam, dpi)
         primal = within_domain(ds, x, p, dz, primal)
         change = 0.0
         for i in range(n):
@@ -210,32 +237,35 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max):
 
 
 @njit(cache=True, error_model="numpy")
-def minimise(grid, jerk_max, x, u, p, jumps, tol, iterations):
+def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
     """Solve one window in place, from the profile x, u (N+1,), p (N,) to the optimal one; x_0, u_0, x_N = u_N = 0 are given.
 
-    Returns iterations used, relative gap, residual of rows and of dynamics, durations (N,), multipliers (N, R, 2).
+    Returns iterations used, relative gap, residual of rows and of dynamics, durations (N,), multipliers (N, M) of the
+    rows' upper sides, then their lower sides.
     """
-    n, axes = len(x) - 1, len(jerk_max)
-    one_sided = axes * (3 + jumps)
-    count = one_sided + 2
+    n = len(x) - 1
+    lower = len(per_jerk) * (3 + jumps)
+    count = lower + 2
     h, pi, dpi = np.empty(n), np.zeros(n), np.zeros(n)
     model = empty_model(n, count)
     gains, dz = np.empty((n, 8)), np.zeros((n + 1, 3))
-    slack, lam = np.ones((n, count, 2)), np.zeros((n, count, 2))
-    dslack, dlam = np.zeros((n, count, 2)), np.zeros((n, count, 2))
-    total, _ = linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps)
-    pairs = n * (one_sided + count)
+    slack, lam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
+    dslack, dlam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
+    total, _ = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
+    pairs = slack.size
     mu = START_GAP * total / n
     for i in range(n):
         for r in range(count):
-            for side in range(2):
-                slack[i, r, side] = max(1.0 - (1.0 - 2.0 * side) * model.values[i, r], SLACK_MIN)
-                lam[i, r, side] = mu / slack[i, r, side]
+            slack[i, r] = max(1.0 - model.values[i, r], SLACK_MIN)
+        for r in range(lower):
+            slack[i, count + r] = max(1.0 + model.values[i, r], SLACK_MIN)
+        for r in range(count + lower):
+            lam[i, r] = mu / slack[i, r]
     share = 1.0
     gap, hold, residual, defect, done = mu * pairs, 0.0, np.inf, np.inf, iterations
     for it in range(iterations):
-        total, defect = linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps)
-        residual = weigh(model, slack, lam, 0.0, one_sided)
+        total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
+        residual = weigh(model, slack, lam)
         if gap <= tol * total and residual <= RESIDUAL and defect <= DEFECT:
             done = it
             break
@@ -246,24 +276,16 @@ def minimise(grid, jerk_max, x, u, p, jumps, tol, iterations):
             share = 0.25 * share if share > SHARE_MIN else 0.0
         offsets(model, share, gains)
         dlam[:] = 0.0
-        primal, dual = direction(
-            model, share, gains, x, slack, lam, pi, 0.0, one_sided, dz, dslack, dlam, dpi
-        )
-        left = complementarity(slack, lam, dslack, dlam, primal, dual, one_sided) / gap
-        mu = (
-            max(
-                hold * gap if hold > 0.0 else min(left * left * left, SIGMA_MAX) * gap,
-                GAP_FLOOR * tol * total,
-            )
-            / pairs
-        )
+        primal, dual, left = direction(model, share, gains, x, slack, lam, pi, 0.0, dz, dslack, dlam, dpi)
+        sigma = hold if hold > 0.0 else min((left / gap) ** 3, SIGMA_MAX)
+        mu = max(sigma * gap, GAP_FLOOR * tol * total) / pairs
         bending = 1.0 if min(primal, dual) > PREDICTED_MIN else 0.0
-        correct(model, slack, lam, mu, bending, one_sided, dslack, dlam)
+        correct(model, slack, mu, bending, dslack, dlam)
         offsets(model, share, gains)
-        primal, dual = direction(model, share, gains, x, slack, lam, pi, mu, one_sided, dz, dslack, dlam, dpi)
+        primal, dual, _ = direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
         primal = within_domain(grid.ds, x, p, dz, primal)
-        gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual, one_sided)
+        gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual)
         hold = 1.0 if change > CHANGE_MAX else 0.0
     if done == iterations:  # the last step has not been looked at yet
-        total, defect = linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps)
+        total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
     return done, gap / total, residual, defect, h, lam

@@ -42,7 +42,7 @@ class Grid(NamedTuple):
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
-    acceleration: FloatArray
+    per_acceleration: FloatArray  # one over the limits
 
 
 class Model(NamedTuple):
@@ -50,7 +50,7 @@ class Model(NamedTuple):
 
     dynamics : (N, 4) dx_{i+1} = D0 dx + D1 du + D2 dp + D3
     gradient : (N, 3) of the total time
-    rows     : (N, R, 3) gradients of the rows
+    rows     : (N, 3, R) gradients of the rows
     values   : (N, R) the rows, the effect of the dynamics' defect included
     convex   : (N, 6) Hessian of the time, as (xx, xu, xp, uu, up, pp)
     curved   : (N, 6) Hessian of rows and dynamics, weighed by their multipliers
@@ -72,7 +72,7 @@ def empty_model(n, count):
     return Model(
         np.zeros((n, 4)),
         np.zeros((n, 3)),
-        np.zeros((n, count, 3)),
+        np.zeros((n, 3, count)),
         np.zeros((n, count)),
         np.zeros((n, 6)),
         np.zeros((n, 6)),
@@ -113,7 +113,7 @@ def kinematics(x0, x1, u, p, ds, last):
 
 @njit(cache=True, error_model="numpy")
 def _put(rows, values, i, r, cx, cu, cp, value, scale):
-    rows[i, r, 0], rows[i, r, 1], rows[i, r, 2] = cx * scale, cu * scale, cp * scale
+    rows[i, 0, r], rows[i, 1, r], rows[i, 2, r] = cx * scale, cu * scale, cp * scale
     values[i, r] = value * scale
 
 
@@ -130,17 +130,19 @@ def _reduce(out, i, q, e0, e1, e2):
 
 
 @njit(cache=True, error_model="numpy")
-def linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps):
-    """Fill the model at the profile (x, u, p) with the multipliers lam (N, R, 2) of the rows and pi (N,) of the dynamics.
+def linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps):
+    """Fill the model at the profile (x, u, p) with the multipliers of rows and dynamics.
 
-    h       : (N,) out, durations
-    jumps   : 1 if r'' jumps anywhere: a row for the acceleration left of each point
+    lam, pi  : (N, M), (N,) multipliers of the rows, upper sides first, and of the dynamics
+    per_jerk : (A,) one over the limits
+    h        : (N,) out, durations
+    jumps    : 1 if r'' jumps anywhere: a row for the acceleration left of each point
 
     Returns the total time and the largest defect of the dynamics, as a speed.
     """
-    ds, x_max, d1, d2_left, d2_right, d3_left, d3_right, acceleration = grid
+    ds, x_max, d1, d2_left, d2_right, d3_left, d3_right, per_acceleration = grid
     dynamics, gradient, rows, values, convex, curved, costate = model
-    n, axes = len(h), len(jerk_max)
+    n, axes, below = len(h), len(per_jerk), values.shape[1]
     total, worst = 0.0, 0.0
     for i in range(n):
         step, last = ds[i], i == n - 1
@@ -162,32 +164,35 @@ def linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps):
         hx, hu, hp, h0 = left + right * e0, right * e1, h_p + right * e2, right * e3
         gradient[i, 0], gradient[i, 1], gradient[i, 2] = hx, hu, hp
 
-        j, u1 = p[i] / t, u[i] + p[i]
+        per_t = 1.0 / t
+        j, u1 = p[i] * per_t, u[i] + p[i]
+        per_v0, per_v1 = 4.0 * m0, 4.0 * m1
+        j_t = -j * per_t
         inner = 1.0 if i > 0 else 0.0  # the first point is given: its own rows have no step to limit
         end = 0.0 if last else 1.0
         r = 0
         lam_j = 0.0  # sum of lam r'/j_k over both ends, and per end those of 3 r'' and r'''
         bend0, twist0, bend1, twist1, jump = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(axes):
-            a = 1.0 / acceleration[i, k]
+            a = per_acceleration[i, k]
             value = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) * inner
             _put(rows, values, i, r, d2_right[i, k] * inner, d1[i, k] * inner, 0.0, value, a)
-            b = 1.0 / jerk_max[k]
+            b = per_jerk[k]
             turn = 3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i]
-            by_h = -d1[i, k] * j / t
-            cx = v0 * d3_right[i, k] + (0.5 * turn / v0 if v0 > 0.0 else 0.0)
+            by_h = d1[i, k] * j_t
+            cx = v0 * d3_right[i, k] + 0.5 * turn * per_v0
             value = d1[i, k] * j + v0 * turn + by_h * h0
             cu = 3.0 * v0 * d2_right[i, k] + by_h * hu
-            _put(rows, values, i, r + 1, cx + by_h * hx, cu, d1[i, k] / t + by_h * hp, value, b)
+            _put(rows, values, i, r + 1, cx + by_h * hx, cu, d1[i, k] * per_t + by_h * hp, value, b)
             turn = 3.0 * d2_left[i + 1, k] * u1 + d3_left[i + 1, k] * x[i + 1]
-            by_h = -d1[i + 1, k] * j / t
-            cx = (v1 * d3_left[i + 1, k] + (0.5 * turn / v1 if v1 > 0.0 else 0.0)) * end
+            by_h = d1[i + 1, k] * j_t
+            cx = (v1 * d3_left[i + 1, k] + 0.5 * turn * per_v1) * end
             cu = 3.0 * v1 * d2_left[i + 1, k]
             value = d1[i + 1, k] * j + v1 * turn + by_h * h0 + cx * e3 * end
-            cp = d1[i + 1, k] / t + by_h * hp + cx * e2 + cu
+            cp = d1[i + 1, k] * per_t + by_h * hp + cx * e2 + cu
             _put(rows, values, i, r + 2, cx * e0 + by_h * hx, cx * e1 + cu + by_h * hu, cp, value, b)
-            lam0 = (lam[i, r + 1, 0] - lam[i, r + 1, 1]) * b
-            lam1 = (lam[i, r + 2, 0] - lam[i, r + 2, 1]) * b
+            lam0 = (lam[i, r + 1] - lam[i, below + r + 1]) * b
+            lam1 = (lam[i, r + 2] - lam[i, below + r + 2]) * b
             lam_j += lam0 * d1[i, k] + lam1 * d1[i + 1, k]
             bend0 += lam0 * 3.0 * d2_right[i, k]
             twist0 += lam0 * d3_right[i, k]
@@ -195,11 +200,11 @@ def linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps):
             twist1 += lam1 * d3_left[i + 1, k]
             r += 3
             if jumps:
-                a = 1.0 / acceleration[i + 1, k]
+                a = per_acceleration[i + 1, k]
                 cx, cu = d2_left[i + 1, k] * end, d1[i + 1, k] * end
                 value = cu * u1 + cx * (x[i + 1] + e3)
                 _put(rows, values, i, r, cx * e0, cx * e1 + cu, cx * e2 + cu, value, a)
-                jump += (lam[i, r, 0] - lam[i, r, 1]) * a * cx
+                jump += (lam[i, r] - lam[i, below + r]) * a * cx
                 r += 1
         _put(rows, values, i, r, inner, 0.0, 0.0, inner * x[i], 1.0 / x_max[i])
 
@@ -213,7 +218,7 @@ def linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps):
             by_v = -2.0 * c * p[i] / mean
             cx, cu, cp = by_v * (m0 + m1 * e0), by_v * m1 * e1, c + by_v * m1 * e2
             _put(rows, values, i, r + 1, cx, cu, cp, c * p[i] + by_v * m1 * e3, 1.0)
-            weight = lam[i, r + 1, 0]
+            weight = lam[i, r + 1]
             l_v += weight * by_v
             l_vv += -3.0 * weight * by_v / mean
             l_vp += -2.0 * weight * c / mean
@@ -224,7 +229,7 @@ def linearise(grid, jerk_max, x, u, p, h, lam, pi, model, jumps):
             cx, cu, cp = m0 + m1 * e0 + c * hx, m1 * e1 + c * hu, m1 * e2 + c * hp - 0.125 * t
             value = 0.5 * middle + m1 * e3 + c * h0
             _put(rows, values, i, r + 1, cx, cu, cp, value, scale * middle)
-            weight = lam[i, r + 1, 0] * scale
+            weight = lam[i, r + 1] * scale
             l_v += weight * middle
             l_vv += weight
             l_vp -= 0.125 * weight * t

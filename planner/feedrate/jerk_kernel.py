@@ -25,6 +25,8 @@ DOMAIN_EDGE = 0.98  # share of the kinematics' domain that a step may reach; the
 STEP_MIN = 1e-3  # shorter steps are not shortened any further [-]
 PREDICTED_MIN = 0.1  # a shorter predictor step says nothing about second-order terms [-]
 SIGMA_MAX = 0.9  # the barrier falls by at least this factor ... [-]
+STALL_STEP = 0.01  # steps shorter than this ...
+STALL_ROUNDS = 10  # ... so often in a row lead nowhere
 CHANGE_MAX = 0.4  # while some x changes by more than this share, the barrier stays; far from the solution it must not fall first [-]
 SHARE_MIN = 0.05  # a smaller share of the curvature is none [-]
 FEED_SQ_SHRINK = 0.9  # largest share of x that one step may take away [-]
@@ -261,7 +263,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
             slack[i, count + r] = max(1.0 + model.values[i, r], SLACK_MIN)
         for r in range(count + lower):
             lam[i, r] = mu / slack[i, r]
-    share = 1.0
+    share, stalled = 1.0, 0
     gap, hold, residual, defect, done = mu * pairs, 0.0, np.inf, np.inf, iterations
     for it in range(iterations):
         total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
@@ -286,6 +288,9 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         primal = within_domain(grid.ds, x, p, dz, primal)
         gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual)
         hold = 1.0 if change > CHANGE_MAX else 0.0
+        stalled = stalled + 1 if primal < STALL_STEP else 0
+        if stalled == STALL_ROUNDS:
+            return it, gap / total, np.inf, np.inf, h, lam
     if done == iterations:  # the last step has not been looked at yet
         total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
     return done, gap / total, residual, defect, h, lam

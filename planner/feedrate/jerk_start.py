@@ -37,8 +37,7 @@ def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
     with np.errstate(divide="ignore"):
         by_acceleration = NORMAL_SHARE / curve.max(axis=1)
         by_jerk = (JERK_SHARE / slope.max(axis=1)) ** (2 / 3)
-    along = np.abs(problem.d1[own]) / problem.acceleration
-    rate = ACCELERATION_SHARE / along.max(axis=1)
+        rate = ACCELERATION_SHARE / (np.abs(problem.d1[own]) / problem.acceleration).max(axis=1)
     caps = np.minimum(CAP_SHARE * problem.feed_sq_max[own], np.minimum(by_acceleration, by_jerk))
     caps[0] = caps[-1] = 0.0
     ds = np.diff(problem.s[own])

@@ -1,0 +1,15 @@
+"""The first problems of the campaign (benchmarks/jerk_campaign.py): every one is solved, and every answer holds."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.jerk_campaign import faults, small_problem
+from planner.feedrate.jerk import JerkLimited
+
+
+@pytest.mark.parametrize("first", range(0, 200, 20))
+def test_nasty_small_problems_are_solved(first: int) -> None:
+    for seed in range(first, first + 20):
+        problem = small_problem(seed)
+        assert not faults(problem, JerkLimited().solve(problem)), f"seed {seed}"

@@ -32,7 +32,7 @@ LAYERS = (
     "planner.verify",
     "planner.methods",
     "planner.report",
-    "planner.cli_pulses",
+    "planner.commands",
     "planner.cli",
 )
 # The judge sees the path, the machine and the samples, and no code of those it judges.

@@ -1,4 +1,4 @@
-"""The command `planner pulses`: step and direction pulses of a trajectory file."""
+"""`planner pulses`: step and direction pulses of a trajectory file."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.commands.terminal import FAILED, guarded
 from planner.errors import InputError
 
 if TYPE_CHECKING:
     from planner.pulses import AxisPulses
 
 
+@guarded
 def pulses(
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
@@ -64,7 +66,7 @@ def pulses(
         if output is not None and not faults:
             typer.echo(str(output))
     if faults:
-        raise typer.Exit(1)
+        raise typer.Exit(FAILED)
 
 
 def parse_steps(text: str) -> dict[str, float]:

@@ -1,0 +1,27 @@
+"""`planner info`: what a program holds."""
+
+from __future__ import annotations
+
+import json
+
+import typer
+
+from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption
+from planner.commands.terminal import BAD_INPUT, guarded, show
+
+
+@guarded
+def info(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -> None:
+    """What a program holds; every construct that is not supported, with its line."""
+    from planner.machine import load_machine
+    from planner.nc.info import inspect_program
+    from planner.report.export import info_summary
+    from planner.report.tables import info_table
+
+    found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE))
+    if as_json:
+        typer.echo(json.dumps(info_summary(found), indent=2, allow_nan=False))
+    else:
+        show(info_table(found))
+    if found.unsupported:
+        raise typer.Exit(BAD_INPUT)

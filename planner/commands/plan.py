@@ -1,0 +1,87 @@
+"""`planner plan`: plan, sample and verify a program, and write the files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planner.commands.options import (
+    DEFAULT_MACHINE,
+    Corner,
+    Format,
+    Job,
+    JsonOption,
+    MachineOption,
+    Method,
+    Solver,
+    ToleranceOption,
+)
+from planner.commands.terminal import FAILED, ProgressBar, guarded, show
+from planner.errors import InputError, NotSolvedError
+
+
+@guarded
+def plan(
+    job: Job,
+    machine: MachineOption = None,
+    method: Annotated[Method, typer.Option(help="how to plan")] = Method.toppra,
+    corner: Annotated[
+        Corner, typer.Option(help="shape of the rounded corners, for toppra and optimal")
+    ] = Corner.bezier,
+    solver: Annotated[
+        Solver, typer.Option(help="of method toppra: our kernel, or the package toppra for comparison")
+    ] = Solver.reachability,
+    tolerance: ToleranceOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="write trajectory and summary into DIR"),
+    ] = None,
+    file_format: Annotated[
+        Format, typer.Option("--format", help="format of the trajectory")
+    ] = Format.parquet,
+    plot: Annotated[bool, typer.Option("--plot", help="write pictures into DIR (PNG)")] = False,
+    corners: Annotated[
+        bool, typer.Option("--corners", help="print the corners next to their closed-form speed")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan, sample and verify the motion of a program."""
+    if plot and output is None:
+        raise InputError("--plot writes its pictures into the output directory: give one with -o DIR")
+    from planner import plan as plan_program
+    from planner.report.export import summary, write_plan
+
+    with ProgressBar() as progress:
+        result = plan_program(
+            job,
+            machine or DEFAULT_MACHINE,
+            method=method.value,
+            corner=corner.value,
+            solver=solver.value,
+            tolerance=tolerance,
+            progress=progress,
+        )
+        written: list[str] = []
+        if output is not None and result.trajectory is not None:
+            progress("write", 0.0)
+            written = write_plan(result, output, file_format=file_format.value, plots=plot)
+
+    if as_json:
+        typer.echo(json.dumps(summary(result), indent=2, allow_nan=False))
+    else:
+        from planner.report.tables import corner_table, plan_table
+
+        show(plan_table(result))
+        table = corner_table(result) if corners else None
+        if table is not None:
+            show("", table)
+        for name in written:
+            typer.echo(str(output / name) if output else name)
+    if result.trajectory is None:
+        kept = f"; {output} was not touched" if output is not None else ""
+        raise NotSolvedError(f"{result.sentence}{kept}")
+    if result.verdict is None or not result.verdict.passed:
+        raise typer.Exit(FAILED)

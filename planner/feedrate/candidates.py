@@ -56,8 +56,7 @@ def candidates(
         (Kind.ENTRY, *_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
     ]
     if start_stop > 0:
-        step = np.abs(u2 - u1).max(axis=1)
-        ways.append((Kind.PASS, start_stop / step, np.ones(len(k)), np.ones(len(k))))
+        ways.append((Kind.PASS, *_velocity_step(u1, u2, toolpath.tolerance[at[k]], machine.dt, start_stop)))
     return [_candidate(bare, feed, k, *way) for way in ways]
 
 
@@ -90,6 +89,16 @@ def _zero_entry(
     alpha = np.minimum(alpha, np.minimum(machine.normal_acceleration or np.inf, tol / (2.0 * rate)) / twice)
     bow = rate * twice * np.minimum(alpha, np.cbrt(6.0 * tol * eta**2 / twice))
     return corner.speed_from_middle((tol - bow) / twice, alpha, eta), alpha, eta
+
+
+def _velocity_step(
+    u1: FloatArray, u2: FloatArray, tol: FloatArray, dt: float, start_stop: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Speed at the vertex with no axis stepping by more than `start_stop`; the chord between two samples cuts the vertex off by up to
+    V dt s / 2. This kind has no parameters."""
+    step = np.abs(u2 - u1).max(axis=1)
+    sin_half = np.linalg.norm(u2 - u1, axis=1) / 2.0
+    return np.minimum(start_stop / step, 2.0 * tol / (dt * sin_half)), np.ones(len(u1)), np.ones(len(u1))
 
 
 def _entry(

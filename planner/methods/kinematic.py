@@ -52,8 +52,8 @@ class KinematicMethod:
     """Kinematic corners with look-ahead.
 
     start_stop    : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at
-                    the vertex where no axis steps by more. Steps break the limits of acceleration and jerk, which the verdict then
-                    reports without judging
+                    the vertex where no axis steps by more. Such a step breaks the limits of acceleration and jerk, and the verdict
+                    says so
     short_segment : paper 003's factor k, 0 < k <= 1, on the speed that a leg can reach; 1 uses short legs completely
     """
 
@@ -81,10 +81,7 @@ class KinematicMethod:
         with stages.stage("solve"):
             course = self._course(toolpath, machine, exact)
             motion = _motion(course, toolpath.axes)
-        stepping = bool((course.turns & (course.passage.kind == Kind.PASS)).any())
-        trajectory, verdict = deliver(
-            motion, toolpath, machine, stages, not_limited=("acceleration", "jerk") if stepping else ()
-        )
+        trajectory, verdict = deliver(motion, toolpath, machine, stages)
         with stages.stage("report"):
             corners = _corner_table(course, machine)
         return Plan(
@@ -250,8 +247,9 @@ def _limited_by(course: _Course, k: Array) -> Array:
 
 def _sentence(course: _Course) -> str:
     turns, kind = course.turns, course.passage.kind
-    stops = int((turns & (kind == Kind.STOP)).sum())
     if not turns.any():
         return "there is no corner between full stops; every stretch is run in the shortest time"
+    stops, steps = (int((turns & (kind == which)).sum()) for which in (Kind.STOP, Kind.PASS))
     text = f"{int(turns.sum()) - stops} corners are run through"
+    text += f", {steps} of them with a step of velocity, which breaks acceleration and jerk" if steps else ""
     return text + (f", {stops} are full stops because that is faster" if stops else "")

@@ -161,19 +161,6 @@ def test_short_segment_rule_holds_in_both_directions(seed, k):
         assert high <= k * (low + reach(low, max(free, 0.0), legs.a[i], legs.j[i])) * (1 + 1e-9) + 1e-12
 
 
-@given(seeds)
-@settings(max_examples=10)
-def test_a_smaller_factor_never_makes_a_speed_higher(seed):
-    legs, candidates = random_case(seed, 60)
-    swept = []
-    for k in (1.0, 0.8, 0.4):
-        V = candidates[0].V.copy()
-        la._sweep(candidates[0].kind, V, candidates[0].p, candidates[0].q, legs.length, legs.a, legs.j, k)
-        swept.append(V)
-    assert (swept[1] <= swept[0] * (1 + 1e-9)).all()
-    assert (swept[2] <= swept[1] * (1 + 1e-9)).all()
-
-
 def total_time(legs: Legs, passage: Passage) -> float:
     """Time of a passage by ruckig, infinite where a leg is too short."""
     total = 0.0

@@ -17,6 +17,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.constraints.assemble import feedrate_problem
+from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
@@ -31,6 +32,9 @@ from planner.nc.program import Program
 from planner.path import sample_path
 from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
 
+# The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
+# (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
+SIGMA2 = 0.94
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
@@ -60,7 +64,11 @@ class OptimalMethod:
         stages = Stages(progress)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
-            shape = corner_shape(self.corner, machine, toolpath)
+            shape = (
+                BezierCorner(sigma2=SIGMA2)
+                if self.corner == "bezier"
+                else corner_shape(self.corner, machine, toolpath)
+            )
             path = round_corners(toolpath, machine, shape, blend_tangents=True)
             samples = sample_path(path, machine, third_order=True)
         with stages.stage("solve") as report:

@@ -128,7 +128,7 @@ def main() -> None:
         "Iterations (of the worst window and start): "
         + ", ".join(f"{p} % at most {n:.0f}" for p, n in percentiles.items())
         + ".",
-        f"Compared with ipopt on {len(gaps)} of them: time between {min(gaps):+.4%} and {max(gaps):+.4%} of its, median {np.median(gaps):+.5%}.",
+        f"Against ipopt on {len(gaps)} of them: the time is {min(gaps):+.4%} to {max(gaps):+.4%} off, median {np.median(gaps):+.5%}.",
         "",
         *(f"- {count} times: {kind}" for kind, count in kinds.items()),
         *(f"- seed {t['seed']} ({t['points']} points, {t['axes']} axes): {t['fault']}" for t in trouble[:50]),

@@ -18,6 +18,8 @@ class Method(StrEnum):
     optimal = "optimal"
     bezier = "bezier"
     kinematic = "kinematic"
+    fir = "fir"
+    fir_plain = "fir-plain"
     stop = "stop"
 
 

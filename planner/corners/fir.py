@@ -120,10 +120,13 @@ def fir_breaks(params: FloatArray) -> tuple[float, ...]:
     return tuple(sorted({0.5} | {float(t / Tk) for t in (T2, T1, Tk - T2, Tk - T1) if 0 < t < Tk}))
 
 
-def overlap_time(eps: float, V: float, sin_half: float, T1: float, T2: float) -> float:
+def overlap_time(
+    eps: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
     """Overlap time Tk [s] of paper 000 eq. (15) for a corner error eps [mm]: branch chosen on eps, clamped to Td."""
-    if sin_half <= 0 or eps >= V * sin_half * (3 * T1**2 + T2**2) / (12 * T1):
-        return T1 + T2
-    if eps <= V * sin_half * T2**2 / (3 * T1):
-        return float(np.cbrt(24 * T1 * T2 * eps / (V * sin_half)))
-    return float(T2 + np.sqrt(4 * T1 * eps / (V * sin_half) - T2**2 / 3))
+    with np.errstate(divide="ignore"):
+        over = np.asarray(eps) / (V * np.asarray(sin_half))  # infinite without a turn
+    cubic = np.cbrt(24 * T1 * T2 * over)
+    square = T2 + np.sqrt(np.maximum(4 * T1 * over - T2**2 / 3, 0.0))
+    most = (3 * T1**2 + T2**2) / (12 * T1)
+    return np.where(over >= most, T1 + T2, np.where(over <= T2**2 / (3 * T1), cubic, square))

@@ -9,6 +9,7 @@ from typing import Protocol
 from planner.errors import InputError
 from planner.machine import Machine, load_machine
 from planner.methods.bezier import BezierMethod
+from planner.methods.fir import FirMethod
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
@@ -19,7 +20,7 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 
 DEFAULT_MACHINE = "mill"
-METHODS = ("optimal", "toppra", "bezier", "kinematic", "stop")
+METHODS = ("optimal", "toppra", "bezier", "kinematic", "fir", "fir-plain", "stop")
 
 
 class Method(Protocol):
@@ -82,6 +83,8 @@ def _method(name: str, corner: str, solver: str) -> Method:
         return BezierMethod()
     if name == "kinematic":
         return KinematicMethod()
+    if name in ("fir", "fir-plain"):
+        return FirMethod(plain=name == "fir-plain")
     if name == "stop":
         return StopMethod()
     raise InputError(f"no method '{name}'; there are {', '.join(METHODS)}")

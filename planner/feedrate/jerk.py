@@ -40,6 +40,8 @@ from planner.feedrate.solution import FeedrateSolution, Prices, Status
 START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-] ...
 SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
 TRACKING_ROUNDS = 20  # at most, of the first profile; 3 to 6 are the rule
+POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
+POLISHED = 1e-14  # defect, share of the largest feed [-]
 TRACKED = 0.1  # a round that changes no x by more than this share has done it [-]
 GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
@@ -168,8 +170,10 @@ class _Scaled:
         slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
         return x / slower**2, u / slower**2, p / slower**2
 
-    def window(self, x: FloatArray, u: FloatArray, p: FloatArray, h: FloatArray, lam: FloatArray) -> _Window:
+    def window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray) -> _Window:
         """A profile in the problem's units."""
+        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
+        h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
         sides = np.zeros((len(p), self.rows, 2))
         sides[:, :, 0], sides[:, : self.rows - 2, 1] = lam[:, : self.rows], lam[:, self.rows :]
         feed, t = self.feed, self.time
@@ -268,7 +272,7 @@ class _Profile:
         scaled = self._scaled(begin, end)
         for start in (self._tracked, self._plain)[: 1 if self.x[begin] > 0.0 else 2]:
             x, u, p = start(begin, end, scaled)
-            done, gap, residual, defect, h, lam = kernel.minimise(
+            done, gap, residual, defect, lam = kernel.minimise(
                 scaled.grid,
                 scaled.per_jerk,
                 x,
@@ -280,7 +284,9 @@ class _Profile:
             )
             self.iterations = max(self.iterations, done)
             if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
-                return scaled.window(x, u, p, h, lam)
+                jerk = float(1.0 / scaled.per_jerk.max())
+                kernel.track(scaled.grid, jerk, x.copy(), x, u, p, 0.0, POLISHING_ROUNDS, np.inf, POLISHED)
+                return scaled.window(x, u, p, lam)
         return None
 
     def _tracked(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -301,7 +307,12 @@ class _Profile:
                 x[faster], u[faster] = ahead[faster], rate[faster]
                 x[0], u[0] = ahead[0], rate[0]
             p = np.diff(u)
-            if kernel.track(scaled.grid, jerk, asked, x, u, p, TRACKING_ROUNDS, change_max) <= kernel.DEFECT:
+            if (
+                kernel.track(
+                    scaled.grid, jerk, asked, x, u, p, 1.0, TRACKING_ROUNDS, change_max, kernel.DEFECT
+                )
+                <= kernel.DEFECT
+            ):
                 break
         return scaled.slowed(x, u, p, SLOWER_MAX) if before is None else (x, u, p)
 
@@ -314,9 +325,7 @@ class _Profile:
         """The plain start as a profile: feasible, and slow."""
         scaled = self._scaled(begin, end)
         x, u, p = self._plain(begin, end, scaled)
-        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
-        h = 2.0 * scaled.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * scaled.grid.ds / 3.0, 0.0)))
-        return scaled.window(x, u, p, h, np.zeros((len(p), 2 * scaled.rows - 2)))
+        return scaled.window(x, u, p, np.zeros((len(p), 2 * scaled.rows - 2)))
 
     def _price(self, begin: int, count: int, found: _Window) -> None:
         """Add the multipliers of the kept intervals to the prices; a scaled row g <= 1 costs lam per unit of its limit."""

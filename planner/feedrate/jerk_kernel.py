@@ -205,9 +205,10 @@ def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual):
 
 
 @njit(cache=True, error_model="numpy")
-def track(grid, jerk, asked, x, u, p, rounds, change_max):
+def track(grid, jerk, asked, x, u, p, smoothing, rounds, change_max, defect_max):
     """Move a motion x, u (N+1,), p (N,) towards the feed^2 asked for: Gauss-Newton on the time integral of (dx/x)^2 J + j^2/J,
-    with the jerk j of the result and a jerk J of the machine's size. Both ends stay. Returns the defect that is left."""
+    with the jerk j of the result and a jerk J of the machine's size; without smoothing, j is the change of the jerk. Both ends stay.
+    Returns the defect that is left."""
     n = len(p)
     ds, lam, pi = grid.ds, np.zeros((n, 0)), np.zeros(n)
     model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 8)), np.zeros((n + 1, 3)), np.zeros(n)
@@ -222,8 +223,8 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max):
             span = found[4] * jerk
             weight = span / (asked[i] * asked[i]) if i > 0 else 0.0
             model.convex[i, 0], model.convex[i, 5] = weight, 1.0 / span
-            model.gradient[i, 0], model.gradient[i, 2] = weight * (x[i] - asked[i]), p[i] / span
-        if (worst <= DEFECT and change <= change_max) or not riccati(model, 0.0, gains):
+            model.gradient[i, 0], model.gradient[i, 2] = weight * (x[i] - asked[i]), smoothing * p[i] / span
+        if (worst <= defect_max and change <= change_max) or not riccati(model, 0.0, gains):
             break
         offsets(model, 0.0, gains)
         primal, _, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, dz, lam, lam, dpi)
@@ -242,7 +243,7 @@ def track(grid, jerk, asked, x, u, p, rounds, change_max):
 def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
     """Solve one window in place, from the profile x, u (N+1,), p (N,) to the optimal one; x_0, u_0, x_N = u_N = 0 are given.
 
-    Returns iterations used, relative gap, residual of rows and of dynamics, durations (N,), multipliers (N, M) of the
+    Returns iterations used, relative gap, residual of rows and of dynamics, multipliers (N, M) of the
     rows' upper sides, then their lower sides.
     """
     n = len(x) - 1
@@ -274,7 +275,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         share = min(4.0 * share, 1.0)
         while not riccati(model, share, gains):
             if share == 0.0:
-                return it, gap / total, np.inf, np.inf, h, lam
+                return it, gap / total, np.inf, np.inf, lam
             share = 0.25 * share if share > SHARE_MIN else 0.0
         offsets(model, share, gains)
         dlam[:] = 0.0
@@ -290,7 +291,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         hold = 1.0 if change > CHANGE_MAX else 0.0
         stalled = stalled + 1 if primal < STALL_STEP else 0
         if stalled == STALL_ROUNDS:
-            return it, gap / total, np.inf, np.inf, h, lam
+            return it, gap / total, np.inf, np.inf, lam
     if done == iterations:  # the last step has not been looked at yet
         total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
-    return done, gap / total, residual, defect, h, lam
+    return done, gap / total, residual, defect, lam

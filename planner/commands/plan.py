@@ -27,7 +27,7 @@ from planner.errors import InputError, NotSolvedError
 def plan(
     job: Job,
     machine: MachineOption = None,
-    method: Annotated[Method, typer.Option(help="how to plan")] = Method.toppra,
+    method: Annotated[Method, typer.Option(help="how to plan")] = Method.optimal,
     corner: Annotated[
         Corner, typer.Option(help="shape of the rounded corners, for toppra and optimal")
     ] = Corner.bezier,

@@ -41,7 +41,7 @@ def plan(
     program: Program | str | Path,
     machine: Machine | str | Path | None = None,
     *,
-    method: str | Method = "toppra",
+    method: str | Method = "optimal",
     corner: str = "bezier",
     solver: str = "reachability",
     tolerance: float | None = None,

@@ -18,7 +18,8 @@ from planner.arrays import Array, FloatArray
 from planner.corners import kinematic as corner
 from planner.corners.allocation import error_rate
 from planner.corners.sharing import share_legs
-from planner.feedrate.look_ahead import Kind, Legs, Passage, capped, needed
+from planner.feedrate.look_ahead import Legs, Passage, capped, needed
+from planner.feedrate.ramps import Kind
 from planner.feedrate.rest_to_rest import block_limits
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.legs import Legs as PathLegs

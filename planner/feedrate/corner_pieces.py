@@ -22,16 +22,8 @@ from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.feedrate.arc_pieces import spline_at_rest
-from planner.feedrate.look_ahead import (
-    ENTRY,
-    ZERO,
-    Legs,
-    Passage,
-    corner_at,
-    leg_end,
-    leg_top,
-    phase_times_of,
-)
+from planner.feedrate.look_ahead import Legs, Passage
+from planner.feedrate.ramps import ENTRY, ZERO, corner_at, leg_end, leg_top, phase_times_of
 from planner.geometry.chords import arc_point
 from planner.geometry.legs import Legs as PathLegs
 from planner.geometry.toolpath import Toolpath

@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
-from planner.feedrate.look_ahead import leg_top, reach
+from planner.feedrate.ramps import leg_top, reach
 
 ROUNDING = 1e-12  # of speeds [-]
 PHASES = 7  # of a free stretch: two ramps of three phases, and the cruise between them

@@ -28,7 +28,8 @@ from planner.corners.allocation import (
 from planner.errors import InputError
 from planner.feedrate.candidates import candidates, fitted, leg_limits
 from planner.feedrate.corner_pieces import along_axes, pieces_of
-from planner.feedrate.look_ahead import Kind, Legs, Passage, look_ahead
+from planner.feedrate.look_ahead import Legs, Passage, look_ahead
+from planner.feedrate.ramps import Kind
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE, toolpath_from_program

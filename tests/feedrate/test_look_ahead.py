@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from planner.arrays import FloatArray
 from planner.corners import kinematic
 from planner.feedrate import look_ahead as la
-from planner.feedrate.look_ahead import Kind, Legs, Passage, capped, look_ahead, needed, reach
+from planner.feedrate.look_ahead import Legs, Passage, capped, look_ahead, needed
+from planner.feedrate.ramps import Kind, reach
 
 seeds = st.integers(0, 2**32 - 1)
 

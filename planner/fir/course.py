@@ -127,6 +127,15 @@ class Course:
             dwell=np.zeros(len(first)),
         )
 
+    def stopping(self, joints: Array) -> Course:
+        """The same with full stops at the joints (n,) too."""
+        first = np.union1d(self.first, joints)
+        dwell = np.zeros(len(first))
+        dwell[np.searchsorted(first, self.first)] = self.dwell
+        sin_half = self.sin_half.copy()
+        sin_half[joints] = 0.0
+        return dataclasses.replace(self, first=first, dwell=dwell, sin_half=sin_half)
+
 
 def course_of(toolpath: Toolpath, machine: Machine) -> Course:
     """Lay out a toolpath as a course."""

@@ -38,7 +38,7 @@ from planner.machine import Machine
 # Legs are cut where a speed limit ends on them only if they take longer than this share of Td at their own speed [-].
 CUT_LEGS = 0.25
 # More joints than this to one side of a flow joint are taken together.
-FLOW_JOINTS = 64
+FLOW_JOINTS = 24
 # Steps in which the speed of a flow joint is lowered, and what one may leave of it [-].
 FLOW_STEPS = 40
 FLOW_STEP_MIN = 0.3

@@ -21,8 +21,9 @@ from planner.axis_motion import AxisMotion
 from planner.errors import InputError
 from planner.feedrate.solution import Status
 from planner.fir.course import Course, course_of
-from planner.fir.design import fastest, plain_plan
+from planner.fir.design import plain_plan
 from planner.fir.schedule import Schedule
+from planner.fir.search import fastest
 from planner.fir.settle import make
 from planner.fir.superpose import Pieces
 from planner.geometry.build import toolpath_from_program
@@ -59,7 +60,10 @@ class FirMethod:
             toolpath = toolpath_from_program(program, machine, tolerance)
             course = course_of(toolpath, machine)
         with stages.stage("solve"):
-            schedule = plain_plan(course, machine) if self.plain else fastest(course, machine)
+            if self.plain:
+                schedule = plain_plan(course, machine)
+            else:
+                course, schedule = fastest(course, machine)
             pieces = make(course, machine, schedule).pieces
         trajectory, verdict = deliver(_motion(course, pieces), toolpath, machine, stages)
         return Plan(

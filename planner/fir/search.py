@@ -1,0 +1,132 @@
+"""The fastest schedule: which speed, which filters, which full stops.
+
+A high speed V needs a long filter, T1 = V/A, which every standstill and every curve pays for; a pulse of length L is fastest from
+rest to rest at about V = sqrt(L A), well below the feed of many programs. So V is searched for, over decades, and with it the
+margin on T2 = A/J: 1 where nothing overlaps or all flows, up to 2 where overlaps add jerks up. The time of a schedule is known
+without making its motion; what it cannot see costs when the most promising are settled.
+
+Where the command waits anyway a full stop costs little more, and what it parts may have filters of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.fir.course import Course
+from planner.fir.design import plan_for
+from planner.fir.schedule import Schedule, plan_time
+from planner.fir.settle import settle
+from planner.machine import Machine
+
+# Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others
+# between them, to this natural logarithm of their ratio.
+SPEEDS = 10
+FINEST = 0.03
+# Margins that are tried; from the second on with speeds near the best of the one before.
+MARGINS = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
+NEARBY = (1.6, 1.25, 1.0, 0.8, 0.64)
+# Full stops are tried where the command waits for this share of the filters' delay or longer [-].
+STOPS = (1.0, 0.0)
+WAIT_ROUNDING = 1e-9  # of that share
+# A choice is settled if it promises to save this share of the time, although it will lose as much by that as the one before did,
+# which is at most by this factor [-].
+WORTH, LOSS = 2e-3, 1.03
+
+
+def fastest(course: Course, machine: Machine) -> tuple[Course, Schedule]:
+    """The fastest schedule found that keeps tolerance and limits, and the course with the full stops that it has."""
+    plan = _settled(course, machine)
+    for share in STOPS:
+        course, plan = _stopping_at_waits(course, machine, plan, share)
+    return course, plan
+
+
+def _stopping_at_waits(
+    course: Course, machine: Machine, plan: Schedule, share: float
+) -> tuple[Course, Schedule]:
+    """Full stops instead of waits, in the stretches that gain by it."""
+    gap, (T1, T2) = plan.gap(course), plan.at_joints(course)
+    waits = (gap > 0) & (gap >= share * (T1 + T2) * (1 - WAIT_ROUNDING))
+    tried = np.logical_or.reduceat(waits[:-1], course.first[:-1])
+    if not tried.any():
+        return course, plan
+    legs = np.flatnonzero(tried[course.stretch])
+    part = course.pick(tried).stopping(np.flatnonzero(waits[legs]))
+    other = _settled(part, machine)
+    home = course.stretch[legs[part.first[:-1]]]  # the stretch that each of the part's was cut from
+    time = np.bincount(home, plan_time(part, other), course.stretches)
+    better = tried & (time < plan_time(course, plan) * (1 - WORTH))
+
+    cut = course.stopping(np.flatnonzero(waits & np.append(better[course.stretch], False)))
+    home_of_cut = course.stretch[cut.first[:-1]]
+    kept = Schedule(
+        T1=plan.T1[home_of_cut],
+        T2=plan.T2[home_of_cut],
+        speed=plan.speed,
+        passing=plan.passing,
+        overlap=plan.overlap,
+    )
+    return cut, kept.put(cut, better[home_of_cut], other.pick(part, better[home]))
+
+
+def _settled(course: Course, machine: Machine) -> Schedule:
+    """The fastest of the settled schedules, each stretch with the choices that are most promising for it."""
+    margins = MARGINS if machine.fir is None else MARGINS[:1]
+    speeds, times = _search(course, machine, margins)
+    every = np.arange(course.stretches)
+    plan = plan_for(course, machine, speeds[0], np.full(course.stretches, margins[0]))
+    time = np.full(course.stretches, np.inf)
+    for rank in np.argsort(times, axis=0, kind="stable"):
+        promised = times[rank, every]
+        tried = promised * np.minimum(time / times.min(axis=0), LOSS) < time * (1 - WORTH)
+        if not tried.any():
+            break
+        part = course.pick(tried)
+        new = settle(part, machine, plan_for(part, machine, speeds[rank, every][tried], margins[rank][tried]))
+        new_time = plan_time(part, new)
+        better = new_time < time[tried]
+        taken = tried.copy()
+        taken[tried] = better
+        plan = plan.put(course, taken, new.pick(part, better))
+        time[taken] = new_time[better]
+    return plan
+
+
+def _search(course: Course, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """For each margin (K,) the best speed of each stretch [mm/s] and its time [s], both (K, S), by the times of schedules.
+
+    Where nothing waits at the first margin, the others would make filters longer for nothing.
+    """
+    speeds, times = (np.empty((len(margins), course.stretches)) for _ in range(2))
+    high = course.largest(course.feed)
+    low = -course.largest(-np.minimum(np.cbrt(course.j_max * course.length**2 / 4), course.feed))
+    step = np.log(high / low) / (SPEEDS - 1)
+    tries = [np.exp(-k * step) * high for k in range(SPEEDS)]
+    speeds[:], times[:] = _best_speeds(course, machine, margins[0], tries, step)
+    plan = plan_for(course, machine, speeds[0], np.full(course.stretches, margins[0]))
+    waits: Array = np.logical_or.reduceat((plan.gap(course) > 0)[:-1], course.first[:-1])
+    if waits.any():
+        part = course.pick(waits)
+        for k in range(1, len(margins)):
+            tries = [np.minimum(speeds[k - 1, waits] * ratio, high[waits]) for ratio in NEARBY]
+            step = np.full(part.stretches, np.log(NEARBY[0]) / 2)
+            speeds[k, waits], times[k, waits] = _best_speeds(part, machine, margins[k], tries, step)
+    return speeds, times
+
+
+def _best_speeds(
+    course: Course, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Best speed (S,) [mm/s] of each stretch and its time (S,) [s]: among `tries`, whose logarithms are `step` (S,) apart, and between."""
+    margins, high = np.full(course.stretches, margin), course.largest(course.feed)
+    best, best_time = high, np.full(course.stretches, np.inf)
+    while tries:
+        for speed in tries:
+            time = plan_time(course, plan_for(course, machine, speed, margins))
+            better = time < best_time
+            best, best_time = np.where(better, speed, best), np.where(better, time, best_time)
+        step = step / 2
+        signs = (-1, 1) if (step > FINEST).any() else ()
+        tries = [np.minimum(best * np.exp(sign * step), high) for sign in signs]
+    return best, best_time

@@ -2,10 +2,12 @@
 
 A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
 or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
-tangents agree it is smooth; everywhere else it is a corner.
+tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
 """
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
@@ -32,12 +34,14 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
 
     tolerance : contour error budget [mm] that beats the program's G64 P and the machine's tolerance; None to use those
 
-    Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis the machine lacks, and
-    coordinates beyond `COORDINATE_MAX`.
+    Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis that moves and
+    that the machine lacks, and coordinates beyond `COORDINATE_MAX`.
     """
     if tolerance is not None and not (0 < tolerance < np.inf):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
-    machine.limits("velocity", program.axes)
+    axis = _axes_in_use(program, machine)
+    axes = tuple(program.axes[k] for k in axis)
+    machine.limits("velocity", axes)
     if not len(program):
         raise InputError("the program has no move", source=program.source)
     _check_coordinates(program)
@@ -69,18 +73,18 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     joint, dwell = _joints(program, machine, block, theta)
     return Toolpath(
         source=program.source,
-        axes=program.axes,
-        start=start,
-        end=end,
+        axes=axes,
+        start=start[:, axis],
+        end=end[:, axis],
         length=length,
         feed=_feeds(program, machine, block),
         rapid=program.kind[block] == Kind.RAPID,
         block=block,
         line=program.line[block],
         arc=arc,
-        arcs=arcs,
-        tangent_start=tangent_start,
-        tangent_end=tangent_end,
+        arcs=_of_axes(arcs, axis),
+        tangent_start=tangent_start[:, axis],
+        tangent_end=tangent_end[:, axis],
         curvature=curvature,
         joint=joint,
         theta=theta,
@@ -93,6 +97,25 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
     """Angle between unit vectors (n, A), row by row [rad]; exact to rounding near 0 and pi, where acos is not."""
     return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
+
+
+def _axes_in_use(program: Program, machine: Machine) -> Array:
+    """Indices of the axes that the machine has or that move: a plotter needs no z for a program that stays in the plane."""
+    moved = (program.end != program.start).any(axis=0)
+    for normal in np.unique(program.arc_normal):
+        moved[np.arange(len(moved)) != normal] = True
+    return np.flatnonzero(moved | [letter in machine.axes for letter in program.axes])
+
+
+def _of_axes(arcs: Arcs, axis: Array) -> Arcs:
+    """The arcs in the coordinates of some axes; they do not move along the others."""
+    return dataclasses.replace(
+        arcs,
+        center=arcs.center[:, axis],
+        e1=arcs.e1[:, axis],
+        e2=arcs.e2[:, axis],
+        drift=arcs.drift[:, axis],
+    )
 
 
 def _check_coordinates(program: Program) -> None:

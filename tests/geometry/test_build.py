@@ -225,10 +225,25 @@ def empty():
     )  # fmt: skip
 
 
-def test_a_machine_without_the_axis_is_refused():
-    flat = MACHINE.model_copy(update={"axes": {k: MACHINE.axes[k] for k in "xy"}})
+FLAT = MACHINE.model_copy(update={"axes": {k: MACHINE.axes[k] for k in "xy"}})
+
+
+@pytest.mark.parametrize("text", ["G1 X10 Z1", "G18 G3 X0 Z0 I5"])
+def test_a_machine_without_an_axis_that_moves_is_refused(text):
     with pytest.raises(InputError, match="no axis 'z'"):
-        toolpath_from_program(problems.pentagon(), flat)
+        build(text, FLAT)
+
+
+def test_an_axis_that_never_moves_may_be_missing():
+    text = "G1 X10\nG3 X20 Y10 J10\nG1 Y20\nG2 X20 Y20 I5"
+    flat, full = build(text, FLAT), build(text)
+    assert (flat.axes, full.axes) == (("x", "y"), ("x", "y", "z"))
+    for name in ("start", "end", "tangent_start", "tangent_end"):
+        np.testing.assert_array_equal(getattr(flat, name), getattr(full, name)[:, :2])
+    for name in ("center", "e1", "e2", "drift"):
+        np.testing.assert_array_equal(getattr(flat.arcs, name), getattr(full.arcs, name)[:, :2])
+    for name in ("length", "joint", "theta", "arc", "curvature"):
+        np.testing.assert_array_equal(getattr(flat, name), getattr(full, name))
 
 
 def test_coordinates_beyond_all_machines_are_refused_with_their_line():

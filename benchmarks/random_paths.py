@@ -45,7 +45,7 @@ class Limits:
     feed: float
 
 
-def random_path(seed: int) -> FeedrateProblem:
+def random_path(seed: int, points: int | None = None) -> FeedrateProblem:
     """Seeded: a quintic spline through 6 to 20 random points some 1 to 30 mm apart; axis velocities of 30 to 300 mm/s and
     accelerations of 1 to 10 m/s2; the jerk takes 0.03 to 3 times as long to reach the acceleration as that the velocity."""
     rng = np.random.default_rng([31, seed])
@@ -58,7 +58,7 @@ def random_path(seed: int) -> FeedrateProblem:
     limits = Limits(
         velocity=velocity, acceleration=acceleration, jerk=jerk, feed=10.0 ** rng.uniform(1.5, 2.5)
     )
-    points = round(200.0 * 10.0 ** rng.uniform(0.0, 1.0))
+    points = points or round(200.0 * 10.0 ** rng.uniform(0.0, 1.0))
     spline = make_interp_spline(chords, np.cumsum(steps, axis=0), k=QUINTIC)
     return _along_arc_length(_Pieces.of(spline), None, points, limits)
 

@@ -140,6 +140,8 @@ def reversed_problem(problem: FeedrateProblem) -> FeedrateProblem:
         d1=-problem.d1[::-1],
         d2_left=problem.d2_right[::-1],
         d2_right=problem.d2_left[::-1],
+        d3_left=-problem.d3_right[::-1],
+        d3_right=-problem.d3_left[::-1],
         feed_sq_max=problem.feed_sq_max[::-1],
         feed_sq_bound=problem.feed_sq_bound[::-1],
         margin=margin,

@@ -34,11 +34,16 @@ EASE_MIN = 1e-12  # speed^2 per length [mm/s2] that a corner counts with at leas
 
 
 def leg_limits(path: PathLegs, toolpath: Toolpath, machine: Machine) -> Legs:
-    """Limits of the legs of a path of lines, and of arcs between full stops."""
-    limits = [np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine)]
+    """Limits of the legs of a path of lines, and of arcs between full stops.
+
+    The acceleration a is at most the tolerance over dt^2/8: half a period before and after a full stop the motion is a dt^2/8 from the
+    vertex, and the chord between samples there cuts it off.
+    """
+    v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
+    tolerance = toolpath.tolerance[path.first]
+    a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / error_rate(machine))
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
-    v, a, j = (share * limit for limit in limits)
-    return Legs(length=path.length, v=v, a=a, j=j)
+    return Legs(length=path.length, v=share * v, a=share * a, j=share * j)
 
 
 def candidates(

@@ -28,10 +28,12 @@ from planner.geometry.chords import arc_point
 from planner.geometry.legs import Legs as PathLegs
 from planner.geometry.toolpath import Toolpath
 
-# A piece on an arc turns by at most so much [rad], and each of the seven phases has at least so many pieces. The spline then misses
-# the arc by (5/384) 0.01^4 = 1e-10 of the radius, and the acceleration, where the jerk along the arc steps by J, by
-# h^2/12 * 4 kappa v J: 0.01/16/3 = 2e-4 of the limit.
-ARC_PIECE, ARC_PARTS = 0.01, 16
+# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius.
+ARC_PIECE = 0.01
+# Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this share
+# of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets in, and
+# 2 kappa a^2 where the acceleration is constant.
+ARC_PARTS, ARC_ACCURACY = 16, 1e-4
 # Shortest piece of all [s]: at 1000 mm/s it is 1e-13 mm long.
 SHORTEST = 1e-16
 # Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
@@ -178,7 +180,7 @@ def _emit(kind, V, p, q, length, v, a, j, dwell, turning, joint, legs, duration,
         _phases(kind, V, p, q, k, length[k], v[k], a[k], j[k], phase, jerk)
         two[0], two[1], two[2] = reach, V[k], A
         if turning[k] > 0.0:
-            n = _emit_arc(n, k, turning[k], phase, jerk, one, two, joint, legs, duration, before, after)
+            n = _emit_arc(n, k, turning[k], v[k], phase, jerk, one, two, joint, legs, duration, before, after)
         else:
             for f in range(7):
                 two[3] = jerk[f]
@@ -187,8 +189,8 @@ def _emit(kind, V, p, q, length, v, a, j, dwell, turning, joint, legs, duration,
 
 
 @njit(cache=True, error_model="numpy")
-def _emit_arc(n, k, turning, phase, jerk, one, two, joint, legs, duration, before, after):
-    """The phases on an arc in pieces that turn by at most `ARC_PIECE`; phases shorter than `ARC_SHORTEST` join their neighbour."""
+def _emit_arc(n, k, turning, v, phase, jerk, one, two, joint, legs, duration, before, after):
+    """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their neighbour."""
     pending, began = 0.0, two[0]
     for f in range(7):
         two[3] = jerk[f]
@@ -197,7 +199,9 @@ def _emit_arc(n, k, turning, phase, jerk, one, two, joint, legs, duration, befor
             pending += phase[f]
             continue
         moved = phase[f] * (two[1] + phase[f] * (0.5 * two[2] + phase[f] * two[3] / 6.0))
-        parts = min(max(ARC_PARTS, 1 + int(turning * moved / ARC_PIECE)), int(phase[f] / ARC_SHORTEST))
+        accuracy = max(np.sqrt(abs(jerk[f]) / (3.0 * v)), abs(two[2]) / (2.45 * v)) / np.sqrt(ARC_ACCURACY)
+        parts = max(ARC_PARTS, 1 + int(max(turning * moved / ARC_PIECE, phase[f] * accuracy)))
+        parts = min(parts, int(phase[f] / ARC_SHORTEST))
         for _ in range(parts):
             n = _put(n, phase[f] / parts, k, k, one, two, joint, legs, duration, before, after)
             if pending > 0.0 and n <= len(duration):

@@ -49,9 +49,10 @@ def random_corners(seed: int, count: int = 200) -> Corners:
     other -= (other * u1).sum(axis=1, keepdims=True) * u1
     other /= np.linalg.norm(other, axis=1, keepdims=True)
     theta = np.deg2rad(rng.uniform(1.0, 179.0, (count, 1)))
+    u2 = np.cos(theta) * u1 + np.sin(theta) * other
     return Corners(
         u1=u1,
-        u2=np.cos(theta) * u1 + np.sin(theta) * other,
+        u2=u2 / np.linalg.norm(u2, axis=1, keepdims=True),
         acceleration=10 ** rng.uniform(2, 4.5, axes),
         jerk=10 ** rng.uniform(3, 7, axes),
         eps=10 ** rng.uniform(-2, 2, count),  # 10 um to 100 mm

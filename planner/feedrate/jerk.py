@@ -170,6 +170,18 @@ class _Scaled:
         slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
         return x / slower**2, u / slower**2, p / slower**2
 
+    def track(
+        self, asked: FloatArray, x: FloatArray, u: FloatArray, p: FloatArray, rounds: int, change_max: float
+    ) -> float:
+        """Move a profile, in place, towards the feed^2 asked for; returns the defect of its kinematics."""
+        jerk = float(1.0 / self.per_jerk.max())
+        return float(kernel.track(self.grid, jerk, asked, x, u, p, 1.0, rounds, change_max, kernel.DEFECT))
+
+    def polish(self, x: FloatArray, u: FloatArray, p: FloatArray) -> None:
+        """Bring a profile onto exact kinematics, in place, as far as rounding allows."""
+        jerk = float(1.0 / self.per_jerk.max())
+        kernel.track(self.grid, jerk, x.copy(), x, u, p, 0.0, POLISHING_ROUNDS, np.inf, POLISHED)
+
     def window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray) -> _Window:
         """A profile in the problem's units."""
         vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
@@ -211,8 +223,8 @@ class _Profile:
             end = self._window_end(begin, size, last)
             found = self._solve_window(begin, end)
             if found is None:
-                divided = True
-                if end - begin > SMALLEST_WINDOW:
+                if end - begin > SMALLEST_WINDOW and self.x[begin] == 0.0:
+                    divided = True
                     size = max((end - begin) // DIVISION, SMALLEST_WINDOW)
                     continue
                 begin = self._stop(begin, end)
@@ -284,37 +296,30 @@ class _Profile:
             )
             self.iterations = max(self.iterations, done)
             if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
-                jerk = float(1.0 / scaled.per_jerk.max())
-                kernel.track(scaled.grid, jerk, x.copy(), x, u, p, 0.0, POLISHING_ROUNDS, np.inf, POLISHED)
+                scaled.polish(x, u, p)
                 return scaled.window(x, u, p, lam)
         return None
 
     def _tracked(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The envelope tracked by a motion, not much faster than the limits allow; from a window before, its way ahead is tracked
-        where that is faster."""
+        """The envelope tracked by a motion from rest to rest, not much faster than the limits allow; after a window before, its way
+        ahead as long as that is faster."""
         asked = envelope(self.problem, begin, end) / scaled.feed**2
         plain_x, plain_u = plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)]))
-        before = self._rest if self.x[begin] > 0.0 else None
-        jerk = float(1.0 / scaled.per_jerk.max())
         for change_max in (TRACKED, np.inf):  # what cannot be tracked closely is at least approached
             x, u = plain_x * asked.max(), plain_u * asked.max()
-            if before is not None:
-                known = min(len(x), len(before.x))
-                ahead, rate = before.x[:known] / scaled.feed**2, before.u[:known] * scaled.time / scaled.feed
-                faster = np.flatnonzero(ahead > asked[:known])
-                asked[faster] = ahead[faster]
-                faster = np.flatnonzero(ahead > x[:known])
-                x[faster], u[faster] = ahead[faster], rate[faster]
-                x[0], u[0] = ahead[0], rate[0]
             p = np.diff(u)
-            if (
-                kernel.track(
-                    scaled.grid, jerk, asked, x, u, p, 1.0, TRACKING_ROUNDS, change_max, kernel.DEFECT
-                )
-                <= kernel.DEFECT
-            ):
+            if scaled.track(asked, x, u, p, TRACKING_ROUNDS, change_max) <= kernel.DEFECT:
                 break
-        return scaled.slowed(x, u, p, SLOWER_MAX) if before is None else (x, u, p)
+        x, u, p = scaled.slowed(x, u, p, SLOWER_MAX)
+        if self.x[begin] > 0.0:
+            assert self._rest is not None  # motion comes out of a window
+            ahead, rate = self._rest.x / scaled.feed**2, self._rest.u * scaled.time / scaled.feed
+            faster = np.flatnonzero(ahead > x[: len(ahead)])
+            x[faster], u[faster] = ahead[faster], rate[faster]
+            x[0], u[0] = ahead[0], rate[0]
+            p = np.diff(u)
+            scaled.track(x.copy(), x, u, p, TRACKING_ROUNDS, TRACKED)
+        return x, u, p
 
     def _plain(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The plain start, slow enough for all limits."""

@@ -177,9 +177,9 @@ def within_domain(ds, x, p, dz, primal):
     """The step length, reduced until the kinematics of every interval have a solution: p ds < 3 vm^2."""
     n = len(p)
     for i in range(n):
-        while True:
+        while primal >= STEP_MIN:
             vm = 0.5 * (np.sqrt(x[i] + primal * dz[i, 0]) + np.sqrt(x[i + 1] + primal * dz[i + 1, 0]))
-            if (p[i] + primal * dz[i, 2]) * ds[i] <= 3.0 * DOMAIN_EDGE * vm * vm or primal < STEP_MIN:
+            if (p[i] + primal * dz[i, 2]) * ds[i] <= 3.0 * DOMAIN_EDGE * vm * vm:
                 break
             primal *= 0.7
     return primal
@@ -289,8 +289,8 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         primal = within_domain(grid.ds, x, p, dz, primal)
         gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual)
         hold = 1.0 if change > CHANGE_MAX else 0.0
-        stalled = stalled + 1 if primal < STALL_STEP else 0
-        if stalled == STALL_ROUNDS:
+        stalled = 0 if primal >= STALL_STEP else stalled + 1
+        if stalled == STALL_ROUNDS or not gap < np.inf:
             return it, gap / total, np.inf, np.inf, lam
     if done == iterations:  # the last step has not been looked at yet
         total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)

@@ -9,10 +9,8 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
-from planner.corners.bezier import BezierCorner
 from planner.corners.blend import CORNER_DTYPE, corner_point
 from planner.corners.elements import to_arc_length
-from planner.corners.fir import FirCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
@@ -21,11 +19,12 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.methods.toppra import corner_shape
 from planner.nc.program import Program
 from planner.path import RESOLUTION, PathSamples, sample_path
 from planner.timing import Motion, TimeLaw, law_of_solution
 
-CORNERS = ("bezier", "fir")
+CORNERS = ("bezier", "fir", "kinematic")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +53,7 @@ def smooth_path(
 ) -> SmoothPath:
     toolpath = toolpath_from_program(program, machine, tolerance)
     if isinstance(corner, str):
-        corner = BezierCorner() if corner == "bezier" else FirCorner.from_machine(machine, toolpath.axes)
+        corner = corner_shape(corner, machine, toolpath)
     return round_corners(toolpath, machine, corner)
 
 

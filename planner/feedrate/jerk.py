@@ -35,7 +35,8 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate import jerk_kernel as kernel
 from planner.feedrate.jerk_rows import Grid, empty_model, linearise
 from planner.feedrate.jerk_start import envelope, plain_start
-from planner.feedrate.solution import FeedrateSolution, Prices, Status
+from planner.feedrate.lagrangian import acceleration_limits, lagrangian
+from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-] ...
 SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
@@ -96,7 +97,7 @@ class JerkLimited:
                 f", except {len(profile.stops)} full stops where the method did not converge, at s = {places}{more} mm: "
                 "coarsen the path where points nearly coincide, refine it where the feed changes much between points"
             )
-        return FeedrateSolution(
+        solution = FeedrateSolution(
             status=Status.ACCEPTABLE if profile.stops else Status.OPTIMAL,
             sentence=sentence,
             solver=repr(self),
@@ -104,11 +105,14 @@ class JerkLimited:
             acc_s=profile.u,
             jerk_s=profile.jerk,
             duration=profile.duration,
-            solve_time=time.perf_counter() - began,
+            solve_time=0.0,
             iterations=profile.iterations,
             jerk_limited=True,
-            prices=profile.prices(),
+            multipliers=profile.multipliers(),
         )
+        found = lagrangian(problem, solution)
+        prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
+        return replace(solution, prices=prices, solve_time=time.perf_counter() - began)
 
 
 def _jumps(grid: Grid) -> int:
@@ -119,14 +123,15 @@ def _jumps(grid: Grid) -> int:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Window:
-    """A solved window in the problem's units; `lam` (N, R, 2) are the multipliers of its scaled rows' upper and lower sides."""
+    """A solved window in the problem's units; rows (N, A, 4), feed (N, 2) and dynamics (N,) as in `Multipliers`."""
 
     x: FloatArray
     u: FloatArray
     jerk: FloatArray
     duration: FloatArray
-    lam: FloatArray
-    time_unit: float
+    rows: FloatArray
+    feed: FloatArray
+    dynamics: FloatArray
 
     def after(self, point: int) -> _Window:
         """The part from a point on."""
@@ -137,7 +142,9 @@ class _Window:
             u=self.u[own],
             jerk=self.jerk[own],
             duration=self.duration[own],
-            lam=self.lam[own],
+            rows=self.rows[own],
+            feed=self.feed[own],
+            dynamics=self.dynamics[own],
         )
 
 
@@ -182,15 +189,25 @@ class _Scaled:
         jerk = float(1.0 / self.per_jerk.max())
         kernel.track(self.grid, jerk, x.copy(), x, u, p, 0.0, POLISHING_ROUNDS, np.inf, POLISHED)
 
-    def window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray) -> _Window:
-        """A profile in the problem's units."""
+    def window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray, pi: FloatArray) -> _Window:
+        """A profile in the problem's units, with the multipliers of its rows and dynamics."""
         vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
         h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
-        sides = np.zeros((len(p), self.rows, 2))
-        sides[:, :, 0], sides[:, : self.rows - 2, 1] = lam[:, : self.rows], lam[:, self.rows :]
-        feed, t = self.feed, self.time
+        feed, t, lower = self.feed, self.time, self.rows - 2
+        rows = np.zeros((len(p), len(self.per_jerk), 4))
+        rows[:, :, : 3 + self.jumps] = (lam[:, :lower] - lam[:, self.rows :]).reshape(
+            len(p), -1, 3 + self.jumps
+        )
+        of_feed = lam[:, lower : self.rows].copy()
+        of_feed[[0, -1], 1] = 0.0  # these limit the kinematics, not the feed
         return _Window(
-            x=x * feed**2, u=u * feed / t, jerk=p / h * feed / t**2, duration=h * t, lam=sides, time_unit=t
+            x=x * feed**2,
+            u=u * feed / t,
+            jerk=p / h * feed / t**2,
+            duration=h * t,
+            rows=rows * t,
+            feed=of_feed * t,
+            dynamics=pi * t / feed**2,
         )
 
 
@@ -206,15 +223,15 @@ class _Profile:
         points, axes = problem.d1.shape
         self.x, self.u = np.zeros(points), np.zeros(points)
         self.jerk, self.duration = np.zeros(points), np.zeros(points)
-        self.price_acceleration, self.price_jerk = np.zeros(axes), np.zeros(axes)
-        self.price_feed_sq = np.zeros(points)
+        self.rows, self.feed, self.dynamics = (
+            np.zeros((points, axes, 4)),
+            np.zeros((points, 2)),
+            np.zeros(points),
+        )
         self.iterations = 0
         self.stops: list[int] = []  # points where the profile rests because nothing better was found
         self._rest: _Window | None = None  # what the window before knew of the way ahead, down to its stop
-        margin = problem.margin.copy()
-        margin[problem.piece[1:] - 1] = 0.0
-        before = np.concatenate([[0.0], margin[:-1]])
-        self.acceleration = problem.acceleration * (1.0 - np.maximum(margin, before))[:, None]
+        self.acceleration = acceleration_limits(problem)
 
     def solve_piece(self, first: int, last: int) -> None:
         """Solve the points first..last in windows."""
@@ -284,7 +301,7 @@ class _Profile:
         scaled = self._scaled(begin, end)
         for start in (self._tracked, self._plain)[: 1 if self.x[begin] > 0.0 else 2]:
             x, u, p = start(begin, end, scaled)
-            done, gap, residual, defect, lam = kernel.minimise(
+            done, gap, residual, defect, lam, pi = kernel.minimise(
                 scaled.grid,
                 scaled.per_jerk,
                 x,
@@ -297,7 +314,7 @@ class _Profile:
             self.iterations = max(self.iterations, done)
             if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
                 scaled.polish(x, u, p)
-                return scaled.window(x, u, p, lam)
+                return scaled.window(x, u, p, lam, pi)
         return None
 
     def _tracked(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -330,21 +347,7 @@ class _Profile:
         """The plain start as a profile: feasible, and slow."""
         scaled = self._scaled(begin, end)
         x, u, p = self._plain(begin, end, scaled)
-        return scaled.window(x, u, p, np.zeros((len(p), 2 * scaled.rows - 2)))
-
-    def _price(self, begin: int, count: int, found: _Window) -> None:
-        """Add the multipliers of the kept intervals to the prices; a scaled row g <= 1 costs lam per unit of its limit."""
-        lam, axes = found.lam[:count] * found.time_unit, len(self.problem.axes)
-        per_axis = (found.lam.shape[1] - 2) // axes
-        for k in range(axes):
-            rows = lam[:, k * per_axis : (k + 1) * per_axis].sum(axis=2)
-            self.price_jerk[k] -= rows[:, 1:3].sum()
-            self.price_acceleration[k] -= rows[:, 0].sum() + rows[:, 3:].sum()
-        at_point, between = lam[:, -2, 0], lam[:, -1, 0] / 2.0
-        limit = self.problem.feed_sq_max
-        point = np.arange(begin, begin + count)
-        self.price_feed_sq[point] -= (at_point + between) / limit[point]
-        self.price_feed_sq[point + 1] -= between / limit[point + 1]
+        return scaled.window(x, u, p, np.zeros((len(p), 2 * scaled.rows - 2)), np.zeros(len(p)))
 
     def _unfelt(self, begin: int, end: int, found: _Window) -> int:
         """Last point of a window from which its end is far beyond the way to brake."""
@@ -360,7 +363,8 @@ class _Profile:
         count = end - begin
         self.x[begin : end + 1], self.u[begin : end + 1] = found.x[: count + 1], found.u[: count + 1]
         self.jerk[begin:end], self.duration[begin:end] = found.jerk[:count], found.duration[:count]
-        self._price(begin, count, found)
+        self.rows[begin:end], self.feed[begin:end] = found.rows[:count], found.feed[:count]
+        self.dynamics[begin:end] = found.dynamics[:count]
         if self._progress is not None:
             self._progress(end / len(self.problem))
         self._rest = found.after(count)
@@ -388,19 +392,6 @@ class _Profile:
         self.duration = self.duration * by
         return float(largest.max())
 
-    def prices(self) -> Prices:
-        """Derivatives of the time with respect to the limits (the multipliers, unscaled)."""
-        problem = self.problem
-        velocity = np.zeros(len(problem.axes))
-        for k, axis in enumerate(problem.axes):
-            if f"velocity.{axis}" in problem.bound_names:
-                held = problem.feed_sq_bound == problem.bound_names.index(f"velocity.{axis}")
-                velocity[k] = (
-                    2.0 * (self.price_feed_sq * problem.feed_sq_max)[held].sum() / problem.velocity[k]
-                )
-        return Prices(
-            velocity=velocity,
-            acceleration=self.price_acceleration / problem.acceleration,
-            jerk=self.price_jerk / problem.jerk,
-            feed_sq_max=self.price_feed_sq,
-        )
+    def multipliers(self) -> Multipliers:
+        """Of all intervals."""
+        return Multipliers(rows=self.rows, feed=self.feed, dynamics=self.dynamics)

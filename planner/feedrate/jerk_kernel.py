@@ -244,7 +244,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
     """Solve one window in place, from the profile x, u (N+1,), p (N,) to the optimal one; x_0, u_0, x_N = u_N = 0 are given.
 
     Returns iterations used, relative gap, residual of rows and of dynamics, multipliers (N, M) of the
-    rows' upper sides, then their lower sides.
+    rows' upper sides, then their lower sides, and (N,) of the dynamics of x.
     """
     n = len(x) - 1
     lower = len(per_jerk) * (3 + jumps)
@@ -275,7 +275,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         share = min(4.0 * share, 1.0)
         while not riccati(model, share, gains):
             if share == 0.0:
-                return it, gap / total, np.inf, np.inf, lam
+                return it, gap / total, np.inf, np.inf, lam, pi
             share = 0.25 * share if share > SHARE_MIN else 0.0
         offsets(model, share, gains)
         dlam[:] = 0.0
@@ -291,7 +291,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         hold = 1.0 if change > CHANGE_MAX else 0.0
         stalled = 0 if primal >= STALL_STEP else stalled + 1
         if stalled == STALL_ROUNDS or not gap < np.inf:
-            return it, gap / total, np.inf, np.inf, lam
+            return it, gap / total, np.inf, np.inf, lam, pi
     if done == iterations:  # the last step has not been looked at yet
         total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
-    return done, gap / total, residual, defect, lam
+    return done, gap / total, residual, defect, lam, pi

@@ -120,6 +120,8 @@ class JerkLimitedNLP:
                 status, sentence = found.status, found.sentence
             here = slice(problem.piece[g], problem.piece[g + 1])
             columns[here], prices[here] = found.columns, found.prices
+        axes = len(problem.axes)
+        relative = prices[:, 0] * problem.feed_sq_max  # dT / d(ln feed_sq_max)
         return FeedrateSolution(
             status=status,
             sentence=sentence,
@@ -131,7 +133,9 @@ class JerkLimitedNLP:
             solve_time=time.perf_counter() - began,
             iterations=iterations,
             jerk_limited=True,
-            prices=_sums(problem, prices),
+            prices=Prices.from_relative(
+                problem, prices[:, 1 : 1 + axes].sum(axis=0), prices[:, 1 + axes :].sum(axis=0), relative
+            ),
         )
 
 
@@ -322,18 +326,3 @@ def _outcome(stats: dict[str, Any], settings: JerkLimitedNLP) -> tuple[Status, s
     if iterations >= settings.max_iterations:  # fatrop has one code for every failure
         return *OUTCOMES["Maximum_Iterations_Exceeded"], iterations
     return *BROKE_DOWN, iterations
-
-
-def _sums(problem: FeedrateProblem, prices: FloatArray) -> Prices:
-    """Prices of the limits from those of the rows (P, 1 + 2A); bounds on feed^2 that come from an axis limit count for it."""
-    axes = len(problem.axes)
-    names = np.array(problem.bound_names)[problem.feed_sq_bound]
-    relative = prices[:, 0] * problem.feed_sq_max  # dT / d(ln feed_sq_max)
-    velocity = np.array([2.0 * relative[names == f"velocity.{axis}"].sum() for axis in problem.axes])
-    jump = np.array([relative[names == f"curvature_jump.{axis}"].sum() for axis in problem.axes])
-    return Prices(
-        velocity=velocity / problem.velocity,
-        acceleration=(prices[:, 1 : 1 + axes].sum(axis=0) + jump) / problem.acceleration,
-        jerk=prices[:, 1 + axes :].sum(axis=0) / problem.jerk,
-        feed_sq_max=prices[:, 0],
-    )

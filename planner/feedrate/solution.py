@@ -43,6 +43,43 @@ class Prices:
             freeze(self, name, np.float64, (axes,))
         freeze(self, "feed_sq_max", np.float64, (None,))
 
+    @classmethod
+    def from_relative(
+        cls, problem: FeedrateProblem, acceleration: FloatArray, jerk: FloatArray, feed_sq_max: FloatArray
+    ) -> Prices:
+        """From dT/d(ln limit) [s]: of the rows of each axis (A,), and of every point's feed_sq_max (P,), which counts for the axis
+        limit it comes from."""
+        names = np.array(problem.bound_names)[problem.feed_sq_bound]
+        velocity = np.array([2.0 * feed_sq_max[names == f"velocity.{axis}"].sum() for axis in problem.axes])
+        jump = np.array([feed_sq_max[names == f"curvature_jump.{axis}"].sum() for axis in problem.axes])
+        return cls(
+            velocity=velocity / problem.velocity,
+            acceleration=(acceleration + jump) / problem.acceleration,
+            jerk=jerk / problem.jerk,
+            feed_sq_max=feed_sq_max / problem.feed_sq_max,
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Multipliers:
+    """Multipliers of the interval to the right of each point [s]; 0 where there is no interval.
+
+    rows     : (P, A, 4) of the axis limits, as shares of the limits: acceleration at the interval's start, jerk there, jerk at its
+               end, acceleration there; negative where the lower side is the one that holds
+    feed     : (P, 2) of x / feed_sq_max at the point and in the middle of the interval
+    dynamics : (P,) of the kinematics of x [s per mm2/s2]
+    """
+
+    rows: FloatArray
+    feed: FloatArray
+    dynamics: FloatArray
+
+    def __post_init__(self) -> None:
+        points, axes, _ = np.shape(self.rows)
+        freeze(self, "rows", np.float64, (points, axes, 4))
+        freeze(self, "feed", np.float64, (points, 2))
+        freeze(self, "dynamics", np.float64, (points,))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FeedrateSolution:
@@ -59,6 +96,7 @@ class FeedrateSolution:
     iterations   : of an iterative solver; the largest of all pieces
     jerk_limited : True if the jerk limits of the problem were kept
     prices       : what the limits cost, if the solver knows
+    multipliers  : of limits and kinematics, if the solver knows; see feedrate/lagrangian.py
     """
 
     status: Status
@@ -72,6 +110,7 @@ class FeedrateSolution:
     iterations: int = 0
     jerk_limited: bool = False
     prices: Prices | None = None
+    multipliers: Multipliers | None = None
 
     def __post_init__(self) -> None:
         points = len(self.feed_sq)

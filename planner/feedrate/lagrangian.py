@@ -1,0 +1,97 @@
+"""The Lagrangian of the jerk-limited problem, interval by interval: what a small change of the problem does to the shortest time.
+
+    L = sum_i  h_i + sum_r lam_ir g_ir + pi_i (x_i + (2 u_i + p_i) ds_i + p_i (2 u_i + p_i) h_i^2/12 - x_{i+1})
+
+with the rows g and the kinematics of jerk_rows.py, and the multipliers lam, pi that the solver ends with. At the optimum L is
+stationary in the profile. So if the limits, or the path under the grid, change with some theta, the shortest time changes by
+
+    dT/dtheta = dL/dtheta       with profile and multipliers as they are (envelope theorem):
+
+no second solution is needed, and the difference of L between two problems on corresponding grids is the difference of their times to
+first order, place by place. Where two limits hold at once that only together determine the motion (equal axes at 45 degrees), the
+time has a kink; the multipliers then are one of its slopes between left and right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from planner.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk_rows import duration
+from planner.feedrate.solution import FeedrateSolution
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Lagrangian:
+    """value (P,) of every interval [s], and what it changes by per relative change of the limits: acceleration, jerk (A,) and
+    feed_sq_max (P,) [s]."""
+
+    value: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    feed_sq_max: FloatArray
+
+
+def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangian:
+    """The Lagrangian of a problem at the profile and the multipliers of a solution, of this problem or of a neighbouring one on a
+    corresponding grid. Raises ValueError if the solution has no multipliers."""
+    found = solution.multipliers
+    if found is None:
+        raise ValueError(f"lagrangian: {solution.solver} gives no multipliers")
+    points, axes = problem.d1.shape
+    value, of_feed = np.zeros(points), np.zeros(points)
+    of_acceleration, of_jerk = np.zeros(axes), np.zeros(axes)
+    _lagrangian(
+        np.diff(problem.s, append=problem.s[-1]), problem.interval, problem.d1,
+        problem.d2_left, problem.d2_right, problem.d3_left, problem.d3_right,
+        acceleration_limits(problem), problem.jerk, problem.feed_sq_max,
+        solution.feed_sq, solution.acc_s, solution.jerk_s * solution.duration,
+        found.rows, found.feed, found.dynamics,
+        value, of_acceleration, of_jerk, of_feed,
+    )  # fmt: skip
+    return Lagrangian(value=value, acceleration=of_acceleration, jerk=of_jerk, feed_sq_max=of_feed)
+
+
+def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
+    """(P, A) axis accelerations less the larger margin of the intervals at both sides of each point [mm/s2]."""
+    margin = problem.margin.copy()
+    margin[problem.piece[1:] - 1] = 0.0
+    before = np.concatenate([[0.0], margin[:-1]])
+    return problem.acceleration * (1.0 - np.maximum(margin, before))[:, None]
+
+
+@njit(cache=True, error_model="numpy")
+def _lagrangian(
+    ds, interval, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk, x_max,
+    x, u, p, rows, feed, pi, value, of_acceleration, of_jerk, of_feed,
+):  # fmt: skip
+    for i in range(len(ds)):
+        if not interval[i]:
+            continue
+        v0, v1, u1 = np.sqrt(x[i]), np.sqrt(x[i + 1]), u[i] + p[i]
+        h = duration(v0, v1, p[i], ds[i])
+        q, j = p[i] * (2.0 * u[i] + p[i]), p[i] / h
+        total = h + pi[i] * (x[i] + (2.0 * u[i] + p[i]) * ds[i] + q * h * h / 12.0 - x[i + 1])
+        for k in range(len(jerk)):
+            left = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) / acceleration[i, k]
+            right = (d1[i + 1, k] * u1 + d2_left[i + 1, k] * x[i + 1]) / acceleration[i + 1, k]
+            held = rows[i, k, 0] * left + rows[i, k, 3] * right
+            of_acceleration[k] -= held
+            total += held
+            left = d1[i, k] * j + v0 * (3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i])
+            right = d1[i + 1, k] * j + v1 * (3.0 * d2_left[i + 1, k] * u1 + d3_left[i + 1, k] * x[i + 1])
+            held = (rows[i, k, 1] * left + rows[i, k, 2] * right) / jerk[k]
+            of_jerk[k] -= held
+            total += held
+        held = feed[i, 0] * x[i] / x_max[i]
+        of_feed[i] -= held
+        total += held
+        middle, both = 0.5 * (v0 + v1) - 0.125 * p[i] * h, x_max[i] + x_max[i + 1]
+        held = feed[i, 1] * middle * middle * 2.0 / both
+        of_feed[i] -= held * x_max[i] / both
+        of_feed[i + 1] -= held * x_max[i + 1] / both
+        value[i] = total + held

@@ -27,6 +27,9 @@ from planner.fir.course import Course
 from planner.fir.superpose import Pieces
 from planner.machine import Machine
 
+# Normal acceleration, which is not linear on a piece, is looked at this many times on either half of it, and may use this share of
+# its limit [-].
+NORMAL_STEPS, NORMAL_SPARE = 16, 0.98
 # Bisections for the time at which the motion passes a joint: to 1e-9 of the piece.
 BISECTIONS = 30
 FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is rounding
@@ -69,7 +72,7 @@ def audit(course: Course, pieces: Pieces, machine: Machine) -> Audit:
         course.inner,
         machine.limits("acceleration", course.lines.axes),
         machine.limits("jerk", course.lines.axes),
-        machine.normal_acceleration or np.inf,
+        machine.normal_acceleration * NORMAL_SPARE if machine.normal_acceleration else np.inf,
         machine.dt**2 / 8,
         seen,
     )
@@ -81,48 +84,41 @@ def _measure(t, p, v, a, j, end, s, point, direction, tol, inner, a_max, j_max, 
     """Write time and ratios into seen (4, .); returns how many there are. bow: chord error over normal acceleration [s2]."""
     n, leg, last = 0, 0, p.shape[1] - 1
     for m in range(len(t)):
-        duration = end[m] - t[m]
-        middle, done = 0.5 * duration, False
-        arrival = p[m, last] + duration * (
-            v[m, last] + duration * (a[m, last] / 2.0 + duration * j[m, last] / 6.0)
-        )
-        _record(m, 0.0, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, n_max, bow, seen[:, n])
-        n += 1
-        while leg + 1 < len(direction) and s[leg + 1] <= arrival:
-            tau = _passing(p[m, last], v[m, last], a[m, last], j[m, last], s[leg + 1], duration)
-            if not done and middle <= tau:
-                _record(
-                    m,
-                    middle,
-                    leg,
-                    t,
-                    p,
-                    v,
-                    a,
-                    j,
-                    s,
-                    point,
-                    direction,
-                    tol,
-                    a_max,
-                    j_max,
-                    n_max,
-                    bow,
-                    seen[:, n],
-                )
-                n, done = n + 1, True
+        half, begun = 0.5 * (end[m] - t[m]), 0
+        arrival = p[m, last] + 2.0 * half * (v[m, last] + half * (a[m, last] + 2.0 * half * j[m, last] / 3.0))
+        while True:
+            joint, tau = leg + 1 < len(direction) and s[leg + 1] <= arrival, np.inf
+            if joint:
+                tau = _passing(p[m, last], v[m, last], a[m, last], j[m, last], s[leg + 1], 2.0 * half)
+            while begun < 2 and begun * half <= tau:
+                at = begun * half
+                _record(m, at, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, bow, seen[:, n])
+                if n_max < np.inf:
+                    seen[2, n] = max(seen[2, n], _normal_peak(v[m], a[m], j[m], at, half) / n_max)
+                n, begun = n + 1, begun + 1
+            if not joint:
+                break
             leg += 1
             if inner[leg]:
-                _record(
-                    m, tau, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, n_max, bow, seen[:, n]
-                )
+                _record(m, tau, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, bow, seen[:, n])
                 n += 1
-        if not done:
-            _record(
-                m, middle, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, n_max, bow, seen[:, n]
-            )
-            n += 1
     return n
+
+
+@njit(cache=True, error_model="numpy")
+def _normal_peak(v, a, j, begin, lasting):
+    """Largest normal acceleration on a part of a piece."""
+    peak_sq = 0.0
+    for k in range(NORMAL_STEPS + 1):
+        tau, feed_sq, bend_sq, both = begin + lasting * k / NORMAL_STEPS, 0.0, 0.0, 0.0
+        for c in range(len(v) - 1):
+            velocity, acceleration = v[c] + tau * (a[c] + tau * j[c] / 2.0), a[c] + tau * j[c]
+            feed_sq += velocity * velocity
+            bend_sq += acceleration * acceleration
+            both += velocity * acceleration
+        if feed_sq > FEED_AT_REST * FEED_AT_REST:
+            peak_sq = max(peak_sq, bend_sq - both * both / feed_sq)
+    return np.sqrt(peak_sq)
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,7 +135,7 @@ def _passing(p, v, a, j, s, duration):
 
 
 @njit(cache=True, error_model="numpy")
-def _record(m, tau, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, n_max, bow, out):
+def _record(m, tau, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, bow, out):
     """Measure piece m at tau, where the motion is on `leg`: out (4,)."""
     axes = p.shape[1] - 1
     along = p[m, axes] + tau * (v[m, axes] + tau * (a[m, axes] / 2.0 + tau * j[m, axes] / 6.0)) - s[leg]
@@ -159,7 +155,7 @@ def _record(m, tau, leg, t, p, v, a, j, s, point, direction, tol, a_max, j_max, 
     near = leg + 1 if along > 0.5 * (s[leg + 1] - s[leg]) else leg
     out[0] = t[m] + tau
     out[1] = (np.sqrt(off_sq) + bow * np.sqrt(bend_sq)) / tol[near]
-    out[2], out[3] = max(over_a, np.sqrt(bend_sq) / n_max), over_j
+    out[2], out[3] = over_a, over_j
 
 
 def slowest(t: FloatArray, factor: FloatArray, begin: FloatArray, end: FloatArray) -> FloatArray:

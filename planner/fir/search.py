@@ -24,8 +24,9 @@ from planner.machine import Machine
 SPEEDS = 10
 FINEST = 0.03
 # Margins that are tried; from the second on with speeds near the best of the one before.
-MARGINS = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
-NEARBY = (1.6, 1.25, 1.0, 0.8, 0.64)
+MARGINS = np.array([1.0, 2.0, 1.8, 1.6, 1.4, 1.2])
+NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
+MUCH = 1.05  # slower by this factor is much
 # Full stops are tried where the command waits for this share of the filters' delay or longer [-].
 STOPS = (1.0, 0.0)
 WAIT_ROUNDING = 1e-9  # of that share
@@ -96,29 +97,33 @@ def _settled(course: Course, machine: Machine) -> Schedule:
 def _search(course: Course, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
     """For each margin (K,) the best speed of each stretch [mm/s] and its time [s], both (K, S), by the times of schedules.
 
-    Where nothing waits at the first margin, the others would make filters longer for nothing.
+    Where nothing waits at the first margin, the others would make filters longer for nothing; and where the second, the largest, is
+    much slower, those between them are not tried.
     """
-    speeds, times = (np.empty((len(margins), course.stretches)) for _ in range(2))
     high = course.largest(course.feed)
     low = -course.largest(-np.minimum(np.cbrt(course.j_max * course.length**2 / 4), course.feed))
     step = np.log(high / low) / (SPEEDS - 1)
     tries = [np.exp(-k * step) * high for k in range(SPEEDS)]
+    speeds, times = (np.empty((len(margins), course.stretches)) for _ in range(2))
     speeds[:], times[:] = _best_speeds(course, machine, margins[0], tries, step)
     plan = plan_for(course, machine, speeds[0], np.full(course.stretches, margins[0]))
-    waits: Array = np.logical_or.reduceat((plan.gap(course) > 0)[:-1], course.first[:-1])
-    if waits.any():
-        part = course.pick(waits)
-        for k in range(1, len(margins)):
-            tries = [np.minimum(speeds[k - 1, waits] * ratio, high[waits]) for ratio in NEARBY]
-            step = np.full(part.stretches, np.log(NEARBY[0]) / 2)
-            speeds[k, waits], times[k, waits] = _best_speeds(part, machine, margins[k], tries, step)
+    hopeful: Array = np.logical_or.reduceat((plan.gap(course) > 0)[:-1], course.first[:-1])
+    for k in range(1, len(margins)):
+        if k == 2:
+            hopeful = hopeful & (times[1] <= times[0] * MUCH)
+        if not hopeful.any():
+            break
+        part = course.pick(hopeful)
+        tries = [np.minimum(speeds[k - 1, hopeful] * ratio, high[hopeful]) for ratio in NEARBY]
+        step = np.full(part.stretches, np.log(NEARBY[0] / NEARBY[1]))
+        speeds[k, hopeful], times[k, hopeful] = _best_speeds(part, machine, margins[k], tries, step)
     return speeds, times
 
 
 def _best_speeds(
     course: Course, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Best speed (S,) [mm/s] of each stretch and its time (S,) [s]: among `tries`, whose logarithms are `step` (S,) apart, and between."""
+    """Best speed (S,) [mm/s] of each stretch and its time (S,) [s]: among `tries`, `step` (S,) apart in logarithm, and between them."""
     margins, high = np.full(course.stretches, margin), course.largest(course.feed)
     best, best_time = high, np.full(course.stretches, np.inf)
     while tries:

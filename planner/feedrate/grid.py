@@ -13,7 +13,8 @@ A jerk-limited profile rounds the switches off: on a stretch of length L, with l
     tau = min(a/j, (L / (16 j))^(1/3)),
 
 which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in all). The second-order
-profile with the acceleration j tau tells when and where things happen; between its events the points are spread in time, every
+profile with the acceleration j tau, as slow at corners as the jerk asks for at constant speed, tells when and where things happen;
+between its events the points are spread in time, every
 `STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
 So a stretch from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
 """
@@ -82,9 +83,9 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
     margin = samples.margin.copy()
     margin[straight] = np.maximum(1.0 - tau[straight] * j / a, 0.0)  # leaves the acceleration j tau
     model = replace(samples, margin=margin)
-    problem = feedrate_problem(model, machine)
+    problem = _slow_at_corners(feedrate_problem(model, machine))
     model = add_switching_points(model, problem, Reachability().solve(problem), machine)
-    problem = feedrate_problem(model, machine)
+    problem = _slow_at_corners(feedrate_problem(model, machine))
     solution = Reachability().solve(problem).require()
     interval = _straight(model)
     parent = np.searchsorted(samples.s[straight], model.s[interval], side="right") - 1
@@ -99,6 +100,14 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
     margin = model.margin.copy()
     margin[interval] = 0.0  # straight: nothing to interpolate
     return insert_points(replace(model, margin=margin), at[inside], s[inside])
+
+
+def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
+    """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the feed."""
+    turning = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right)) / problem.jerk
+    with np.errstate(divide="ignore"):
+        allowed = turning.max(axis=1) ** (-2.0 / 3.0)
+    return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 
 def _spread(whole: FloatArray, finer: float) -> tuple[Array, FloatArray]:

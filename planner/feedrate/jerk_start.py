@@ -4,8 +4,8 @@
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.
-2. The fastest profile under these caps that accelerates and brakes along the path with a share of what the axes have.
-3. Near rest the motion can only grow like a constant jerk from standstill: s = j t^3/6 gives x = j^(2/3) (6 s)^(4/3) / 4.
+2. The fastest profile under these caps that leaves every dip, and brakes into it, like a motion with a share of the jerk, up to a share
+   of the acceleration. Near rest that is s = j t^3/6.
 
 `plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that acceleration for about
 a quarter of the way, constant speed after one interval of transition, and the same backwards from the end. Every interval has
@@ -26,6 +26,9 @@ JERK_SHARE = 0.5  # of the jerk limits, for the caps and the first motion from r
 
 PLAIN_SHARE = 0.25  # of the way, on which the plain start accelerates, and again brakes [-]
 CAP_SHARE = 0.8  # of all other bounds on feed^2 [-]
+NEWTON_STEPS = (
+    4  # for the time on an interval; from the bound they start at, one in a thousand is left at worst
+)
 FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between the ends [-]
 
 
@@ -38,12 +41,12 @@ def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
         by_acceleration = NORMAL_SHARE / curve.max(axis=1)
         by_jerk = (JERK_SHARE / slope.max(axis=1)) ** (2 / 3)
         rate = ACCELERATION_SHARE / (np.abs(problem.d1[own]) / problem.acceleration).max(axis=1)
+        jerk = JERK_SHARE / (np.abs(problem.d1[own]) / problem.jerk).max(axis=1)
     caps = np.minimum(CAP_SHARE * problem.feed_sq_max[own], np.minimum(by_acceleration, by_jerk))
     caps[0] = caps[-1] = 0.0
-    ds = np.diff(problem.s[own])
-    to_end = np.minimum(problem.s[own] - problem.s[begin], problem.s[end] - problem.s[own])
-    jerk = JERK_SHARE * problem.jerk.min()
-    x = np.minimum(_accelerating(caps, rate, ds), jerk ** (2 / 3) * (6.0 * to_end) ** (4 / 3) / 4.0)
+    x = _growing(
+        _growing(caps, rate, jerk, np.diff(problem.s[own]), 1), rate, jerk, np.diff(problem.s[own]), -1
+    )
     x = np.maximum(x, FEED_SQ_MIN * x.max())
     x[0] = x[-1] = 0.0
     return x
@@ -73,11 +76,27 @@ def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @njit(cache=True, error_model="numpy")
-def _accelerating(caps, rate, ds):
-    """The largest x (N+1,) below the caps with |dx/ds| <= 2 rate."""
+def _growing(caps, rate, jerk, ds, way):
+    """The largest x (N+1,) below the caps that grows, forward (way 1) or backward (-1), with no more than a jerk from u = 0 up to an
+    acceleration: from every dip like a motion that starts there."""
+    n = len(ds)
     x = caps.copy()
-    for i in range(len(ds)):
-        x[i + 1] = min(x[i + 1], x[i] + 2.0 * min(rate[i], rate[i + 1]) * ds[i])
-    for i in range(len(ds) - 1, -1, -1):
-        x[i] = min(x[i], x[i + 1] + 2.0 * min(rate[i], rate[i + 1]) * ds[i])
+    i, u = (0, 0.0) if way > 0 else (n, 0.0)
+    for _ in range(n):
+        step = ds[i] if way > 0 else ds[i - 1]
+        j, a = min(jerk[i], jerk[i + way]), min(rate[i], rate[i + way])
+        v = np.sqrt(x[i])
+        # v h + u h^2/2 + j h^3/6 = step; each term alone bounds h, Newton's steps go down from there
+        h = np.cbrt(6.0 * step / j)
+        if v * h > step:
+            h = step / v
+        for _newton in range(NEWTON_STEPS):
+            h -= (h * (v + h * (u / 2.0 + h * j / 6.0)) - step) / (v + h * (u + h * j / 2.0))
+        grown = min((v + h * (u + h * j / 2.0)) ** 2, x[i] + 2.0 * a * step)
+        if grown < x[i + way]:
+            x[i + way] = grown
+            u = min(u + j * h, a)
+        else:
+            u = min(max((x[i + way] - x[i]) / (2.0 * step), 0.0), u + j * h, a)
+        i += way
     return x

@@ -6,9 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from random_problems import make_problem
+from random_problems import in_units, make_problem
 
 from benchmarks import problems
+from benchmarks.jerk_campaign import small_problem
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -126,3 +127,38 @@ def test_a_piece_with_too_few_intervals_is_refused():
     assert solution.status is Status.INFEASIBLE
     assert "fewer than 4 intervals" in solution.sentence
     assert np.isnan(solution.feed_sq).all()
+
+
+@pytest.mark.parametrize("length", [1.0 / 25.4, 1e-3])
+def test_inches_and_metres_give_the_same_motion(length):
+    for seed in range(12):
+        problem = small_problem(seed)
+        here, there = (JerkLimited().solve(p).require() for p in (problem, in_units(problem, length)))
+        assert there.cycle_time == pytest.approx(here.cycle_time, rel=1e-6)
+        np.testing.assert_allclose(
+            np.sqrt(there.feed_sq) / length, np.sqrt(here.feed_sq), rtol=1e-3, atol=1e-6
+        )
+
+
+def test_lengths_and_limits_scaled_alike_keep_the_time_and_slower_clocks_stretch_it():
+    problem = small_problem(3)
+    time = JerkLimited().solve(problem).require().cycle_time
+    assert JerkLimited().solve(in_units(problem, 1.0, 60.0)).require().cycle_time == pytest.approx(
+        60.0 * time, rel=1e-6
+    )
+
+
+def test_the_time_converges_with_the_grid():
+    """First order: half the step, half the distance to the limit of the times."""
+    machine = problems.machine()
+    toolpath = toolpath_from_program(problems.pentagon(), machine)
+    times = []
+    for finer in (1.0, 2.0, 4.0, 8.0):
+        path = round_corners(toolpath, machine, BezierCorner(), blend_tangents=True)
+        samples = refine_for_jerk(
+            sample_path(path, machine, 2e-3 / finer**2, third_order=True), machine, finer
+        )
+        times.append(JerkLimited(tol=1e-6).solve(feedrate_problem(samples, machine)).require().cycle_time)
+    distance = np.abs(np.array(times[:-1]) - times[-1]) / times[-1]
+    assert distance[0] < 2e-3
+    assert distance[2] < 0.5 * distance[0]

@@ -154,7 +154,7 @@ def course_of(toolpath: Toolpath, machine: Machine) -> Course:
     sin_half[first] = 0.0
     programmed = lines.feed[at[:-1]]
     most = np.repeat(np.maximum.reduceat(programmed, first[:-1]), np.diff(first))
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # infinite for axes that stand still
         v, a, j = (
             (machine.limits(q, lines.axes) / np.abs(direction)).min(axis=1)
             for q in ("velocity", "acceleration", "jerk")

@@ -68,6 +68,7 @@ def plain_plan(course: Course, machine: Machine) -> Schedule:
         speed=course.feed,
         passing=np.full(len(course) + 1, np.inf),
         overlap=np.where(course.inner, overlap, 0.0),
+        holding=np.zeros(len(course), bool),
     )
 
 

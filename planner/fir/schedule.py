@@ -51,6 +51,7 @@ class Schedule:
     speed   : (R,) largest speed on each leg [mm/s]
     passing : (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
     overlap : (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
+    holding : (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
     """
 
     T1: FloatArray
@@ -58,6 +59,7 @@ class Schedule:
     speed: FloatArray
     passing: FloatArray
     overlap: FloatArray
+    holding: Array
 
     def __post_init__(self) -> None:
         legs = len(self.speed)
@@ -66,6 +68,7 @@ class Schedule:
         freeze(self, "speed", np.float64, (legs,))
         freeze(self, "passing", np.float64, (legs + 1,), finite=False)
         freeze(self, "overlap", np.float64, (legs + 1,))
+        freeze(self, "holding", np.bool_, (legs,))
 
     def at_joints(self, course: Course) -> tuple[FloatArray, FloatArray]:
         """T1 and T2 (R+1,) of the stretch that each joint lies in (the last joint: of the last one)."""
@@ -87,15 +90,20 @@ class Schedule:
             speed=self.speed[legs],
             passing=self.passing[joints],
             overlap=self.overlap[joints],
+            holding=self.holding[legs],
         )
 
     def put(self, course: Course, chosen: Array, part: Schedule) -> Schedule:
         """This plan with `part` for the stretches `chosen` (S,)."""
         legs = chosen[course.stretch]
-        new = {name: getattr(self, name).copy() for name in ("T1", "T2", "speed", "passing", "overlap")}
+        new = {
+            name: getattr(self, name).copy()
+            for name in ("T1", "T2", "speed", "passing", "overlap", "holding")
+        }
         for name in ("T1", "T2"):
             new[name][chosen] = getattr(part, name)
-        new["speed"][legs] = part.speed
+        for name in ("speed", "holding"):
+            new[name][legs] = getattr(part, name)
         for name in ("passing", "overlap"):
             new[name][:-1][legs] = getattr(part, name)[:-1]
         return Schedule(**new)
@@ -132,7 +140,7 @@ def schedule(
         waiting[waits] = np.minimum(waiting[waits], np.where(tied[other], shorter, np.inf))
     w = course.direction * speed[:, None]
     overlap[at] = overlap_within_limits(waiting[waits], w[at - 1], w[at], T1_at[waits], T2_at[waits], a, j)
-    return Schedule(T1=T1, T2=T2, speed=speed, passing=passing, overlap=overlap)
+    return Schedule(T1=T1, T2=T2, speed=speed, passing=passing, overlap=overlap, holding=course.slower)
 
 
 def _waiting(
@@ -196,7 +204,7 @@ def cells_of(course: Course, plan: Schedule) -> Cells:
     stretch = np.append(course.stretch, course.stretches - 1)
 
     slow = np.flatnonzero(plan.passing < np.inf)
-    legs = np.flatnonzero(course.slower)
+    legs = np.flatnonzero(plan.holding)
     value = np.concatenate([plan.passing[slow], course.feed[legs]])
     where = np.concatenate([stretch[slow], stretch[legs]])
     reach = value * delay[np.concatenate([slow, legs])] / 2

@@ -67,6 +67,7 @@ def _stopping_at_waits(
         speed=plan.speed,
         passing=plan.passing,
         overlap=plan.overlap,
+        holding=plan.holding,
     )
     return cut, kept.put(cut, better[home_of_cut], other.pick(part, better[home]))
 

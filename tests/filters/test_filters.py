@@ -210,7 +210,7 @@ def test_what_a_filter_of_one_period_leaves_of_a_mode(damping, residue):
     damping=st.floats(0.0, 0.2),
     times=st.lists(st.floats(5e-3, 0.1), min_size=2, max_size=3),
 )
-@settings(max_examples=40)
+@settings(max_examples=15)
 def test_residual_vibration_against_a_simulated_oscillator(frequency, damping, times):
     """x'' + 2 z w x' + w^2 x = -a(t): scipy's lsim, straight between the samples like ours, and its state's envelope at the end."""
     filters, w = Filters(tuple(times)), 2 * np.pi * frequency

@@ -1,0 +1,119 @@
+"""The filtered command against brute force, at any gaps, speeds and lengths; and after hours as exact as at the start."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from courses import course_through, machine_of, motion_of, overlapping
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.filters import Filters
+from planner.fir.command import Cells, command_of
+from planner.fir.course import course_of
+from planner.fir.settle import make
+from planner.fir.superpose import superpose
+from planner.geometry.build import toolpath_from_program
+from planner.nc.reader import parse_program
+
+MACHINE = machine_of(velocity=1e5)
+
+
+def by_superposition(command, stretch, t):
+    """Position, velocity, acceleration (3, n, A+1) at local times t, one edge after the other."""
+    low, high = command.first[stretch], command.first[stretch + 1]
+    filters = Filters((command.T1[stretch], command.T2[stretch]))
+    w = np.vstack([np.zeros(command.velocity.shape[1]), command.velocity[low:high]])
+    out = np.zeros((3, len(t), w.shape[1]))
+    out[0] = command.position[low]
+    for edge, step in zip(command.t[low:high], np.diff(w, axis=0), strict=True):
+        for row, response in enumerate((filters.ramp, filters.step, filters.kernel)):
+            out[row] += np.outer(response(t - edge), step)
+    return out
+
+
+legs = st.lists(
+    st.tuples(st.floats(0.01, 100.0), st.floats(1.0, 300.0), st.floats(0.0, 0.3), st.floats(0.0, 6.28)),
+    min_size=1,
+    max_size=12,
+)
+
+
+@given(legs=legs, T1=st.floats(2e-3, 0.1), ratio=st.floats(0.05, 1.0))
+@settings(max_examples=60)
+def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):
+    """Lengths, speeds, gaps and directions as they come: short pulses, long gaps, none."""
+    length, speed, gap, turn = (np.array(column) for column in zip(*legs, strict=True))
+    steps = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) * length[:, None]
+    course = course_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, speed)
+    cells = Cells(leg=np.arange(len(course)), length=course.length, speed=course.feed)
+    gaps = np.append(gap, 0.1)[: len(course) + 1] * course.inner
+    ones = np.ones(course.stretches)
+    command = command_of(course, cells, gaps, T1 * ones, T1 * ratio * ones)
+    pieces = superpose(command)
+    for k in range(course.stretches):
+        at = slice(pieces.first[k], pieces.first[k + 1])
+        t = pieces.t[at] - command.begin[k]
+        expected = by_superposition(command, k, t)
+        size = speed.max()
+        np.testing.assert_allclose(pieces.position[at], expected[0], atol=1e-10 * size)
+        np.testing.assert_allclose(pieces.velocity[at], expected[1], atol=1e-10 * size)
+        np.testing.assert_allclose(pieces.acceleration[at], expected[2], atol=1e-10 * size / (T1 * ratio))
+        # pieces join: what one ends with, the next begins with
+        h = np.diff(t)[:, None]
+        p, v, a, j = (getattr(pieces, n)[at][:-1] for n in ("position", "velocity", "acceleration", "jerk"))
+        np.testing.assert_allclose(p + h * (v + h * (a / 2 + h * j / 6)), pieces.position[at][1:], atol=1e-9)
+        np.testing.assert_allclose(a + h * j, pieces.acceleration[at][1:], atol=1e-8 * size / (T1**2 * ratio))
+
+
+def test_the_universal_identity():
+    """|a| <= 2 V/T1 and |j| <= 4 V/(T1 T2), both attained by zig-zags without gap (PAPERS G7: 119 and 70 ms, T1 = 50, T2 = 30)."""
+    T1, T2, V = 0.05, 0.03, 100.0
+    machine = machine_of(velocity=1e4, acceleration=V / T1, jerk=V / (T1 * T2))
+    for duration, quantity, peak in ((0.119, "acceleration", 2.0), (0.070, "jerk", 4.0)):
+        up = np.arange(13) * duration * V * np.sin(1e-4)
+        across = np.where(np.arange(13) % 2, duration * V, 0.0) * np.cos(1e-4)
+        course = course_through(np.stack([across, up, 0 * up], axis=1), machine)
+        assert not course.inner.any()  # reversals are full stops; here they are run through all the same
+        through = dataclasses.replace(course, first=np.array([0, 12]), dwell=np.zeros(2))
+        cells = Cells(leg=np.arange(12), length=course.length, speed=course.feed)
+        command = command_of(through, cells, np.zeros(13), np.array([T1]), np.array([T2]))
+        pieces = superpose(command)
+        seen = np.abs(getattr(pieces, quantity)[:, 0]).max() / (
+            V / T1 if quantity == "acceleration" else V / (T1 * T2)
+        )
+        assert seen == pytest.approx(peak, rel=1e-3)
+
+
+def test_nothing_adds_up_over_a_long_program():
+    """20,000 short legs and long ones between: at the end the motion is where the program ends, to rounding."""
+    rng = np.random.default_rng(3)
+    length = np.where(np.arange(20_000) % 500 == 0, 5000.0, 0.05)
+    turn = np.cumsum(rng.normal(0, 0.2, 20_000))
+    steps = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) * length[:, None]
+    course = course_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, 20.0)
+    made = make(course, MACHINE, overlapping(course, 0.09, 0.06, 0.03))
+    motion = motion_of(course, made.pieces)
+    end = motion.at(np.array([motion.end]), 1.0)
+    assert motion.end > 10_000
+    np.testing.assert_allclose(end.position[0], course.point[-1], atol=2e-9)
+    p, v = made.pieces.position, made.pieces.velocity
+    assert np.abs(v[-1]).max() < 20.0
+    h = np.diff(made.pieces.t)[:, None]
+    onward = p[:-1] + h * (v[:-1] + h * (made.pieces.acceleration[:-1] / 2 + h * made.pieces.jerk[:-1] / 6))
+    assert np.abs(onward - p[1:]).max() < 5e-9
+
+
+def test_dwells_and_full_stops():
+    program = parse_program("G21 G64 P0.01 F6000\nG4 P0.5\nG1 X10\nG4 P1\nY10\nG61.1\nX20\nG4 P0.25\nM2\n")
+    machine = machine_of()
+    course = course_of(toolpath_from_program(program, machine), machine)
+    np.testing.assert_allclose(course.dwell, [0.5, 1.0, 0.25])  # the exact stop comes after the corner at Y10
+    made = make(course, machine, overlapping(course, 0.0, 0.05, 0.03))
+    motion = motion_of(course, made.pieces)
+    assert made.command.begin[0] == 0.5
+    assert motion.end == pytest.approx(1.75 + course.length.sum() / 100.0 + len(course) * 0.08)
+    rest = made.pieces.velocity[made.pieces.t >= motion.end - 0.25 - 1e-9]
+    assert not rest.any()

@@ -65,7 +65,7 @@ class FirMethod:
             else:
                 course, schedule = fastest(course, machine)
             pieces = make(course, machine, schedule).pieces
-        trajectory, verdict = deliver(_motion(course, pieces), toolpath, machine, stages)
+        trajectory, verdict = deliver(motion_of(course, pieces), toolpath, machine, stages)
         return Plan(
             method="fir-plain" if self.plain else "fir",
             corner="fir",
@@ -85,7 +85,7 @@ class FirMethod:
         )
 
 
-def _motion(course: Course, pieces: Pieces) -> AxisMotion:
+def motion_of(course: Course, pieces: Pieces) -> AxisMotion:
     """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the course."""
     lines, axes = course.lines, course.point.shape[1]
     middle = (pieces.t + np.append(pieces.t[1:], pieces.end[-1])) / 2 - pieces.t

@@ -8,10 +8,8 @@ import numpy as np
 
 from benchmarks import problems
 from planner.arrays import FloatArray
-from planner.axis_motion import AxisMotion
 from planner.fir.course import Course, course_of
 from planner.fir.schedule import Schedule
-from planner.fir.superpose import Pieces
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
 
@@ -54,19 +52,6 @@ def overlapping(course: Course, overlap: float | FloatArray, T1: float, T2: floa
         passing=np.full(len(course) + 1, np.inf),
         overlap=np.where(inner, overlap, 0.0),
         holding=np.zeros(len(course), bool),
-    )
-
-
-def motion_of(course: Course, pieces: Pieces) -> AxisMotion:
-    """The axes of a filtered motion."""
-    axes = course.point.shape[1]
-    return AxisMotion(
-        axes=course.lines.axes,
-        t=pieces.t,
-        **{n: getattr(pieces, n)[:, :axes] for n in ("position", "velocity", "acceleration", "jerk")},
-        block=np.zeros(len(pieces)),
-        line=np.zeros(len(pieces)),
-        end=float(pieces.end[-1]),
     )
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from courses import corner, course_through, machine_of, motion_of, overlapping
+from courses import corner, course_through, machine_of, overlapping
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.corners.fir import overlap_time
 from planner.fir.overlap import corner_error, overlap_beside, overlap_within, overlap_within_limits
 from planner.fir.settle import make
+from planner.methods.fir import motion_of
 
 V, T1, T2 = 100.0, 0.05, 0.03
 Td = T1 + T2

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from courses import course_through, machine_of, motion_of, overlapping
+from courses import course_through, machine_of, overlapping
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,6 +16,7 @@ from planner.fir.course import course_of
 from planner.fir.settle import make
 from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program
+from planner.methods.fir import motion_of
 from planner.nc.reader import parse_program
 
 MACHINE = machine_of(velocity=1e5)

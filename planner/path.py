@@ -21,7 +21,7 @@ end gets a slightly larger *effective* curvature, such that the line meets X/kap
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -148,10 +148,30 @@ def sample_path(
     ends = np.flatnonzero(last)  # the points that close a piece
     piece = np.concatenate([[0], ends + 1])
     stop = np.flatnonzero(path.joint == Joint.STOP)
-    feed = path.toolpath.feed
-    columns = evaluate(
-        table.legs, table.corners, element, w0, w1, segment, last, feed, velocity, acceleration, jerk
+    limits = (path.toolpath.feed, velocity, acceleration, jerk)
+    return PathSamples(
+        path=path,
+        table=table,
+        piece=piece,
+        stop=stop,
+        element=element,
+        w0=w0,
+        w1=w1,
+        segment=segment,
+        **_evaluated(table, element, w0, w1, segment, last, limits),
     )
+
+
+def _evaluated(
+    table: ElementTable,
+    element: Array,
+    w0: FloatArray,
+    w1: FloatArray,
+    segment: Array,
+    last: Array,
+    limits: tuple[FloatArray, ...],
+) -> dict[str, FloatArray]:
+    """The columns of `PathSamples` that follow from the grid; `limits` (feed, then axis limits) matter to the margin."""
     names = (
         "s",
         "position",
@@ -164,17 +184,33 @@ def sample_path(
         "kappa_left",
         "kappa_right",
     )
-    return PathSamples(
-        path=path,
-        table=table,
-        piece=piece,
-        stop=stop,
-        element=element,
-        w0=w0,
-        w1=w1,
-        segment=segment,
-        **dict(zip(names, columns, strict=True)),
-    )
+    columns = evaluate(table.legs, table.corners, element, w0, w1, segment, last, *limits)
+    return dict(zip(names, columns, strict=True))
+
+
+def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
+    """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the free part of each leg
+    is stretched from its first and last block's ends, and the margins stay as they are."""
+    legs, element, segment = path.legs, samples.element, samples.segment
+    free = element >= 0
+    leg = np.maximum(element, 0)
+    begin = legs.offset[segment]
+    closes = segment + 1 == legs.first[leg + 1]  # the last block of its leg
+    end = np.where(closes, legs.length[leg], legs.offset[np.minimum(segment + 1, len(legs.offset) - 1)])
+
+    def span(on: SmoothPath) -> tuple[FloatArray, FloatArray]:
+        return np.maximum(begin, on.d_out[leg]), np.minimum(end, legs.length[leg] - on.d_in[leg + 1])
+
+    (a, b), (a_new, b_new) = span(samples.path), span(path)
+    rate = np.divide(b_new - a_new, b - a, out=np.ones(len(a)), where=free & (b > a))
+    w0, w1 = (np.where(free, a_new + (w - a) * rate, w) for w in (samples.w0, samples.w1))
+    last = np.zeros(len(samples), dtype=bool)
+    last[samples.piece[1:] - 1] = True
+    table = element_table(path)
+    axes = np.full(samples.d1.shape[1], np.inf)  # for the margins, which are not asked for
+    limits = (path.toolpath.feed, axes, axes, axes)
+    columns = _evaluated(table, element, w0, w1, segment, last, limits) | {"margin": samples.margin}
+    return replace(samples, path=path, table=table, w0=w0, w1=w1, **columns)
 
 
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:

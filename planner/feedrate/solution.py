@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -208,9 +209,19 @@ def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> t
     and the constraint's index (P,) in `active_names`. Jerk counts for jerk-limited solutions only. Solver-independent: computed
     from the profile alone.
     """
+    worst, which = np.zeros(len(problem)), problem.feed_sq_bound.copy()
+    for limit, ratio in ratios_by_limit(problem, solution):
+        better = ratio > worst
+        worst[better], which[better] = ratio[better], limit
+    return worst, which
+
+
+def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Iterator[tuple[int, FloatArray]]:
+    """For every constraint its index in `active_names` and the profile's ratios (P,) to it, as in `constraint_ratios`; of the bounds
+    on feed^2 only the smallest at each point has a ratio there."""
     x, u = solution.require().feed_sq, solution.acc_s
-    worst = x / problem.feed_sq_max
-    which = problem.feed_sq_bound.copy()
+    for bound in range(len(problem.bound_names)):
+        yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_max, 0.0)
     inner = np.flatnonzero(problem.interval)
     jerk = solution.jerk_s[inner]
     # Where there is no jerk, no duration is needed: it is infinite where a second-order profile rests at both ends.
@@ -219,21 +230,20 @@ def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> t
         (inner, u[inner], problem.d2_right, problem.d3_right),
         (inner + 1, u[inner] + gained, problem.d2_left, problem.d3_left),
     )
-    first = len(problem.bound_names)
-    for point, acc, d2, d3 in ends:
-        feed = np.sqrt(x[point])[:, None]
-        acc_axes = problem.d1[point] * acc[:, None] + d2[point] * feed**2
-        rows = [np.abs(acc_axes) / (problem.acceleration * (1.0 - problem.margin[inner, None]))]
+    first, axes = len(problem.bound_names), len(problem.axes)
+    for k in range(axes):
+        of_acceleration, of_jerk = np.zeros(len(problem)), np.zeros(len(problem))
+        for point, acc, d2, d3 in ends:
+            d1, curve, feed = problem.d1[point, k], d2[point, k], np.sqrt(x[point])
+            ratio = np.abs(d1 * acc + curve * x[point]) / (
+                problem.acceleration[k] * (1.0 - problem.margin[inner])
+            )
+            of_acceleration[inner] = np.maximum(of_acceleration[inner], ratio)
+            turning = feed * (3.0 * curve * acc + d3[point, k] * x[point])
+            of_jerk[inner] = np.maximum(of_jerk[inner], np.abs(d1 * jerk + turning) / problem.jerk[k])
+        yield first + k, of_acceleration
         if solution.jerk_limited:
-            turning = 3.0 * d2[point] * feed * acc[:, None] + d3[point] * feed**3
-            rows.append(np.abs(problem.d1[point] * jerk[:, None] + turning) / problem.jerk)
-        ratios = np.concatenate(rows, axis=1)
-        largest = ratios.argmax(axis=1)
-        ratio = ratios[np.arange(len(inner)), largest]
-        better = ratio > worst[inner]
-        worst[inner[better]] = ratio[better]
-        which[inner[better]] = first + largest[better]
-    return worst, which
+            yield first + axes + k, of_jerk
 
 
 def active_names(problem: FeedrateProblem) -> tuple[str, ...]:

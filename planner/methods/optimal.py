@@ -24,10 +24,11 @@ from planner.feedrate.jerk import JerkLimited
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.methods.activity import history
 from planner.methods.closed_form import corner_table
 from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages, deliver, stop_time
-from planner.methods.toppra import corner_shape, history
+from planner.methods.toppra import corner_shape
 from planner.nc.program import Program
 from planner.path import sample_path
 from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from planner.arrays import Array, FloatArray
 from planner.errors import NotSolvedError
 from planner.feedrate.solution import Status
@@ -17,14 +19,29 @@ from planner.verify import Verdict
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GridHistory:
-    """The profile at the solver's grid points: time (P,) [s], s (P,) [mm], feed (P,) [mm/s], and the constraint that is closest
-    to its limit there and on the interval behind, (P,) indices into `active_names`."""
+    """The profile at the solver's grid points, and which limit holds it there (methods/activity.py).
+
+    t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
+    active       : (P,) index in `active_names` of what holds the interval to the right of each point
+    active_names : limits, then "none" and "rest"
+    share        : of the cycle time that each of them holds [-]; they add up to 1
+    """
 
     t: FloatArray
     s: FloatArray
     feed: FloatArray
     active: Array
     active_names: tuple[str, ...]
+    share: FloatArray
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """What holds any time, with its share: limits, the largest first, then "none" and "rest"."""
+        limits, others = (
+            np.flatnonzero(self.share[:-2]),
+            len(self.share) - 2 + np.flatnonzero(self.share[-2:]),
+        )
+        order = [*limits[np.argsort(-self.share[limits], kind="stable")], *others]
+        return [(self.active_names[k], float(self.share[k])) for k in order]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

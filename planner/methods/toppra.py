@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
@@ -18,22 +16,18 @@ from planner.corners.smooth import CornerShape, round_corners
 from planner.errors import InputError
 from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.solution import (
-    FeedrateSolution,
-    FeedrateSolver,
-    active_names,
-    constraint_ratios,
-)
+from planner.feedrate.solution import FeedrateSolution, FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.methods.activity import history
 from planner.methods.closed_form import corner_table
-from planner.methods.plan import GridHistory, Plan
+from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.nc.program import Program
 from planner.path import PathSamples, sample_path
-from planner.timing import Motion, TimeLaw, law_of_solution
+from planner.timing import Motion, law_of_solution
 
 CORNERS = ("bezier", "fir", "kinematic")
 SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
@@ -119,15 +113,3 @@ def _solve(
     samples = add_switching_points(samples, problem, solution, machine)
     problem = feedrate_problem(samples, machine)
     return samples, problem, solver.solve(problem)
-
-
-def history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) -> GridHistory:
-    """The profile at the grid points with what limits it there."""
-    _, active = constraint_ratios(problem, solution)
-    return GridHistory(
-        t=law.t,
-        s=problem.s,
-        feed=np.sqrt(solution.feed_sq),
-        active=active,
-        active_names=active_names(problem),
-    )

@@ -22,6 +22,7 @@ LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -51,6 +52,14 @@ class Mode(_Record):
     damping: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
 
+class Plotter(_Record):
+    """How plotter files (HPGL) are read: plotter unit [mm]; standstill while the pen or knife goes down and up [s]."""
+
+    unit: Positive = 0.025
+    pen_down: NotNegative = 0.0
+    pen_up: NotNegative = 0.0
+
+
 class Machine(_Record):
     """A machine. Lengths [mm], times [s]; see the template for every key.
 
@@ -73,6 +82,7 @@ class Machine(_Record):
     blend_rapids: bool = False
     fir: Fir | None = None
     modes: tuple[Mode, ...] = ()
+    plotter: Plotter | None = None
     tools: dict[str, Finite] = {}
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}

@@ -1,8 +1,8 @@
 """Languages that are not RS274NGC, by what only they contain.
 
-Conversational Heidenhain programs, Siemens programs with their commands and assignments, and plotter files
-(HPGL) cannot be read word by word: a message about their first odd letter would not help. The marks below
-occur in no RS274NGC program outside comments.
+Conversational Heidenhain programs and Siemens programs with their commands and assignments cannot be read word by word: a message
+about their first odd letter would not help. Plotter files (HPGL) are read, by `planner.nc.hpgl`. The marks below occur in no
+RS274NGC program outside comments.
 """
 
 from __future__ import annotations
@@ -41,12 +41,30 @@ _DIALECTS = (
         ),
         _RS274,
     ),
-    _Dialect(
-        "a plotter file (HPGL)",
-        re.compile(rb"\A\s*(?:\x1b[^;]*)?((?:IN|DF|SP\d*|PA|PU)[-\d, ]*;)", re.IGNORECASE),
-        "convert it to G0 and G1 moves with feeds",
-    ),
 )
+
+
+# A plotter file starts with one of these instructions and a number, the end of the instruction or the next one. No word of an NC
+# program is a letter followed by a letter.
+_FIRST = rb"(?:IN|DF|PU|PD|PA|PR|SP|VS|IP|SC|RO|PS|BP|PG|LT|CO|FS|PW|WU|QL|NP|AF)"
+_HPGL = re.compile(
+    rb"\A(?:[\s;]|\xef\xbb\xbf|\x1b[^A-Za-z]*[A-Za-z]|\x1b\.\S[\d; ]*:|@PJL[^\n]*)*"
+    + _FIRST
+    + rb"(?=[-+.\d,;\s]|"
+    + _FIRST
+    + rb"|\Z)",
+    re.IGNORECASE,
+)
+_NC = re.compile(rb"\A(?:[%\s]|;[^\n]*|\([^)\n]*\)|/)*[GMNOFST][ \t]*\d", re.IGNORECASE)
+PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
+
+
+def is_plotter_file(data: bytes, source: str) -> bool:
+    """Whether a text is HPGL: by its content where that is clear, else by the suffix of its name."""
+    head = data[:_LOOKED_AT]
+    if _HPGL.match(head):
+        return True
+    return source.lower().endswith(PLOTTER_SUFFIXES) and not _NC.match(head)
 
 
 def recognise(data: bytes) -> Fault | None:

@@ -36,7 +36,7 @@ class ProgramInfo:
     events           : number of events by letter or code ("S", "T", "M3" ...)
     extent_min, _max : (3,) box around the start and all motion, arcs included [mm]
     length           : path length by kind "rapid", "line", "arc" [mm]
-    feed             : (least, largest) programmed feed [mm/s]
+    feed             : (least, largest) programmed feed [mm/s]; inf where a plotter file gives none
     feed_changes     : number of feed moves whose feed differs from the one before
     segment_length   : quantiles LENGTH_QUANTILES of the feed moves' lengths [mm]
     corners          : number of corners that turn by more than each of CORNER_DEGREES
@@ -75,8 +75,8 @@ def inspect_program(
     Raises InputError only if the file cannot be read, is empty or is not a text.
     """
     data = load(path)
-    interpreter, faults = interpret(data, machine, source=str(path), block_delete=block_delete)
-    return describe(interpreter.program(), lines=len(data.splitlines()), unsupported=tuple(faults))
+    program, faults = interpret(data, machine, source=str(path), block_delete=block_delete)
+    return describe(program, lines=len(data.splitlines()), unsupported=tuple(faults))
 
 
 def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = ()) -> ProgramInfo:
@@ -100,7 +100,7 @@ def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = (
             for kind in (Kind.RAPID, Kind.LINE, Kind.ARC)
         },
         feed=(float(feed.min()), float(feed.max())) if len(feed) else (np.nan, np.nan),
-        feed_changes=int((np.diff(feed) != 0).sum()),
+        feed_changes=int((feed[1:] != feed[:-1]).sum()),
         segment_length=tuple(
             float(q) for q in (np.quantile(length[is_feed], LENGTH_QUANTILES) if len(feed) else [np.nan] * 5)
         ),

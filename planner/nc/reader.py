@@ -1,4 +1,5 @@
-"""Reading an NC program: text to `Program`, or an `InputError` that names file, line, column, the word and what to do."""
+"""Reading an NC program or a plotter file (HPGL): text to `Program`, or an `InputError` that names file, line, column, the word and
+what to do. Which of the two a text is, its content says, and its name where the content does not."""
 
 from __future__ import annotations
 
@@ -7,17 +8,19 @@ from pathlib import Path
 
 from planner.errors import InputError
 from planner.machine import Machine
-from planner.nc.dialects import recognise
+from planner.nc.dialects import is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none
+from planner.nc.hpgl.plotter import read_drawing
 from planner.nc.interpreter import Interpreter
 from planner.nc.lexer import split_words
 from planner.nc.program import Program
 
 
 def read_program(path: str | Path, machine: Machine | None = None, *, block_delete: bool = True) -> Program:
-    """Read an NC program from a file.
+    """Read an NC program or a plotter file.
 
-    machine      : gives tool lengths, G28/G30 positions, work offsets and the first path control; None for zeros and blending
+    machine      : gives tool lengths, G28/G30 positions, work offsets, the first path control and what plotter files need;
+                   None for zeros and blending
     block_delete : leave out the lines that start with "/"
 
     Raises InputError for a file that cannot be read and for the first construct that is not supported or not valid.
@@ -29,27 +32,29 @@ def parse_program(
     text: bytes | str, machine: Machine | None = None, *, source: str = "<text>", block_delete: bool = True
 ) -> Program:
     """Read an NC program given as text; like `read_program`."""
-    interpreter, faults = interpret(text, machine, source=source, block_delete=block_delete)
+    program, faults = interpret(text, machine, source=source, block_delete=block_delete)
     require_none(faults, source)
-    return interpreter.program()
+    return program
 
 
 def interpret(
     text: bytes | str, machine: Machine | None, *, source: str, block_delete: bool
-) -> tuple[Interpreter, Sequence[Fault]]:
+) -> tuple[Program, Sequence[Fault]]:
     """Run a program to its end past everything that is not supported; the faults in the order of the lines.
 
     A program in another language is one fault, and none of it is run. Raises InputError for an empty or binary text.
     """
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
     _check_text(data, source)
+    if is_plotter_file(data, source):
+        return read_drawing(data, machine, source)
     foreign = recognise(data)
     words = split_words(b"" if foreign else data, block_delete=block_delete)
     if not foreign and not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     interpreter = Interpreter(words, machine, source)
     interpreter.run()
-    return interpreter, [foreign] if foreign else interpreter.faults()
+    return interpreter.program(), [foreign] if foreign else interpreter.faults()
 
 
 def load(path: str | Path) -> bytes:

@@ -1,4 +1,7 @@
-"""`planned.ngc`: the program of a plan with the planned feed of every block, read back before it is given out."""
+"""`planned.ngc`: the program of a plan with the planned feed of every block, read back before it is given out.
+
+An NC program stays as it is but for its F words. A plotter file is written anew as an NC program.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.arrays import FloatArray
 from planner.errors import InputError
 from planner.methods.block_feeds import block_feeds
+from planner.nc.dialects import is_plotter_file
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
+from planner.nc.text import program_text
 from planner.nc.writer import retimed
 
 if TYPE_CHECKING:
@@ -20,6 +26,10 @@ _MOTION = (
     "kind", "end", "dwell", "line", "path_control", "tolerance",
     "arc_block", "arc_center", "arc_normal", "arc_sweep",
 )  # fmt: skip
+
+
+# A path that was written with seven decimals and read back is off by less than this [mm].
+SAME_PATH = 1e-6
 
 
 class LeftOut(Exception):
@@ -41,16 +51,45 @@ def planned_program(plan: Plan) -> bytes:
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
     feeds = block_feeds(plan.trajectory, plan.toolpath, len(plan.program))
+    if is_plotter_file(data, plan.program.source):
+        return _written_anew(plan, feeds)
     text = retimed(data, plan.program, feeds)
     if not _reads_as(text, plan, feeds=False):
         raise LeftOut(f"{source} with F words does not read back as the same motion")
     return text
 
 
+def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
+    """The program as an NC program that reads back as the same path. Raises LeftOut if it does not."""
+    planned = plan.program
+    text = program_text(
+        planned, np.minimum(_finite(feeds), planned.feed), float(plan.toolpath.tolerance.min())
+    ).encode()
+    try:
+        read = parse_program(text, plan.machine)
+    except InputError as fault:
+        raise LeftOut(f"{planned.source} as an NC program does not read back: {fault.message}") from None
+    same = _same(read, planned, ("kind", "dwell", "path_control", "arc_block", "arc_normal"))
+    if not same or not all(
+        np.allclose(getattr(read, name), getattr(planned, name), rtol=0.0, atol=SAME_PATH)
+        for name in ("end", "arc_center")
+    ):
+        raise LeftOut(f"{planned.source} as an NC program does not read back as the same path")
+    return text
+
+
+def _finite(feeds: FloatArray) -> FloatArray:
+    """Feeds that can be written: a block that takes no measurable time gets the feed of the one before, or after."""
+    known = np.flatnonzero(np.isfinite(feeds))
+    if not len(known):
+        return np.zeros_like(feeds)
+    return feeds[known[np.searchsorted(known, np.arange(len(feeds)), side="right").clip(1) - 1]]
+
+
 def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
     """Whether a program's motion is the one of the plan's program, with or without its feeds."""
     try:
-        program = parse_program(text, plan.machine)
+        program = parse_program(text, plan.machine, source=plan.program.source)
     except InputError:
         return False
     return _same(program, plan.program, (*_MOTION, "feed") if feeds else _MOTION)

@@ -107,9 +107,10 @@ def info_table(info: ProgramInfo) -> Group:
     table.add_row(
         "length [mm]", ", ".join(f"{kind} {length:,.3f}" for kind, length in info.length.items() if length)
     )
-    if np.isfinite(info.feed[0]):
+    if not np.isnan(info.feed[0]):
         low, high = (feed * SECONDS_PER_MINUTE for feed in info.feed)
-        table.add_row("feed [mm/min]", f"{low:g} to {high:g}, {info.feed_changes:,} changes")
+        given = f"{low:g} to {high:g}, {info.feed_changes:,} changes"
+        table.add_row("feed [mm/min]", given if np.isfinite(low) else "as fast as the machine allows")
         least, _, median, _, largest = info.segment_length
         table.add_row("feed moves [mm]", f"{least:.4g} to {largest:.4g} long, median {median:.4g}")
     turns = ", ".join(f"{count:,} over {angle:g}°" for angle, count in info.corners.items() if count)

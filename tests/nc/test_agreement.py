@@ -27,7 +27,8 @@ from planner.units import MM_PER_INCH
 
 HERE = Path(__file__).parent
 SHARED = HERE.parents[1].parent / "shared"
-PROGRAMS = sorted(p for p in (SHARED / "nc").glob("*") if p.suffix != ".csv") if SHARED.is_dir() else []
+NOT_NC = (".csv", ".plt", ".hpgl")  # plotter files: tests/nc/test_hpgl.py
+PROGRAMS = sorted(p for p in (SHARED / "nc").glob("*") if p.suffix not in NOT_NC) if SHARED.is_dir() else []
 PYTHON = "/usr/bin/python3"
 NOWHERE = 1e-9  # [mm]
 END_OF_FILE = "File ended with no percent sign"  # LinuxCNC wants M2, M30 or %; a file that just ends has moved all the same

@@ -113,7 +113,6 @@ REFUSED = [
     # other languages, other files
     ("0 BEGIN PGM 11 MM\n1 L X+5", 1, 3, ["BEGIN PGM", "Heidenhain"]),
     ("G21\nN10 CYCLE800()\nG0 X1", 2, 5, ["CYCLE800(", "Siemens"]),
-    ("IN;SP1;PU0,0;PD5,5;", 1, 1, ["IN;", "HPGL"]),
     ("", 1, 1, ["empty"]),
     ("(nothing)\n\n; here", 1, 1, ["empty"]),
     ("G0 X1\nG\0", 2, 2, ["NUL", "binary"]),

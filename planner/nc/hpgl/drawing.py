@@ -1,0 +1,90 @@
+"""The blocks and events of a drawing while it is read; `finish` makes the record.
+
+The pen is an event with a full stop, because it takes its time to rise and to fall: M3 down, M5 up, T a pen from the carousel. The
+numbers are those of NC programs, so that the same drives, files and reports know them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.machine import LINEAR_AXES
+from planner.nc.events import EventTable
+from planner.nc.program import Kind, PathControl, Program
+
+Point = tuple[float, float]
+
+PEN_DOWN, PEN_UP = 3.0, 5.0  # M3 and M5
+
+
+class Drawing:
+    """Blocks so far: kinds, ends [mm], feeds [mm/s], dwells [s], and where in the source they stand [bytes]."""
+
+    def __init__(self) -> None:
+        self.kind: list[Kind] = []
+        self.end: list[Point] = []
+        self.feed: list[float] = []
+        self.dwell: list[float] = []
+        self.at: list[int] = []
+        self.arcs: list[tuple[int, Point, float]] = []
+        self.events: list[tuple[int, int, str, float]] = []
+
+    def add(self, kind: Kind, end: Point, at: int, *, feed: float = math.inf, dwell: float = 0.0) -> None:
+        self.kind.append(kind)
+        self.end.append(end)
+        self.feed.append(feed)
+        self.dwell.append(dwell)
+        self.at.append(at)
+
+    def add_arc(self, centre: Point, sweep: float, end: Point, at: int, *, feed: float) -> None:
+        """An arc about `centre` [mm]; sweep [rad], counter-clockwise positive."""
+        self.arcs.append((len(self.kind), centre, sweep))
+        self.add(Kind.ARC, end, at, feed=feed)
+
+    def add_stop(self, where: Point, seconds: float, at: int) -> None:
+        """A full stop, with a dwell if `seconds` is positive."""
+        self.add(Kind.DWELL if seconds > 0 else Kind.STOP, where, at, dwell=seconds)
+
+    def add_event(self, letter: str, value: float, at: int) -> None:
+        """An event before the next block."""
+        self.events.append((len(self.kind), at, letter, value))
+
+    def finish(self, data: bytes, source: str, path_control: PathControl, notes: Sequence[str]) -> Program:
+        """The program; `data` is the text it was read from."""
+        blocks, arcs = len(self.kind), len(self.arcs)
+        newline = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+        event_at = np.array([event[1] for event in self.events], dtype=np.int64)
+        return Program(
+            source=source,
+            axes=LINEAR_AXES,
+            start=np.zeros(3),
+            kind=np.array(self.kind, dtype=np.uint8),
+            end=_in_space(self.end),
+            feed=np.array(self.feed, dtype=np.float64),
+            dwell=np.array(self.dwell, dtype=np.float64),
+            line=1 + np.searchsorted(newline, np.array(self.at, dtype=np.int64)),
+            path_control=np.full(blocks, path_control),
+            tolerance=np.full(blocks, np.nan),
+            arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
+            arc_center=_in_space([arc[1] for arc in self.arcs]),
+            arc_normal=np.full(arcs, 2),
+            arc_sweep=np.array([arc[2] for arc in self.arcs]),
+            events=EventTable(
+                block=np.array([event[0] for event in self.events], dtype=np.int64),
+                line=1 + np.searchsorted(newline, event_at),
+                letter=np.array([ord(event[2]) for event in self.events], dtype=np.uint8),
+                value=np.array([event[3] for event in self.events], dtype=np.float64),
+            ),
+            notes=tuple(notes),
+        )
+
+
+def _in_space(points: Sequence[Point]) -> FloatArray:
+    """(n, 3) points in the x y plane."""
+    space = np.zeros((len(points), 3))
+    space[:, :2] = np.array(points, dtype=np.float64).reshape(-1, 2)
+    return space

@@ -1,0 +1,270 @@
+"""Executing the instructions of a plotter file: where the pen goes, at which speed, and when it rises and falls.
+
+    position [mm] = plotter units * unit                                  without SC
+                  = (P1 + (user - user_min) * (P2 - P1) / (user_max - user_min)) * unit     with SC
+
+The plotter unit is 0.025 mm unless the machine file says otherwise. Pen up the plotter moves as fast as it can (rapids), pen down at
+VS, in cm/s; without VS at the limits of its axes. Where the pen rises or falls it stands still for as long as the machine file says.
+A pen is changed with the pen up; afterwards it is down again if it was. CI and EA lower the pen for what they draw and leave pen
+and position as they found them. A file starts at (0, 0) with the pen up, without scaling, in absolute coordinates.
+
+A fault is recorded and reading goes on with the next instruction, so that `info` can show them all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from planner.errors import InputError
+from planner.machine import Machine, Plotter
+from planner.nc.faults import Fault
+from planner.nc.hpgl.drawing import PEN_DOWN, PEN_UP, Drawing, Point
+from planner.nc.hpgl.instructions import ALLOWED, FORMS, IGNORED, PAGE_ENDS, REFUSED
+from planner.nc.hpgl.lexer import Instruction, instructions
+from planner.nc.hpgl.scaling import Scaling, ScalingError
+from planner.nc.program import Kind, Program
+from planner.nc.state import Setup
+from planner.units import RAD_PER_DEG
+
+MM_PER_CM = 10.0
+FULL_TURN = 360.0  # [deg]
+# Below this an arc is a straight line [rad]: NC programs take so short an arc for a full turn.
+SWEEP_MIN = 1e-6
+
+
+class _NotDrawn(Exception):
+    """The instruction cannot be executed; the text says why."""
+
+
+def read_drawing(data: bytes, machine: Machine | None, source: str) -> tuple[Program, Sequence[Fault]]:
+    """Read a plotter file past everything that is not supported; the faults in the order of the file.
+
+    Raises InputError for a file without any instruction.
+    """
+    run = _Run(data, machine)
+    found = 0
+    for instruction in instructions(data, run.report, run.note):
+        run.execute(instruction)
+        found += 1
+    if not found and not run.reports:
+        raise InputError(
+            "the plotter file is empty: there is no instruction in it", source=source, line=1, column=1
+        )
+    control = Setup.of(machine).path_control
+    return run.drawing.finish(data, source, control, run.all_notes()), run.faults()
+
+
+class _Run:
+    """The state of the plotter; one method per instruction."""
+
+    def __init__(self, data: bytes, machine: Machine | None):
+        self.data = data
+        self.plotter = (machine.plotter if machine is not None else None) or Plotter()
+        self.drawing = Drawing()
+        self.reports: list[tuple[int, int, str]] = []
+        self.notes: dict[str, None] = {}  # ordered, each once
+        self.ignored: dict[str, list[int]] = {}
+        self.position: Point = (0.0, 0.0)
+        self.down = False
+        self.drawn = False
+        self.page_end: Instruction | None = None
+        self.pen = 0
+        self._initialise()
+        self.drawing.add_event("M", PEN_UP, 0)
+
+    def _initialise(self) -> None:
+        self.scaling = Scaling()
+        self.absolute = True
+        self.speed, self.speed_of_pen = math.inf, dict[int, float]()
+
+    # --- what is said about it ------------------------------------------------------------------------------------------------
+
+    def report(self, at: int, end: int, message: str) -> None:
+        self.reports.append((at, end, message))
+
+    def note(self, text: str) -> None:
+        self.notes[text] = None
+
+    def faults(self) -> list[Fault]:
+        """All faults in the order of the file."""
+        return [
+            Fault(*self._place(at), self.data[at:end].decode("latin-1").strip()[:20], message)
+            for at, end, message in sorted(self.reports)
+        ]
+
+    def all_notes(self) -> list[str]:
+        notes = [f"read as a plotter file (HPGL), 1 plotter unit = {self.plotter.unit:g} mm"]
+        at_will = next((k for k in range(len(self.drawing.kind)) if self._is_unlimited(k)), None)
+        if at_will is not None:
+            line = self._place(self.drawing.at[at_will])[0]
+            notes.append(f"line {line}: no speed (VS) before it; the pen runs as fast as the machine allows")
+        for name, places in self.ignored.items():
+            line, times = self._place(places[0])[0], f"{len(places)} times, first " if len(places) > 1 else ""
+            notes.append(f"{name} ignored, {times}on line {line}: {IGNORED.get(name, 'the end of a page')}")
+        return [*notes, *self.notes]
+
+    def _is_unlimited(self, block: int) -> bool:
+        return self.drawing.kind[block] in (Kind.LINE, Kind.ARC) and self.drawing.feed[block] == math.inf
+
+    def _place(self, at: int) -> tuple[int, int]:
+        """Line and column of a byte, from 1."""
+        return self.data.count(b"\n", 0, at) + 1, at - self.data.rfind(b"\n", 0, at)
+
+    # --- instructions -----------------------------------------------------------------------------------------------------------
+
+    def execute(self, it: Instruction) -> None:
+        try:
+            self._execute(it)
+        except (_NotDrawn, ScalingError) as fault:
+            self.report(it.at, it.end, str(fault))
+
+    def _execute(self, it: Instruction) -> None:
+        name, numbers = it.name, it.numbers
+        form = FORMS.get(name)
+        if form is None:
+            if name in IGNORED or (name == "SM" and not it.text.strip(b"; \r\n")):
+                self.ignored.setdefault(name, []).append(it.at)
+                return
+            raise _NotDrawn(REFUSED.get(name, f"there is no such instruction; allowed are {ALLOWED}"))
+        if not form.fits(len(numbers)):
+            raise _NotDrawn(f"{len(numbers)} numbers found; write {form}")
+        if name in ("PU", "PD", "PA", "PR"):
+            self._plot(it)
+        elif name in ("AA", "AR"):
+            self._arc(it)
+        elif name == "CI":
+            self._circle(numbers[0], it.at)
+        elif name in ("EA", "ER"):
+            self._rectangle(it)
+        elif name == "SP":
+            self._select_pen(it)
+        elif name == "VS":
+            self._select_speed(numbers)
+        elif name == "IP":
+            self.scaling = self.scaling.with_points(numbers)
+        elif name == "SC":
+            self.scaling = self.scaling.with_range(numbers)
+        elif name in PAGE_ENDS:
+            self.ignored.setdefault(name, []).append(it.at)
+            self.page_end = self.page_end or (it if self.drawn else None)
+        elif name == "DF":
+            self.scaling, self.absolute = self.scaling.with_range([]), True
+        elif name == "IN":
+            self._move_pen(False, it.at)
+            self._initialise()
+
+    def _plot(self, it: Instruction) -> None:
+        if it.name in ("PA", "PR"):
+            self.absolute = it.name == "PA"
+        else:
+            self._move_pen(it.name == "PD", it.at)
+        for x, y in _pairs(it.numbers):
+            self._go(self._point(x, y, absolute=self.absolute), it.at)
+
+    def _arc(self, it: Instruction) -> None:
+        centre = self._point(*it.numbers[:2], absolute=it.name == "AA")
+        degrees = it.numbers[2]
+        if not 0 < abs(degrees) <= FULL_TURN:
+            raise _NotDrawn(f"a sweep of {degrees:g} degrees; allowed are -360 to 360, but not 0")
+        sweep = degrees * RAD_PER_DEG * self.scaling.handedness()
+        dx, dy = self.position[0] - centre[0], self.position[1] - centre[1]
+        if not math.hypot(dx, dy) > 0:
+            raise _NotDrawn("the arc has no radius: the pen stands on its centre")
+        end = self.position
+        if abs(degrees) < FULL_TURN:
+            cos, sin = math.cos(sweep), math.sin(sweep)
+            end = centre[0] + cos * dx - sin * dy, centre[1] + sin * dx + cos * dy
+        self._turn(centre, sweep, end, it.at)
+
+    def _circle(self, radius: float, at: int) -> None:
+        if radius == 0:
+            raise _NotDrawn("a circle of radius 0; write its radius, such as CI400")
+        handedness = self.scaling.handedness()
+        centre, was_down = self.position, self.down
+        start = self._point(radius, 0.0, absolute=False)
+        self._move_pen(False, at)
+        self._go(start, at)
+        self._move_pen(True, at)
+        self._turn(centre, 2.0 * math.pi * handedness, start, at)
+        self._move_pen(False, at)
+        self._go(centre, at)
+        self._move_pen(was_down, at)
+
+    def _rectangle(self, it: Instruction) -> None:
+        (x0, y0), was_down = self.position, self.down
+        x1, y1 = self._point(*it.numbers, absolute=it.name == "EA")
+        self._move_pen(True, it.at)
+        for corner in ((x1, y0), (x1, y1), (x0, y1), (x0, y0)):
+            self._go(corner, it.at)
+        self._move_pen(was_down, it.at)
+
+    def _select_pen(self, it: Instruction) -> None:
+        pen = it.numbers[0] if it.numbers else 0.0
+        if pen != round(pen) or pen < 0:
+            raise _NotDrawn("a pen is a whole number, 0 (put the pen away) or more")
+        if pen == self.pen:
+            return
+        was_down = self.down
+        self._move_pen(False, it.at)
+        self.pen = int(pen)
+        self.drawing.add_event("T", pen, it.at)
+        self.drawing.add_stop(self.position, 0.0, it.at)
+        self._move_pen(was_down, it.at)
+
+    def _select_speed(self, numbers: list[float]) -> None:
+        speed = numbers[0] * MM_PER_CM if numbers else math.inf
+        if not speed > 0:
+            raise _NotDrawn("a speed must be positive; write the pen's speed in cm/s, such as VS20")
+        if len(numbers) == 2:
+            self.speed_of_pen[round(numbers[1])] = speed
+        else:
+            self.speed, self.speed_of_pen = speed, {}
+
+    # --- what the pen does --------------------------------------------------------------------------------------------------------
+
+    def _point(self, x: float, y: float, *, absolute: bool) -> Point:
+        """Where user coordinates lead [mm]."""
+        unit = self.plotter.unit
+        if absolute:
+            x, y = self.scaling.place(x, y)
+            return x * unit, y * unit
+        (fx, fy), (x0, y0) = self.scaling.factor, self.position
+        return x0 + x * fx * unit, y0 + y * fy * unit
+
+    def _go(self, end: Point, at: int) -> None:
+        if self.down:
+            self._begin_to_draw()
+            self.drawing.add(Kind.LINE, end, at, feed=self._feed())
+        else:
+            self.drawing.add(Kind.RAPID, end, at)
+        self.position = end
+
+    def _turn(self, centre: Point, sweep: float, end: Point, at: int) -> None:
+        if not self.down or abs(sweep) < SWEEP_MIN:
+            self._go(end, at)
+            return
+        self._begin_to_draw()
+        self.drawing.add_arc(centre, sweep, end, at, feed=self._feed())
+        self.position = end
+
+    def _begin_to_draw(self) -> None:
+        self.drawn = True
+        if self.page_end is not None:
+            message = "the drawing goes on after the end of a page; write one file for each page"
+            self.report(self.page_end.at, self.page_end.end, message)
+            self.page_end = None
+
+    def _move_pen(self, down: bool, at: int) -> None:
+        """Lower or raise the pen, if it is not there already, at a full stop."""
+        if down != self.down:
+            self.down = down
+            self.drawing.add_event("M", PEN_DOWN if down else PEN_UP, at)
+            self.drawing.add_stop(self.position, self.plotter.pen_down if down else self.plotter.pen_up, at)
+
+    def _feed(self) -> float:
+        return self.speed_of_pen.get(self.pen, self.speed)
+
+
+def _pairs(numbers: list[float]) -> Iterator[tuple[float, float]]:
+    return zip(numbers[::2], numbers[1::2], strict=True)

@@ -20,6 +20,8 @@ class Method(StrEnum):
     kinematic = "kinematic"
     fir = "fir"
     fir_plain = "fir-plain"
+    fir_spline = "fir-spline"
+    fir_spline_plain = "fir-spline-plain"
     stop = "stop"
 
 

@@ -14,6 +14,8 @@ All take arrays over points and return (P,) bounds, inf where the path does not 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planner.arrays import Array, FloatArray
@@ -41,12 +43,14 @@ def chord_error(kappa: FloatArray, tol: FloatArray, dt: float) -> FloatArray:
     return _over(tol, kappa * dt**2 / 8.0)
 
 
-def filter_error(kappa: FloatArray, tol: FloatArray, time_constants: tuple[float, ...]) -> FloatArray:
+def filter_error(
+    kappa: FloatArray, tol: FloatArray, time_constants: Sequence[FloatArray | float]
+) -> FloatArray:
     """kappa x sum T^2/24 <= tol [mm] for moving averages of lengths T [s]."""
     return _over(tol, kappa * sum(T * T for T in time_constants) / 24.0)
 
 
-def phase_lag(kappa: FloatArray, angle: float, time_constants: tuple[float, ...]) -> FloatArray:
+def phase_lag(kappa: FloatArray, angle: float, time_constants: Sequence[FloatArray | float]) -> FloatArray:
     """feed kappa sum T/2 <= angle [rad]: on a circle the filtered point lags by feed kappa times the filters' delay."""
     return _over(angle, kappa * sum(time_constants) / 2.0) ** 2
 

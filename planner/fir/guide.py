@@ -1,8 +1,8 @@
 """What the filters are led along: a smooth path, or a curve, as chords so fine that they are the path.
 
 The chords leave the path by a share of its tolerance at most (`SAGITTA`), which is taken off the tolerance, and turn by little from one
-to the next. Each chord knows the largest curvature next to it, and how fast the limits of the axes let a point go round a circle of
-this curvature in the osculating plane (paper 001, par. 9 to 17): with the unit vectors T along the path and N to the centre
+to the next. Each chord knows the largest curvature beside it, and how fast the limits of the axes let a point go round a circle of
+this curvature in the osculating plane (paper 001, par. 9 to 17): with the unit vectors T along the path and N towards the centre
 
     |a_k| <= kappa v^2 amplitude_k,   |j_k| <= kappa^2 v^3 amplitude_k,   amplitude_k = sqrt(T_k^2 + N_k^2) = sqrt(1 - n_k^2).
 """
@@ -16,14 +16,27 @@ from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.corners.elements import element_point, to_arc_length
-from planner.corners.smooth import SmoothPath
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 from planner.path import PathSamples
 
 SAGITTA = 0.01  # deviation of the chords from the path [share of the tolerance]
-TURN = 0.05  # from one chord to the next [rad]
-STRAIGHT = 1e-12  # curvature below this is rounding [1/mm]
+TURN = 0.1  # from one chord to the next [rad]
+STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
+COLUMNS = (
+    "point",
+    "s",
+    "length",
+    "feed",
+    "kappa",
+    "v_acc",
+    "v_jerk",
+    "tol",
+    "corner",
+    "sin_half",
+    "whole",
+    "segment",
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,6 +55,9 @@ class Guide:
     kappa   : (P,) largest curvature of the path at the chord [1/mm]
     v_acc, v_jerk : (P,) speeds that the axes' accelerations and jerks allow on a circle of that curvature [mm/s]; inf if straight
     tol     : (P,) what filters and interpolation may use of the tolerance [mm]
+    corner  : (P,) joint whose rounded corner the chord belongs to, ascending, or -1
+    sin_half: (P,) sine of half the turning angle there
+    whole   : (P,) tolerance, with what the rounding uses of it [mm]
     segment : (P,) segment of the toolpath
     """
 
@@ -56,6 +72,9 @@ class Guide:
     v_acc: FloatArray
     v_jerk: FloatArray
     tol: FloatArray
+    corner: Array
+    sin_half: FloatArray
+    whole: FloatArray
     segment: Array
 
     def __post_init__(self) -> None:
@@ -63,11 +82,12 @@ class Guide:
         freeze(self, "first", np.int64, (None,))
         freeze(self, "dwell", np.float64, (len(self.first),))
         freeze(self, "point", np.float64, (points, len(self.axes)))
-        for name in ("s", "length", "kappa", "tol"):
+        for name in ("s", "length", "kappa", "tol", "sin_half", "whole"):
             freeze(self, name, np.float64, (points,))
         for name in ("feed", "v_acc", "v_jerk"):
             freeze(self, name, np.float64, (points,), finite=False)
-        freeze(self, "segment", np.int64, (points,))
+        for name in ("corner", "segment"):
+            freeze(self, name, np.int64, (points,))
 
     def __len__(self) -> int:
         return len(self.point)
@@ -86,108 +106,142 @@ class Guide:
     def direction(self) -> FloatArray:
         """(P, A) unit vector of each chord; 0 at the end of a run."""
         way = np.diff(self.point, axis=0, append=self.point[-1:])
-        return np.divide(way, self.length[:, None], out=np.zeros_like(way), where=self.length[:, None] > 0)
+        length = self.length[:, None]
+        return np.divide(way, length, out=np.zeros_like(way), where=length > 0)
+
+    def largest(self, value: FloatArray) -> FloatArray:
+        """(G,) the largest of a value per chord (P,) in each run."""
+        return np.maximum.reduceat(value, self.first[:-1])
 
     def pick(self, chosen: Array) -> Guide:
         """The runs `chosen` (G,) by themselves, without dwells."""
         rows = chosen[self.run]
         size = np.diff(self.first)[chosen]
-        columns = ("point", "s", "length", "feed", "kappa", "v_acc", "v_jerk", "tol", "segment")
         return Guide(
             axes=self.axes,
             first=np.concatenate([[0], np.cumsum(size)]),
             dwell=np.zeros(len(size) + 1),
-            **{name: getattr(self, name)[rows] for name in columns},
+            **{name: getattr(self, name)[rows] for name in COLUMNS},
         )
 
 
 def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
     """The chords of a smooth path."""
-    path, at = samples.path, samples.intervals
+    path, segment = samples.path, samples.segment
     toolpath = path.toolpath
-    tol = _budget(path, samples.element, samples.segment)
-    kappa = np.maximum(np.linalg.norm(samples.d2_right, axis=1), np.linalg.norm(np.roll(samples.d2_left, -1, axis=0), axis=1))
+    corner = np.where(samples.element < 0, ~samples.element, -1)
+    beside = np.minimum(toolpath.tolerance[segment], toolpath.tolerance[segment + 1])
+    whole = np.where(corner >= 0, path.tol[corner], beside)
+    tol = whole - np.where(corner >= 0, path.tol_ap[corner], 0.0)
+    behind = np.linalg.norm(np.append(samples.d2_left[1:], samples.d2_left[-1:], axis=0), axis=1)
+    kappa = np.maximum(np.linalg.norm(samples.d2_right, axis=1), behind)
     h = np.diff(samples.s, append=samples.s[-1])
-    parts = np.ones(len(samples), np.int64)
-    fine = np.maximum(h * np.sqrt(kappa / (8.0 * SAGITTA * tol)), h * kappa / TURN)
-    parts[at] = np.maximum(np.ceil(fine[at]), 1)
+    parts = np.ceil(np.maximum(h * np.sqrt(kappa / (8.0 * SAGITTA * tol)), h * kappa / TURN))
+    parts = np.maximum(parts, 1).astype(np.int64)
+    parts[samples.piece[1:] - 1] = 1
     start, end = (np.empty((parts.sum(), 4, len(toolpath.axes))) for _ in range(2))
     _evaluate(*samples.table, samples.element, samples.w0, samples.w1, parts, start, end)
-    first = np.concatenate([[0], np.cumsum(parts)])[samples.piece]
-    closing = np.zeros(len(start), bool)
-    closing[first[1:] - 1] = True
     row = np.repeat(np.arange(len(samples)), parts)
+    first = np.concatenate([[0], np.cumsum(parts)])[samples.piece]
     return _guide(
-        toolpath.axes, first, toolpath.dwell[path.legs.first[samples.stop]], start, end, closing,
-        toolpath.feed[samples.segment][row], tol[row], samples.segment[row], machine,
-    )  # fmt: skip
-
-
-def guide_of_curve(curve: Nurbs, machine: Machine, feed: float, tolerance: float) -> Guide:
-    """The chords of a curve at `feed` [mm/s] within `tolerance` [mm]; full stops at its kinks."""
-    u = curve.stations(SAGITTA * tolerance)
-    h = curve.length_between(u[:-1], u[1:])
-    kappa = np.maximum(*(np.linalg.norm(curve.along(at, before=side)[:, 2], axis=1) for at, side in ((u[:-1], False), (u[1:], True))))
-    parts = np.maximum(np.ceil(h * kappa / TURN), 1).astype(np.int64)
-    inner = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-    u = np.append(np.repeat(u[:-1], parts) + inner / np.repeat(parts, parts) * np.repeat(np.diff(u), parts), u[-1])
-    stops = np.append(curve.kinks, u[-1])
-    where = np.searchsorted(u, stops)
-    closing = np.insert(np.zeros(len(u) - 1, bool), where, True)
-    row = np.arange(len(closing)) - np.cumsum(closing) + closing  # of u, once more where a run ends
-    start, end = curve.along(u[row]), curve.along(u[np.minimum(row + 1, len(u) - 1)], before=True)
-    start[closing] = end[closing] = curve.along(u[row[closing]], before=True)
-    count = len(row)
-    return _guide(
-        curve.axes, np.concatenate([[0], np.flatnonzero(closing) + 1]), np.zeros(len(stops) + 1), start, end, closing,
-        np.full(count, feed), np.full(count, tolerance), np.zeros(count, np.int64), machine,
-    )  # fmt: skip
-
-
-def _guide(
-    axes: tuple[str, ...], first: Array, dwell: FloatArray, start: FloatArray, end: FloatArray, closing: Array,
-    feed: FloatArray, tol: FloatArray, segment: Array, machine: Machine,
-) -> Guide:  # fmt: skip
-    """From points and derivatives (P, 4, A) at the start and the end of each chord; `closing` (P,) ends a run."""
-    way = np.where(closing[:, None], 0.0, end[:, 0] - start[:, 0])
-    length = np.linalg.norm(way, axis=1)
-    velocity, acceleration, jerk = (machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk"))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        axes_allow = (velocity / (np.abs(way) / length[:, None])).min(axis=1)
-    speeds = [_circle_speeds(side, acceleration, jerk) for side in (start, end)]
-    kappa = np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end)))
-    return Guide(
-        axes=axes,
+        machine,
+        start,
+        end,
+        axes=toolpath.axes,
         first=first,
-        dwell=dwell,
-        point=start[:, 0],
-        s=np.concatenate([[0.0], np.cumsum(length)[:-1]]),
-        length=length,
-        feed=np.where(closing, np.inf, np.minimum(feed, axes_allow)),
-        kappa=kappa,
-        v_acc=np.minimum(speeds[0][0], speeds[1][0]),
-        v_jerk=np.minimum(speeds[0][1], speeds[1][1]),
-        tol=(1.0 - SAGITTA) * tol,
-        segment=segment,
+        dwell=toolpath.dwell[path.legs.first[samples.stop]],
+        feed=toolpath.feed[segment][row],
+        tol=tol[row],
+        corner=corner[row],
+        sin_half=np.where(corner >= 0, np.sin(path.theta[corner] / 2), 0.0)[row],
+        whole=whole[row],
+        segment=segment[row],
     )
 
 
-def _circle_speeds(by_s: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
+def guide_of_curve(
+    curve: Nurbs, machine: Machine, feed: float, tolerance: float, blocks: FloatArray
+) -> Guide:
+    """The chords of a curve at `feed` [mm/s] within `tolerance` [mm]; full stops at its kinks.
+
+    blocks : (B+1,) parameters of the ends of the program's blocks
+    """
+    u = curve.stations(SAGITTA * tolerance)
+    kappa = [
+        np.linalg.norm(curve.along(at, before=side)[:, 2], axis=1)
+        for at, side in ((u[:-1], False), (u[1:], True))
+    ]
+    turn = curve.length_between(u[:-1], u[1:]) * np.maximum(*kappa)
+    parts = np.maximum(np.ceil(turn / TURN), 1).astype(np.int64)
+    share = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    u = np.append(np.repeat(u[:-1], parts) + share * np.repeat(np.diff(u) / parts, parts), u[-1])
+    stops = np.append(curve.kinks, u[-1])
+    closing = np.insert(np.zeros(len(u) - 1, bool), np.searchsorted(u, stops), True)
+    at = u[np.arange(len(closing)) - np.cumsum(closing) + closing]  # a kink's parameter is there twice
+    start, end = curve.along(at), curve.along(np.append(at[1:], at[-1]), before=True)
+    start[closing] = end[closing] = curve.along(at[closing], before=True)
+    count = len(at)
+    return _guide(
+        machine,
+        start,
+        end,
+        axes=curve.axes,
+        first=np.concatenate([[0], np.flatnonzero(closing) + 1]),
+        dwell=np.zeros(len(stops) + 1),
+        feed=np.full(count, feed),
+        tol=np.full(count, tolerance),
+        corner=np.full(count, -1),
+        sin_half=np.zeros(count),
+        whole=np.full(count, tolerance),
+        segment=np.clip(np.searchsorted(blocks, at, side="right") - 1, 0, len(blocks) - 2),
+    )
+
+
+def _guide(
+    machine: Machine,
+    start: FloatArray,
+    end: FloatArray,
+    *,
+    axes: tuple[str, ...],
+    first: Array,
+    feed: FloatArray,
+    tol: FloatArray,
+    **columns: Array,
+) -> Guide:
+    """From points and arc-length derivatives (P, 4, A) at start and end of each chord, and the columns of the record."""
+    way = end[:, 0] - start[:, 0]
+    way[first[1:] - 1] = 0.0
+    length = np.linalg.norm(way, axis=1)
+    velocity, acceleration, jerk = (machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk"))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        axes_allow = np.where(length > 0, length * (velocity / np.abs(way)).min(axis=1), np.inf)
+    speeds = [_circle_speeds(side, acceleration, jerk) for side in (start, end)]
+    return Guide(
+        axes=axes,
+        first=first,
+        point=start[:, 0],
+        s=np.concatenate([[0.0], np.cumsum(length)[:-1]]),
+        length=length,
+        feed=np.minimum(feed, axes_allow),
+        kappa=np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end))),
+        v_acc=np.minimum(speeds[0][0], speeds[1][0]),
+        v_jerk=np.minimum(speeds[0][1], speeds[1][1]),
+        tol=tol - SAGITTA * tol,
+        **columns,
+    )
+
+
+def _circle_speeds(
+    by_s: FloatArray, acceleration: FloatArray, jerk: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """v_acc and v_jerk (P,) from point and derivatives by the arc length (P, 4, A)."""
     kappa = np.linalg.norm(by_s[:, 2], axis=1)
-    bent = kappa > STRAIGHT
-    normal = np.divide(by_s[:, 2], kappa[:, None], out=np.zeros_like(by_s[:, 2]), where=bent[:, None])
-    amplitude = np.sqrt(by_s[:, 1] ** 2 + normal**2)
+    bent = kappa[:, None] > STRAIGHT
+    normal = np.divide(by_s[:, 2], kappa[:, None], out=np.zeros_like(by_s[:, 2]), where=bent)
+    amplitude = np.where(bent, np.sqrt(by_s[:, 1] ** 2 + normal**2), 0.0)
     with np.errstate(divide="ignore"):
-        a, j = (limit / np.where(bent[:, None], amplitude, 0.0) for limit in (acceleration, jerk))
-        return np.sqrt(a.min(axis=1) / kappa), np.cbrt(j.min(axis=1) / kappa**2)
-
-
-def _budget(path: SmoothPath, element: Array, segment: Array) -> FloatArray:
-    """What the rounding leaves of the tolerance on each interval [mm]."""
-    joint = np.where(element < 0, ~element, 0)
-    tolerance = path.toolpath.tolerance
-    return np.where(element < 0, path.tol[joint] - path.tol_ap[joint], np.minimum(tolerance[segment], tolerance[segment + 1]))
+        a, j = ((limit / amplitude).min(axis=1) for limit in (acceleration, jerk))
+        return np.sqrt(a / kappa), np.cbrt(j / kappa**2)
 
 
 @njit(cache=True, error_model="numpy")
@@ -200,6 +254,7 @@ def _evaluate(legs, corners, element, w0, w1, parts, start, end):
         for p in range(parts[i]):
             for side in range(2):
                 out = start[n] if side == 0 else end[n]
-                element_point(legs, corners, element[i], w0[i] + (w1[i] - w0[i]) * (p + side) / parts[i], w_ref, work, out)
+                w = w0[i] + (w1[i] - w0[i]) * (p + side) / parts[i]
+                element_point(legs, corners, element[i], w, w_ref, work, out)
                 to_arc_length(out)
             n += 1

@@ -1,4 +1,4 @@
-"""Closed-form feed limits of paper 001 on a path of curvature kappa = 1/rho, behind two moving averages T1, T2.
+"""Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, T2: paper 001's, and what to begin with.
 
     v_acc  = sqrt(a rho)                          normal acceleration                                        (par. 13)
     v_jerk = (j rho^2)^(1/3)                      jerk of a point on a circle                                (par. 17)
@@ -10,23 +10,29 @@
 On a circle the filtered point runs on another one, exactly rho [1 - sinc(v T1/2rho) sinc(v T2/2rho)] further inside, sinc x =
 sin x / x; the second order is larger than that, by 0.9 % at a phase lag of 30 degrees.
 
-Where the curvature varies within the length that the filters cover, none of this is a bound (PAPERS, paper 001): the path's own
-curvature may also overrate what the filters see of it. At the constant speed v they see the path's mean with their kernel as weight,
-by a rule with two nodes that has the kernel's second and fourth moment mu2, mu4
+Where the curvature varies within the length that the filters cover, none of this is a bound (PAPERS, paper 001), nor is it needed:
+what the filters see at the constant speed v is the mean of the path with their kernel as weight. By a rule with two nodes that has
+the kernel's second and fourth moment mu2, mu4,
 
     D = p(s - v x) + p(s + v x) - 2 p(s),   error w |D|,   acceleration D/x^2,      x^2 = mu4/mu2,   w = mu2^2/(2 mu4).
+
+A corner that turns by theta is missed by no more than eps if the command takes as long as the gap Td - Tk that paper 000's eq. 15
+puts between the pulses of two legs, with V in its legs.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import Array, FloatArray
 from planner.constraints.bounds import filter_error, phase_lag
+from planner.corners.fir import overlap_time
 from planner.fir.guide import Guide
 
-# Bisections of the speed between nothing and what the other limits allow; 2^-12 of it is left.
-BISECTIONS = 12
+# Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
+MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
+# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured afterwards.
+MEAN_OVER = 0.02
 
 
 def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
@@ -45,47 +51,85 @@ def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> Float
     return np.sqrt(phase_lag(kappa, phi, (T1, T2)))
 
 
-def v_sc(guide: Guide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
-    """The paper's speed on each chord (P,) for filters T1, T2 (G,) of the runs."""
-    T1, T2 = T1[guide.run], T2[guide.run]
-    limits = (guide.feed, guide.v_acc, guide.v_jerk, v_eps(guide.kappa, guide.tol, T1, T2), v_ph(guide.kappa, phi, T1, T2))
-    return np.min(limits, axis=0)
-
-
 def filter_lengths(
-    guide: Guide, speed: FloatArray, acceleration: FloatArray, jerk: FloatArray, a_margin: FloatArray, j_margin: FloatArray
+    guide: Guide, speed: FloatArray, acceleration: FloatArray, jerk: FloatArray, margins: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (G,) [s] of the shortest filters for speeds (P,) on the chords: V/A and A/J, both longer by the margins (G,), or
-    both the same where V is too small to reach A."""
+    """T1 >= T2 (G,) [s] for speeds (P,) on the chords and limits of the axes (A,): T1 = V/A and T1 T2 = V/J, each times its margin
+    (2, G), or both the same where V is too small to reach A."""
     along = speed[:, None] * np.abs(guide.direction)
     along[guide.length == 0] = 0.0
-    first = guide.first[:-1]
-    by_a = np.maximum.reduceat((along / acceleration).max(axis=1), first) * a_margin
-    by_j = np.maximum.reduceat((along / jerk).max(axis=1), first) * a_margin * j_margin
+    by_a = guide.largest((along / acceleration).max(axis=1)) * margins[0]
+    by_j = guide.largest((along / jerk).max(axis=1)) * margins[1]
     T1 = np.maximum(by_a, np.sqrt(by_j))
     return T1, by_j / T1
 
 
-def v_mean(guide: Guide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """Largest constant speeds (P,), up to `most` (P,), at which the mean of the path keeps error and acceleration (module text)."""
+def v_sc(guide: Guide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
+    """The paper's speed on each chord (P,) behind filters T1, T2 (G,) of the runs."""
     T1, T2 = T1[guide.run], T2[guide.run]
+    by_filters = v_eps(guide.kappa, guide.tol, T1, T2), v_ph(guide.kappa, phi, T1, T2)
+    return np.min([guide.feed, guide.v_acc, guide.v_jerk, *by_filters], axis=0)
+
+
+def first_speeds(
+    guide: Guide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """Speeds (P,) up to `most` (P,) to begin with, too fast rather than too slow: what either the curvature beside a chord or the
+    mean of the path allows, and corners for as long as the gap takes."""
+    local = np.minimum(guide.v_acc, v_eps(guide.kappa, guide.tol, T1[guide.run], T2[guide.run]))
+    v = np.minimum(most, local)
+    bent = np.flatnonzero(local < most)
+    v[bent] = np.maximum(v[bent], _v_mean(guide, bent, most[bent], acceleration, T1, T2))
+    return v * _slower_corners(guide, v, most, T1, T2)
+
+
+def _v_mean(
+    guide: Guide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows (module text)."""
+    run = guide.run[at]
+    T1, T2 = T1[run], T2[run]
     second, fourth = (T1**2 + T2**2) / 12.0, (T1**4 + T2**4) / 80.0 + T1**2 * T2**2 / 24.0
     x, w = np.sqrt(fourth / second), second**2 / (2.0 * fourth)
-    low, high, v = np.zeros(len(guide)), most, most
-    begin, end = guide.s[guide.first[:-1]][guide.run], guide.s[guide.first[1:] - 1][guide.run]
-    here = guide.s + 0.5 * guide.length
-    middle = guide.point + 0.5 * guide.length[:, None] * guide.direction
-    for _ in range(BISECTIONS):
-        reach = np.minimum(v * x, np.minimum(here - begin, end - here))  # before a run's ends the path is run through to them
-        around = [_point(guide, here - reach), _point(guide, here + reach)]
-        D = around[0] + around[1] - 2.0 * middle
-        over = np.maximum(w * np.linalg.norm(D, axis=1) / guide.tol, (np.abs(D) / acceleration).max(axis=1) / x**2)
-        fits = over <= 1.0
-        low, high = np.where(fits, v, low), np.where(fits, high, v)
-        v = np.where(fits & (v == most), most, 0.5 * (low + high))
-    return np.maximum(low, 0.0)
+    begin, end = guide.s[guide.first[run]], guide.s[guide.first[run + 1] - 1]
+    half = 0.5 * guide.length[at]
+    here, middle = guide.s[at] + half, guide.point[at] + half[:, None] * guide.direction[at]
+    v, open_ = most.copy(), np.arange(len(at))
+    for _ in range(MEAN_STEPS):
+        k = open_
+        reach = np.minimum(
+            v[k] * x[k], np.minimum(here[k] - begin[k], end[k] - here[k])
+        )  # the path ends at a run's ends
+        D = guide_point(guide, here[k] - reach) + guide_point(guide, here[k] + reach) - 2.0 * middle[k]
+        by_error = w[k] * np.linalg.norm(D, axis=1) / guide.tol[at[k]]
+        over = np.maximum(by_error, (np.abs(D) / acceleration).max(axis=1) / x[k] ** 2)
+        v[k] *= np.maximum(MEAN_STEP_MIN, 1.0 / np.sqrt(np.maximum(over, 1.0)))
+        open_ = k[over > 1.0 + MEAN_OVER]
+        if not len(open_):
+            break
+    return v
 
 
-def _point(guide: Guide, s: FloatArray) -> FloatArray:
+def _slower_corners(
+    guide: Guide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """(P,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1 elsewhere."""
+    chord = np.flatnonzero((guide.corner >= 0) & (guide.length > 0))
+    by = np.ones(len(guide))
+    if not len(chord):
+        return by
+    first = np.flatnonzero(np.diff(guide.corner[chord], prepend=-2))
+    at, run = chord[first], guide.run[chord[first]]
+    last = np.append(chord[first[1:] - 1], chord[-1])
+    V = np.sqrt(most[at] * most[last])
+    gap = T1[run] + T2[run] - overlap_time(guide.whole[at], V, guide.sin_half[at], T1[run], T2[run])
+    lasting = np.add.reduceat(guide.length[chord] / v[chord], first)
+    by[chord] = np.repeat(
+        np.minimum(lasting / np.maximum(gap, 1e-300), 1.0), np.diff(np.append(first, len(chord)))
+    )
+    return by
+
+
+def guide_point(guide: Guide, s: FloatArray) -> FloatArray:
     """Points (n, A) of the chords at lengths (n,)."""
     return np.stack([np.interp(s, guide.s, axis) for axis in guide.point.T], axis=1)

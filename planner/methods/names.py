@@ -10,6 +10,7 @@ from planner.errors import InputError
 from planner.machine import Machine, load_machine
 from planner.methods.bezier import BezierMethod
 from planner.methods.fir import FirMethod
+from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
@@ -20,7 +21,17 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 
 DEFAULT_MACHINE = "mill"
-METHODS = ("optimal", "toppra", "bezier", "kinematic", "fir", "fir-plain", "stop")
+METHODS = (
+    "optimal",
+    "toppra",
+    "bezier",
+    "kinematic",
+    "fir",
+    "fir-plain",
+    "fir-spline",
+    "fir-spline-plain",
+    "stop",
+)
 
 
 class Method(Protocol):
@@ -85,6 +96,8 @@ def _method(name: str, corner: str, solver: str) -> Method:
         return KinematicMethod()
     if name in ("fir", "fir-plain"):
         return FirMethod(plain=name == "fir-plain")
+    if name in ("fir-spline", "fir-spline-plain"):
+        return FirSplineMethod(plain=name == "fir-spline-plain")
     if name == "stop":
         return StopMethod()
     raise InputError(f"no method '{name}'; there are {', '.join(METHODS)}")

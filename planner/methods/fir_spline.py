@@ -1,0 +1,217 @@
+"""Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
+
+1. The path has to be smooth: corners are rounded by Bezier pairs that use a small share of the tolerance. Curves are taken as they are
+   (`plan_curve`). Either becomes chords so fine that they are the path (fir/guide.py).
+2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J (fir/spline_speeds.py), for a few largest speeds V of
+   every run between full stops.
+3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured, and where something is
+   exceeded the command gets slower or the filters longer, until nothing is (fir/hold.py). The fastest of the V stays.
+
+`plain` is the paper as it is: v_sc at every point and its filters, without 3. The formulas assume a constant curvature within what
+the filters cover; where it varies, the verdict shows what they exceed (PAPERS, paper 001: G3).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.axis_motion import AxisMotion
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.errors import InputError
+from planner.feedrate.solution import Status
+from planner.fir.guide import Guide, guide_of_curve, guide_of_path
+from planner.fir.hold import Held, command_of, fastest, promised
+from planner.fir.spline_speeds import v_sc
+from planner.fir.superpose import superpose
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.nurbs import Nurbs
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.methods.plan import Plan
+from planner.methods.stages import Progress, Stages, deliver, stop_time
+from planner.nc.program import Program
+from planner.path import sample_path
+from planner.units import RAD_PER_DEG
+
+# Share of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
+# zig-zag 2.93, 2.66, 2.65 s with 0.5, 0.1, 0.05; circle and spiral of chords do not care.
+ROUNDING_SHARE = 0.1
+# Interpolation error of the grid that the chords start from, as of path.py: they are refined by the angle they turn.
+RESOLUTION = 0.05
+# Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
+STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
+# Share of the tolerance that the chords of a curve's program may use [-].
+CHORD_SHARE = 0.05
+# Phase lag phi of v_ph unless the machine has its own [rad]: up to it the second-order error is good to 1 % (PAPERS).
+PHASE_LAG = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirSplineMethod:
+    """Closed-form feed limits and two FIR filters along a smooth path.
+
+    plain : the paper's speeds and filters as they are, whatever they exceed
+    """
+
+    plain: bool = False
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program. Raises InputError for what cannot be planned."""
+        _check(machine)
+        stages = Stages(progress)
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+            choose = _plain_stops if self.plain else _stops
+            guide = _guide_of(choose(toolpath, machine), machine)
+        return self._finish(program, machine, toolpath, guide, "bezier", stages)
+
+    def plan_curve(
+        self,
+        curve: Nurbs,
+        machine: Machine,
+        feed: float,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan the motion along a curve at `feed` [mm/s]. The plan's program are chords of it, within which it is verified.
+
+        Raises InputError for what cannot be planned.
+        """
+        _check(machine)
+        stages = Stages(progress)
+        with stages.stage("geometry"):
+            whole = machine.tolerance if tolerance is None else tolerance
+            chords = CHORD_SHARE * whole
+            program = curve.to_program(chords, feed)
+            toolpath = toolpath_from_program(program, machine, whole)
+            guide = guide_of_curve(curve, machine, feed, whole - chords, curve.stations(chords))
+        return self._finish(program, machine, toolpath, guide, None, stages)
+
+    def _finish(
+        self,
+        program: Program,
+        machine: Machine,
+        toolpath: Toolpath,
+        guide: Guide,
+        corner: str | None,
+        stages: Stages,
+    ) -> Plan:
+        with stages.stage("solve"):
+            alone = guide.pick(np.ones(guide.runs, bool))
+            held = _plain(alone, machine) if self.plain else fastest(alone, machine)
+            motion = _motion(guide, held, toolpath)
+        trajectory, verdict = deliver(motion, toolpath, machine, stages)
+        delay = 1e3 * (held.T1 + held.T2)
+        return Plan(
+            method="fir-spline-plain" if self.plain else "fir-spline",
+            corner=corner,
+            solver="filters",
+            program=program,
+            machine=machine,
+            toolpath=toolpath,
+            status=Status.ACCEPTABLE,
+            sentence=f"filters of {delay.min():.3g} to {delay.max():.3g} ms in all",
+            trajectory=trajectory,
+            verdict=verdict,
+            corners=None,
+            grid=None,
+            stop_time=stop_time(toolpath, machine),
+            grid_points=len(guide),
+            timings=stages.timings,
+        )
+
+
+def _check(machine: Machine) -> None:
+    if machine.fir is not None and len(machine.fir.time_constants) != 2:
+        raise InputError(
+            f"machine '{machine.name}' has {len(machine.fir.time_constants)} filters in fir.time_constants; "
+            "method fir-spline plans for two (or give none, and it chooses them)"
+        )
+
+
+def _guide_of(toolpath: Toolpath, machine: Machine) -> Guide:
+    """The guide along a toolpath whose corners are rounded within a share of the tolerance."""
+    less = dataclasses.replace(toolpath, tolerance=ROUNDING_SHARE * toolpath.tolerance)
+    path = round_corners(less, machine.model_copy(update={"fir": None}), BezierCorner())
+    path = dataclasses.replace(
+        path, toolpath=toolpath, tol=path.tol / ROUNDING_SHARE
+    )  # from here on the whole of it
+    return guide_of_path(sample_path(path, machine, RESOLUTION), machine)
+
+
+def _plain_stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    return toolpath
+
+
+def _stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
+    """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by itself: at a full stop
+    the filters may change."""
+    ends = np.flatnonzero(toolpath.joint == Joint.STOP)
+    best, best_time = toolpath.joint, np.full(len(ends) - 1, np.inf)
+    for angle in STOP_ANGLES:
+        sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > angle)
+        if not sharp.any() and np.isfinite(best_time).all():
+            continue
+        joint = np.where(sharp, Joint.STOP, toolpath.joint).astype(np.uint8)
+        guide = _guide_of(dataclasses.replace(toolpath, joint=joint), machine)
+        time = promised(guide.pick(np.ones(guide.runs, bool)), machine)[1].min(axis=0)
+        run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
+        time = np.bincount(run, time, len(ends) - 1)
+        better = np.append(time < best_time, False)[
+            np.searchsorted(ends, np.arange(len(joint)), side="right") - 1
+        ]
+        best, best_time = np.where(better, joint, best), np.minimum(time, best_time)
+    return dataclasses.replace(toolpath, joint=best)
+
+
+def _plain(guide: Guide, machine: Machine) -> Held:
+    """Paper 001 as it is: T1 = v_p/a, T2 = a/j with the largest v_p of each run, and v_sc."""
+    acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
+    T1, T2, phi = (
+        guide.largest(guide.feed * (guide.length > 0)) / acceleration,
+        acceleration / jerk,
+        PHASE_LAG,
+    )
+    if machine.fir is not None:
+        T1, T2 = np.full(guide.runs, machine.fir.time_constants[0]), machine.fir.time_constants[1]
+        phi = (machine.fir.phase_lag_max or PHASE_LAG / RAD_PER_DEG) * RAD_PER_DEG
+    T1, T2 = np.maximum(T1, T2), np.minimum(T1, T2)
+    return Held(v=v_sc(guide, T1, T2, phi), T1=T1, T2=T2)
+
+
+def _motion(guide: Guide, held: Held, toolpath: Toolpath) -> AxisMotion:
+    """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the guide."""
+    command = command_of(guide, held)
+    pieces = superpose(command)
+    middle = (pieces.t + np.append(pieces.t[1:], pieces.end[-1])) / 2 - pieces.t
+    s, v, a, j = (getattr(pieces, name)[:, -1] for name in ("position", "velocity", "acceleration", "jerk"))
+    reached = s + middle * (v + middle * (a / 2 + middle * j / 6))
+    chord = np.searchsorted(guide.s, reached, side="right") - 1
+    run = np.repeat(np.arange(guide.runs), np.diff(pieces.first))
+    segment = guide.segment[np.clip(chord, guide.first[run], guide.first[run + 1] - 1)]
+    columns = {
+        name: getattr(pieces, name)[:, :-1] for name in ("position", "velocity", "acceleration", "jerk")
+    }
+    t = pieces.t
+    if t[0] > 0:  # a standstill before the first move
+        t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, segment[0])
+        still = {name: np.zeros((1, len(guide.axes))) for name in columns} | {"position": guide.point[:1]}
+        columns = {name: np.vstack([still[name], column]) for name, column in columns.items()}
+    return AxisMotion(
+        axes=guide.axes,
+        t=t,
+        block=toolpath.block[segment],
+        line=toolpath.line[segment],
+        end=float(pieces.end[-1]),
+        **columns,
+    )

@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 
 from planner.nc.faults import Fault
+from planner.nc.hpgl.lexer import CONTROL
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,10 @@ _DIALECTS = (
 
 
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next one. No word of an NC
-# program is a letter followed by a letter.
+# program is a letter followed by a letter. (A semicolon before it may start a comment of an NC program.)
 _FIRST = rb"(?:IN|DF|PU|PD|PA|PR|SP|VS|IP|SC|RO|PS|BP|PG|LT|CO|FS|PW|WU|QL|NP|AF)"
 _HPGL = re.compile(
-    rb"\A(?:[\s;]|\xef\xbb\xbf|\x1b[^A-Za-z]*[A-Za-z]|\x1b\.\S[\d; ]*:|@PJL[^\n]*)*"
-    + _FIRST
-    + rb"(?=[-+.\d,;\s]|"
-    + _FIRST
-    + rb"|\Z)",
+    rb"\A(?:\s|\xef\xbb\xbf)*(?:" + CONTROL + rb"[\s;]*)*" + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"|\Z)",
     re.IGNORECASE,
 )
 _NC = re.compile(rb"\A(?:[%\s]|;[^\n]*|\([^)\n]*\)|/)*[GMNOFST][ \t]*\d", re.IGNORECASE)

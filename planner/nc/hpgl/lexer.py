@@ -21,9 +21,8 @@ from planner.nc.hpgl.instructions import TEXT
 NUMBER_MAX = 1e9
 
 _BLANK = re.compile(rb"(?:[\s;]|\xef\xbb\xbf)*")
-_CONTROL = re.compile(
-    rb"\x1b(?:\.[@HIMNPQST](?:[\d; ]*:)?|\.[()A-Z]|%-?\d*[A-Z]|[&*(][^A-Z\x1b]*[A-Z]|E)|@PJL[^\n]*"
-)
+CONTROL = rb"(?:\x1b(?:\.[@HIMNPQST](?:[\d; ]*:)?|\.[()A-Z]|%-?\d*[A-Z]|[&*(][^A-Z\x1b]*[A-Z]|E)|@PJL[^\n]*)"
+_CONTROL = re.compile(CONTROL)
 _INSTRUCTION = re.compile(rb"([A-Za-z]{2})([-+.,\d\s]*)")
 _NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)")
 _SEPARATOR = re.compile(rb"\s*,?\s*")

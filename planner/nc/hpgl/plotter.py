@@ -29,6 +29,7 @@ from planner.units import RAD_PER_DEG
 
 MM_PER_CM = 10.0
 FULL_TURN = 360.0  # [deg]
+WORD_SHOWN = 20  # characters of an instruction in a message
 # Below this an arc is a straight line [rad]: NC programs take so short an arc for a full turn.
 SWEEP_MIN = 1e-6
 
@@ -89,9 +90,13 @@ class _Run:
     def faults(self) -> list[Fault]:
         """All faults in the order of the file."""
         return [
-            Fault(*self._place(at), self.data[at:end].decode("latin-1").strip()[:20], message)
-            for at, end, message in sorted(self.reports)
+            Fault(*self._place(at), self._word(at, end), message) for at, end, message in sorted(self.reports)
         ]
+
+    def _word(self, at: int, end: int) -> str:
+        """What is written there, as far as it can be shown."""
+        text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
+        return text if text.isprintable() else ""
 
     def all_notes(self) -> list[str]:
         notes = [f"read as a plotter file (HPGL), 1 plotter unit = {self.plotter.unit:g} mm"]

@@ -201,7 +201,7 @@ def hold(guide: Guide, machine: Machine, start: Held, *, given: bool) -> Held:
         if not wrong.any():
             break
         by = _slower_chords(part, command, seen, n)
-        everything = (over > 1.0).any(axis=0) if given else np.full(len(wrong), n >= PATIENCE)
+        everything = np.asarray((over > 1.0).any(axis=0)) if given else np.full(len(wrong), n >= PATIENCE)
         by = np.where(everything[part.run], np.minimum(by, BEYOND / np.sqrt(worst)[part.run]), by)
         open_[open_] = wrong
         v[open_[guide.run]] *= by[wrong[part.run]]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.arrays import Array, FloatArray
+from planner.feedrate.rest_to_rest import rest_to_rest_times
 from planner.fir.course import Course
 from planner.fir.design import plan_for
 from planner.fir.schedule import Schedule, plan_time
@@ -49,15 +50,18 @@ def _stopping_at_waits(
     """Full stops instead of waits, in the stretches that gain by it."""
     gap, (T1, T2) = plan.gap(course), plan.at_joints(course)
     waits = (gap > 0) & (gap >= share * (T1 + T2) * (1 - WAIT_ROUNDING))
-    tried = np.logical_or.reduceat(waits[:-1], course.first[:-1])
+    time = plan_time(course, plan)
+    tried = np.logical_or.reduceat(waits[:-1], course.first[:-1]) & (
+        _least_time(course, waits) < time * (1 - WORTH)
+    )
     if not tried.any():
         return course, plan
     legs = np.flatnonzero(tried[course.stretch])
     part = course.pick(tried).stopping(np.flatnonzero(waits[legs]))
     other = _settled(part, machine)
     home = course.stretch[legs[part.first[:-1]]]  # the stretch that each of the part's was cut from
-    time = np.bincount(home, plan_time(part, other), course.stretches)
-    better = tried & (time < plan_time(course, plan) * (1 - WORTH))
+    new_time = np.bincount(home, plan_time(part, other), course.stretches)
+    better = tried & (new_time < time * (1 - WORTH))
 
     cut = course.stopping(np.flatnonzero(waits & np.append(better[course.stretch], False)))
     home_of_cut = course.stretch[cut.first[:-1]]
@@ -70,6 +74,14 @@ def _stopping_at_waits(
         holding=plan.holding,
     )
     return cut, kept.put(cut, better[home_of_cut], other.pick(part, better[home]))
+
+
+def _least_time(course: Course, stops: Array) -> FloatArray:
+    """A time (S,) [s] that each stretch cannot beat with full stops at the joints `stops` (R+1,): straight from stop to stop."""
+    part = course.stopping(np.flatnonzero(stops))
+    limits = (part.largest(value) for value in (part.feed, part.a_max, part.j_max))
+    times = rest_to_rest_times(part.total(part.length), *limits)
+    return np.asarray(np.bincount(course.stretch[part.first[:-1]], times, course.stretches), dtype=np.float64)
 
 
 def _settled(course: Course, machine: Machine) -> Schedule:

@@ -3,6 +3,7 @@
     random_path(seed)     2 to 6 axes, 200 to 2000 points, jerk from tight to loose
     copp_spline(seed)     the random splines that the authors of the package copp publish times for (tests/test_random_spline.rs)
     nurbs(name, points)   the butterfly and the trident of curves.json
+    long_path(points)     3 axes, for how solvers grow
 
 A curve r(p) with derivatives R1, R2, R3 by its parameter p becomes one along its arc length s, with sigma = |R1| = ds/dp, by
 
@@ -26,6 +27,9 @@ from planner.constraints.problem import FeedrateProblem
 AXES = "xyzabcd"
 QUINTIC = 5
 FINE = 20  # samples of a curve per grid point, from which its length and turning are summed up
+
+LONG_SPACING, LONG_STEP = 50, 10.0  # grid points and mm between the waypoints of a long path
+LONG_FINE = 4  # like FINE, for memory's sake
 
 COPP_AXES, COPP_WAYPOINTS, COPP_POINTS = 7, 50, 1001
 COPP_LIMITS = {"velocity": 1.0, "acceleration": 5.0, "jerk": 50.0}  # of each axis, times 0.9 to 1.1
@@ -118,20 +122,37 @@ class _Pieces:
         return found
 
 
+def long_path(points: int) -> FeedrateProblem:
+    """A quintic spline in 3 axes with a waypoint every 50 points, some 10 mm apart, at the limits of the shared machine."""
+    rng = np.random.default_rng([34, points])
+    steps = rng.normal(size=(max(points // LONG_SPACING, QUINTIC + 1), 3)) * LONG_STEP / np.sqrt(3.0)
+    chords = np.cumsum(np.linalg.norm(steps, axis=1))
+    limits = {name: np.full(3, limit) for name, limit in CURVE_LIMITS.items()}
+    return _along_arc_length(
+        _Pieces.of(make_interp_spline(chords, np.cumsum(steps, axis=0), k=QUINTIC)),
+        None,
+        points,
+        Limits(**limits, feed=CURVE_LIMITS["velocity"]),
+        fine=LONG_FINE,
+    )
+
+
 def _along_arc_length(
-    numerator: _Pieces, denominator: _Pieces | None, points: int, limits: Limits
+    numerator: _Pieces, denominator: _Pieces | None, points: int, limits: Limits, fine: int = FINE
 ) -> FeedrateProblem:
     """The problem on a grid of which one half is spread evenly along the curve and the other half over its turning."""
-    fine = np.linspace(numerator.breaks[0], numerator.breaks[-1], FINE * points)
-    _, (first, second, _) = _sides(numerator, denominator, fine)
+    sampled = np.linspace(numerator.breaks[0], numerator.breaks[-1], fine * points)
+    _, (first, second, _) = _sides(numerator, denominator, sampled)
     length = np.linalg.norm(first, axis=1)
     tangent = first / length[:, None]
     turning = np.linalg.norm(second - tangent * (second * tangent).sum(axis=1)[:, None], axis=1) / length
     sums = [np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0)]) for rate in (length, turning)]
     share = (sums[0] / sums[0][-1] + sums[1] / sums[1][-1]) / 2.0
-    parameter = np.interp(np.linspace(0.0, 1.0, points), share, fine)
-    for knot in numerator.breaks[1:-1]:
-        parameter[np.abs(parameter - knot).argmin()] = knot
+    parameter = np.interp(np.linspace(0.0, 1.0, points), share, sampled)
+    knots = numerator.breaks[1:-1]
+    after = np.searchsorted(parameter, knots)
+    nearest = np.where(knots - parameter[after - 1] < parameter[after] - knots, after - 1, after)
+    parameter[nearest] = knots
     left, right = (_by_arc_length(*side) for side in _sides(numerator, denominator, parameter))
     return _problem(_arc_length(numerator, denominator, parameter), left, right, limits)
 

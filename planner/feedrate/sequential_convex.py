@@ -72,7 +72,7 @@ INTERVALS_MIN = 3
 
 CONVERGED = (
     Status.OPTIMAL,
-    "time-optimal for the limits with jerk, to first order, with constant du/ds on each interval",
+    "time-optimal for the limits with jerk, in the path domain, to first order",
 )
 STOPPED = (
     Status.ACCEPTABLE,

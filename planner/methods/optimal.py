@@ -27,6 +27,7 @@ from planner.machine import Machine
 from planner.methods.activity import history
 from planner.methods.closed_form import corner_table
 from planner.methods.plan import Plan
+from planner.methods.prices import price_list
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.methods.toppra import corner_shape
 from planner.nc.program import Program
@@ -76,7 +77,7 @@ class OptimalMethod:
             samples = refine_for_jerk(samples, machine)
             problem = feedrate_problem(samples, machine)
             solution = self.solver.solve(problem, report)
-        trajectory = verdict = corners = grid = None
+        trajectory = verdict = corners = grid = prices = None
         if solution.solved:
             with stages.stage("solve"):
                 motion = Motion(samples=samples, law=law_of_solution(samples, solution))
@@ -85,6 +86,7 @@ class OptimalMethod:
             with stages.stage("report"):
                 corners = corner_table(samples, problem, solution)
                 grid = history(problem, solution, motion.law)
+                prices = price_list(samples, problem, solution, machine) if solution.multipliers else None
         return Plan(
             method="optimal",
             corner=shape.name,
@@ -98,6 +100,7 @@ class OptimalMethod:
             verdict=verdict,
             corners=corners,
             grid=grid,
+            prices=prices,
             stop_time=stop_time(toolpath, machine),
             grid_points=len(samples),
             timings=stages.timings,

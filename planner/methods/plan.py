@@ -12,6 +12,7 @@ from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.closed_form import CornerTable
+from planner.methods.prices import PriceList
 from planner.nc.program import Program
 from planner.trajectory import Trajectory
 from planner.verify import Verdict
@@ -53,6 +54,7 @@ class Plan:
     trajectory, verdict    : None unless solved
     corners                : each corner next to its closed-form speed, or None
     grid                   : the profile at the grid points, or None
+    prices                 : what the limits cost, or None where the solver does not tell
     stop_time              : time if every block ran from rest to rest [s], dwells included
     grid_points            : size of the problem that was solved
     timings                : computing time per stage [s]
@@ -72,6 +74,7 @@ class Plan:
     grid: GridHistory | None
     stop_time: float
     grid_points: int
+    prices: PriceList | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
     @property

@@ -41,7 +41,7 @@ def plan_table(plan: Plan) -> Group:
     if plan.corners is not None and len(plan.corners.line):
         table.add_row(
             "corners",
-            f"{len(plan.corners.line):,}; fastest {_ratio(plan.corners.worst_ratio())} of eq. 19-20",
+            f"{len(plan.corners.line):,}; fastest {ratio_text(plan.corners.worst_ratio())} of eq. 19-20",
         )
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
@@ -170,7 +170,7 @@ def machines_table(machines: Iterable[Machine]) -> Table:
 def _add_verdict(table: Table, verdict: Verdict) -> None:
     for quantity, checks in _by_quantity(verdict).items():
         said = ", ".join(
-            f"{name.partition('.')[2] or ''} {_ratio(check.ratio)}".strip() for name, check in checks
+            f"{name.partition('.')[2] or ''} {ratio_text(check.ratio)}".strip() for name, check in checks
         )
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
@@ -193,7 +193,7 @@ def _by_quantity(verdict: Verdict) -> dict[str, list]:
     return groups
 
 
-def _ratio(value: float) -> str:
+def ratio_text(value: float) -> str:
     """A ratio to a limit; near 1 to the sixth digit, the verdict's own rounding."""
     if not np.isfinite(value):
         return "-"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import typer
 
+from planner.commands.compare import compare
 from planner.commands.info import info
 from planner.commands.machine import init_file, list_machines, show_machine
 from planner.commands.plan import plan
@@ -20,7 +21,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (plan, verify, info, pulses):
+for command in (plan, compare, verify, info, pulses):
     app.command()(command)
 
 machine_app = typer.Typer(help="Machine files.", no_args_is_help=True)

@@ -1,0 +1,104 @@
+"""`planner compare`: several methods on the same job, machine and tolerance, judged by the same verifier."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption, Method, ToleranceOption
+from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, ProgressBar, guarded, show
+from planner.errors import InputError, NotSolvedError
+
+if TYPE_CHECKING:
+    from planner.machine import Machine
+    from planner.nc.program import Program
+    from planner.report.comparison import Row
+
+
+@guarded
+def compare(
+    job: Job,
+    machine: MachineOption = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="A,B,...", help="methods to compare [default: all]")
+    ] = None,
+    tolerance: ToleranceOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", "--out", metavar="FILE", help="write the comparison (.json, .csv)"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan a program with several methods, and put cycle times, worst ratios, errors and verdicts side by side.
+
+    The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused the job.
+    """
+    methods = parse_methods(method)
+    from planner.machine import load_machine
+    from planner.nc.reader import read_program
+    from planner.report.comparison import (
+        about_job,
+        check_place,
+        comparison_dict,
+        comparison_table,
+        write_comparison,
+    )
+
+    if output is not None:
+        check_place(output)
+    limits = load_machine(machine or DEFAULT_MACHINE)
+    program = read_program(job, limits)
+    rows = [_run(name, program, limits, tolerance) for name in methods]
+    about = about_job(str(job), limits, tolerance)
+    if output is not None:
+        write_comparison(output, rows, about)
+    if as_json:
+        typer.echo(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
+    else:
+        show(comparison_table(rows, f"{job}: {len(rows)} methods, machine {limits.name}"))
+        if output is not None:
+            typer.echo(str(output))
+    outcomes = {row.outcome for row in rows}
+    if "passed" not in outcomes:
+        raise typer.Exit(
+            FAILED if "failed" in outcomes else NOT_SOLVED if "not solved" in outcomes else BAD_INPUT
+        )
+
+
+def parse_methods(text: str | None) -> list[str]:
+    """The methods of `a,b,...`, all of them for None. Raises InputError for a name that is unknown or there twice."""
+    known = [method.value for method in Method]
+    if text is None:
+        return known
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in known:
+            raise InputError(f"--method: no method '{name}'; there are {', '.join(known)}")
+        if names.count(name) > 1:
+            raise InputError(f"--method: '{name}' is named twice")
+    return names
+
+
+def _run(method: str, program: Program, machine: Machine, tolerance: float | None) -> Row:
+    """Plan with one method and say on standard error how it went."""
+    from planner import plan
+    from planner.report.comparison import refused, row_of_plan
+
+    with ProgressBar() as progress:
+        try:
+            made = plan(
+                program,
+                machine,
+                method=method,
+                tolerance=tolerance,
+                progress=lambda stage, fraction: progress(f"{method}: {stage}", fraction),
+            )
+            row = row_of_plan(method, made)
+        except (InputError, NotSolvedError) as fault:
+            row = refused(method, fault)
+    took = "" if row.cycle_time is None else f" {row.cycle_time:.4f} s,"
+    typer.echo(f"{method}:{took} {row.outcome}", err=True)
+    return row

@@ -1,0 +1,241 @@
+"""Several methods on one job, side by side: a row per method, as a table, as JSON or as CSV.
+
+The best is the fastest motion that passed with all of its quantities limited; a motion without a jerk limit (method toppra) is compared
+with it but is not it, unless no other passed.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from planner.errors import InputError
+from planner.report.export import summary, verdict_summary, versions
+from planner.report.tables import ratio_text
+from planner.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from planner.machine import Machine
+    from planner.methods.plan import Plan
+
+SUFFIXES = (".json", ".csv")
+# Stages of a plan that cost every method the same per second of motion; the others are its planning time.
+AFTER_PLANNING = ("read", "sample", "verify")
+QUANTITIES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """What one method made of the job.
+
+    outcome       : "passed", "failed" (a limit or the tolerance is exceeded), "not solved" or "refused"
+    sentence      : what it says about its plan, what it exceeds first, or why there is no motion
+    cycle_time    : [s], or None without a motion, as the following
+    worst         : by quantity: worst ratio to its limit and which of the limits that is ("jerk.y")
+    free          : quantities that this method does not limit
+    contour_error, vertex_error : [mm]
+    planning_time : computing time without reading, sampling and verification [s]
+    summary       : the plan's `summary.json`
+    """
+
+    method: str
+    outcome: str
+    sentence: str
+    cycle_time: float | None = None
+    worst: dict[str, tuple[float, str]] | None = None
+    free: tuple[str, ...] = ()
+    contour_error: float | None = None
+    vertex_error: float | None = None
+    planning_time: float | None = None
+    summary: dict[str, Any] | None = None
+
+    @property
+    def passed(self) -> bool:
+        """The verdict on its motion."""
+        return self.outcome == "passed"
+
+
+def row_of_plan(method: str, plan: Plan) -> Row:
+    """The row of a plan, solved or not."""
+    planning = sum(seconds for stage, seconds in plan.timings.items() if stage not in AFTER_PLANNING)
+    if plan.trajectory is None or plan.verdict is None:
+        return Row(method=method, outcome="not solved", sentence=plan.sentence, planning_time=planning)
+    verdict = plan.verdict
+    worst: dict[str, tuple[float, str]] = {}
+    for name, check in verdict.limits.items():
+        quantity = name.partition(".")[0]
+        if np.isfinite(check.ratio) and check.ratio >= worst.get(quantity, (0.0, ""))[0]:
+            worst[quantity] = (float(check.ratio), name)
+    return Row(
+        method=method,
+        outcome="passed" if verdict.passed else "failed",
+        sentence=plan.sentence if verdict.passed else verdict.faults[0],
+        cycle_time=plan.trajectory.cycle_time,
+        worst=worst,
+        free=tuple(verdict_summary(verdict)["not_limited"]),
+        contour_error=verdict.contour_error_mm,
+        vertex_error=verdict.vertex_error_mm,
+        planning_time=planning,
+        summary=summary(plan),
+    )
+
+
+def refused(method: str, fault: Exception) -> Row:
+    """The row of a method that cannot do the job, with what it says."""
+    return Row(method=method, outcome="refused", sentence=str(fault))
+
+
+def best_of(rows: list[Row]) -> Row | None:
+    """The fastest that passed, of those that limit everything if there is one."""
+    passed = [row for row in rows if row.passed]
+    candidates = [row for row in passed if not row.free] or passed
+    return min(candidates, key=lambda row: row.cycle_time or np.inf, default=None)
+
+
+def comparison_table(rows: list[Row], title: str) -> Group:
+    """The table for the terminal; below it what failed, and why."""
+    best = best_of(rows)
+    shown = [name for name in QUANTITIES if any(name in (row.worst or {}) for row in rows)]
+    table = Table(box=None, pad_edge=False)
+    table.add_column("method", no_wrap=True)
+    for name in (
+        "cycle\ntime s",
+        "ratio to\nbest",
+        *(f"{q.replace('_', chr(10), 1)}\n/ limit" for q in shown),
+    ):
+        table.add_column(name, justify="right", no_wrap=True)
+    for name in ("contour\nµm", "corners\nµm", "planning\ns"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    said = []
+    for row in rows:
+        table.add_row(
+            row.method,
+            _number(row.cycle_time, ".4f"),
+            _number(_to_best(row, best), ".4f"),
+            *(_worst(row, quantity) for quantity in shown),
+            _number(row.contour_error, ".3f", MICROMETRE),
+            _number(row.vertex_error, ".3f", MICROMETRE),
+            _number(row.planning_time, ".3f"),
+            Text(row.outcome, style="green" if row.passed else "bold red"),
+        )
+        if not row.passed:
+            said.append(Text(f"{row.method}: {row.sentence}"))
+    free = [f"{row.method} does not limit {', '.join(row.free)}" for row in rows if row.free]
+    notes = [Text(f"(in brackets: not limited; {'; '.join(free)})")] if free else []
+    return Group(Text(title, style="bold"), table, *notes, *said)
+
+
+def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
+    """The comparison ready for JSON."""
+    best = best_of(rows)
+    return {
+        **about,
+        "versions": versions(),
+        "best": best.method if best else None,
+        "methods": [
+            {
+                "method": row.method,
+                "outcome": row.outcome,
+                "sentence": row.sentence,
+                "cycle_time_s": row.cycle_time,
+                "ratio_to_best": _to_best(row, best),
+                "worst": {
+                    q: {"ratio": ratio, "limit": name} for q, (ratio, name) in (row.worst or {}).items()
+                },
+                "not_limited": list(row.free),
+                "contour_error_mm": row.contour_error,
+                "vertex_error_mm": row.vertex_error,
+                "planning_time_s": row.planning_time,
+                "summary": row.summary,
+            }
+            for row in rows
+        ],
+    }
+
+
+def comparison_csv(rows: list[Row]) -> str:
+    """The comparison as CSV, a row per method; empty where there is no number."""
+    best = best_of(rows)
+    out = io.StringIO()
+    write = csv.writer(out, lineterminator="\n")
+    limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
+    head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
+    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "planning_time_s", "sentence"]
+    write.writerow([*head, *limits, *tail])
+    for row in rows:
+        worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
+        first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
+        last = [" ".join(row.free), row.contour_error, row.vertex_error, row.planning_time, row.sentence]
+        write.writerow([*first, *worst, *last])
+    return out.getvalue()
+
+
+def check_place(path: Path) -> None:
+    """Raise InputError for another suffix than .json and .csv, or a place that is no file in a directory."""
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
+    if path.is_dir():
+        raise InputError("cannot be written: is a directory", source=str(path))
+    if path.parent.exists() and not path.parent.is_dir():
+        raise InputError(f"cannot be written: {path.parent} is no directory", source=str(path))
+
+
+def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None:
+    """Write the comparison as JSON or CSV, the whole file or none of it. Raises InputError where it cannot be written."""
+    check_place(path)
+    text = comparison_csv(rows) if path.suffix == ".csv" else _json(comparison_dict(rows, about))
+    new = path.with_name(f".{path.name}.planner-{uuid.uuid4().hex[:12]}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with new.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(path)) from fault
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:
+    """What all rows have in common; `tolerance` [mm] is None where the program or the machine sets it."""
+    return {
+        "program": source,
+        "machine": machine.model_dump(mode="json", exclude_none=True),
+        "tolerance_mm": tolerance,
+    }
+
+
+def _json(value: dict[str, Any]) -> str:
+    return json.dumps(value, indent=2, allow_nan=False) + "\n"
+
+
+def _to_best(row: Row, best: Row | None) -> float | None:
+    if row.cycle_time is None or best is None or not best.cycle_time:
+        return None
+    return row.cycle_time / best.cycle_time
+
+
+def _worst(row: Row, quantity: str) -> str:
+    if not row.worst or quantity not in row.worst:
+        return "-"
+    ratio, name = row.worst[quantity]
+    text = f"{ratio_text(ratio)} {name.partition('.')[2]}".rstrip()
+    return f"({text})" if quantity in row.free else text
+
+
+def _number(value: float | None, form: str, unit: float = 1.0) -> str:
+    return "-" if value is None else format(value / unit, form)

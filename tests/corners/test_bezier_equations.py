@@ -85,8 +85,8 @@ def test_equation_8_with_the_bar_is_the_g2_condition(sigma, seed, scale):
     joint, tangent = rng.normal(size=2), np.array([1.0, 0.0])
     left, right = rng.uniform(0.5, 2.0, 2), rng.uniform(0.5, 2.0, 2)
     Q = np.array([
-        joint + [-3.0, 2.0], joint - left[0] * tangent + [-left[1], 0.7], joint - left[0] * tangent, joint,
-        joint + scale * right[0] * tangent, joint + scale * (right[0] * tangent + [right[1], 0.9]), joint + [3.0, 2.0],
+        joint + 3.0 * np.array((-1.0, 0.7)), joint - left[0] * tangent + [-left[1], 0.7], joint - left[0] * tangent, joint,
+        joint + scale * right[0] * tangent, joint + scale * (right[0] * tangent + [right[1], 0.9]), joint + 3.0 * np.array((1.0, 0.7)),
     ])  # fmt: skip
     s1, s2, b2 = sigma
     b1 = s2 / equation_8(Q)  # the condition

@@ -16,7 +16,8 @@ together and both must give (equal axes at 45 degrees) the time has a kink and t
 one. The programmed feed's price is that of more feed.
 
 Growing to scale is what Bezier corners do. Corner shapes that limits and filters design ("fir", "kinematic") bend while they grow:
-there acceleration and jerk are priced with the shape as it is, and the tolerance to within 10 % (kinematic) or a third (fir).
+there acceleration and jerk are priced with the shape as it is, and the tolerance to within 10 % (kinematic) or a third (fir). Paths
+that are not rounded corner by corner do not tell what the tolerance costs, and accelerations are priced with the path as it is.
 
 **Finite changes.** 10 um are a fifth to a whole of usual tolerances, too much for a derivative alone. What accelerations let through
 a corner goes with the root of its size, so savings by tolerance are extrapolated as roots,
@@ -47,7 +48,7 @@ from planner.path_grid import FREE_PART_MIN
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
 MORE_TOLERANCE = 0.01  # ... and for so much more tolerance [mm]
 DEAREST = 10  # corners that are listed
-SAVED_MIN = 1e-6  # a corner that saves less is not dear [s]
+SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
 STEP = 1e-4  # relative steps of differences [-]: far above rounding, far below what bends a curve ...
 STEP_OF_LEG = 1e-2  # ... and at most this share of the free part of a leg [-]
 CANDIDATES = 30  # corners whose own price is looked at
@@ -91,47 +92,56 @@ class PriceList:
 
     limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]
     feed      : dT/d(ln feed override) [s]
-    tolerance : dT/d(tolerance of all corners) [s/mm]
-    saved     : by `MORE_LIMIT` more of each axis limit and of the "feed", by `MORE_TOLERANCE` more "tolerance" [s]
-    corners   : the dearest ones
+    tolerance : dT/d(tolerance of all corners) [s/mm]; None where it is not known: the path is not one of rounded corners
+    saved     : by `MORE_LIMIT` more of each axis limit and of the "feed", by `MORE_TOLERANCE` more "tolerance" if known [s]
+    corners   : the dearest ones; None where they are not known
     """
 
     limits: dict[str, float]
     feed: float
-    tolerance: float
+    tolerance: float | None
     saved: dict[str, float]
-    corners: DearCorners
+    corners: DearCorners | None
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """What saves time, with the time saved by `MORE_LIMIT` or `MORE_TOLERANCE` more of it [s]; the most valuable first."""
+        worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
+        return sorted(worth, key=lambda entry: -entry[1])
 
 
 def price_list(
     samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution, machine: Machine
 ) -> PriceList:
-    """The prices of a solution on rounded corners. Raises ValueError if its solver gives no multipliers."""
+    """The prices of a solution. Raises ValueError if its solver gives no multipliers."""
     now = lagrangian(problem, solution)
-    corners = _corners(samples, problem, solution, machine, now)
     prices = solution.prices
     assert prices is not None  # solvers that give multipliers give prices
-    by_share: dict[str, float] = {}  # dT/d(ln limit)
-    for quantity in ("velocity", "acceleration", "jerk"):
-        relative = getattr(prices, quantity) * getattr(problem, quantity)
-        by_share |= {f"{quantity}.{axis}": float(relative[k]) for k, axis in enumerate(problem.axes)}
-    for axis in problem.axes:
-        by_share[f"acceleration.{axis}"] += corners.by_acceleration(axis)
-    by_share["feed"] = _by_feed(samples, problem, machine, now)
-    together = corners.by_tolerance()
-    tolerance = float(together.sum()) + corners.between()
-    mean = float(samples.path.toolpath.tolerance.mean())
+    limit = {
+        f"{quantity}.{axis}": float(getattr(problem, quantity)[k])
+        for quantity in ("velocity", "acceleration", "jerk")
+        for k, axis in enumerate(problem.axes)
+    }
+    direct = np.concatenate([prices.velocity, prices.acceleration, prices.jerk])
+    by_share = {name: price * limit[name] for name, price in zip(limit, direct.tolist(), strict=True)}
+    by_share["feed"] = _by_feed(samples, problem, machine, now)  # these are dT/d(ln limit)
+    saved_by_tolerance: dict[str, float] = {}
+    tolerance = dear = None
+    if isinstance(samples.path, SmoothPath):
+        corners = _corners(samples.path, samples, problem, solution, machine, now)
+        for axis in problem.axes:
+            by_share[f"acceleration.{axis}"] += corners.by_acceleration(axis)
+        together = corners.by_tolerance()
+        tolerance = float(together.sum()) + corners.between()
+        mean = float(samples.path.toolpath.tolerance.mean())
+        saved_by_tolerance["tolerance"] = float(_saved(tolerance, mean))
+        dear = corners.dearest(together)
+    more = float(np.log1p(MORE_LIMIT))
     return PriceList(
-        limits={
-            f"{quantity}.{axis}": by_share[f"{quantity}.{axis}"] / float(getattr(problem, quantity)[k])
-            for quantity in ("velocity", "acceleration", "jerk")
-            for k, axis in enumerate(problem.axes)
-        },
+        limits={name: by_share[name] / limit[name] for name in limit},
         feed=by_share["feed"],
         tolerance=tolerance,
-        saved={name: -float(np.log1p(MORE_LIMIT)) * price for name, price in by_share.items()}
-        | {"tolerance": float(_saved(tolerance, mean))},
-        corners=corners.dearest(together),
+        saved={name: -more * price for name, price in by_share.items()} | saved_by_tolerance,
+        corners=dear,
     )
 
 
@@ -235,6 +245,7 @@ def _apart(joint: Array, shared: Array) -> list[list[int]]:
 
 
 def _corners(
+    path: SmoothPath,
     samples: PathSamples,
     problem: FeedrateProblem,
     solution: FeedrateSolution,
@@ -242,7 +253,6 @@ def _corners(
     now: Lagrangian,
 ) -> _Corners:
     """Grow every corner a little (module text, 1.), and sort the multipliers of the error bounds by corner (2.)."""
-    path = samples.path
     joints = np.arange(len(path.d))
     corner, leg = samples.element < 0, np.maximum(samples.element, 0)
     growth, total = _growth(path), np.zeros(len(joints))

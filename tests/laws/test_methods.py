@@ -1,0 +1,166 @@
+"""Laws of every method on random polylines: 2 to 4 axes, turns of 1 to 179 degrees, legs of 10 um to 100 mm.
+
+Those that promise the limits hold them, by the verifier's judgement; those of the papers that do not stay below what PAPERS proves;
+and at a corner by itself each misses the vertex by what it promises.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from benchmarks import problems
+from planner.machine import Axis, Machine
+from planner.methods.names import METHODS, plan
+from planner.nc.program import Program
+from planner.verify.pieces import RATIO_ROUNDING
+
+PLAIN = {"fir-plain", "fir-spline-plain"}
+HOLDING = tuple(name for name in METHODS if name not in PLAIN)
+# Methods that choose a full stop where it is faster: never slower than stopping everywhere, to the accuracy of their grids.
+NOT_SLOWER = {"optimal": 2e-3, "bezier": 1e-6, "kinematic": 1e-6, "toppra": 1e-6, "stop": 1e-9}
+seeds = st.integers(0, 10**6)
+UNITS = {"x": 1.0, "y": 1.0, "z": 1.0, "a": 180.0 / np.pi}  # a machine file's rotary axes are in degrees
+
+
+def random_job(seed: int, axes: int) -> Program:
+    """G1 moves; in four axes the fourth is rotary, in rad."""
+    rng = np.random.default_rng(seed)
+    u, points = np.eye(axes)[0], [np.zeros(axes)]
+    for leg in range(int(rng.integers(2, 13))):
+        if leg:
+            across = rng.normal(size=axes)
+            across -= (across @ u) * u
+            turn = np.deg2rad(rng.uniform(1.0, 179.0))
+            u = np.cos(turn) * u + np.sin(turn) * across / np.linalg.norm(across)
+        points.append(points[-1] + u * 10 ** rng.uniform(-2.0, 2.0))
+    return through(np.array(points))
+
+
+def through(points) -> Program:
+    points = np.asarray(points, float)
+    made = problems.polyline(points[:, : min(3, points.shape[1])])
+    if points.shape[1] < 4:
+        return made
+    return dataclasses.replace(
+        made, axes=("x", "y", "z", "a"), start=points[0], end=points[1:], arc_center=np.zeros((0, 4))
+    )
+
+
+def machine(seed: int = 0, **more) -> Machine:
+    """Different limits on every axis; the rotary one's come out like a linear one's."""
+    rng = np.random.default_rng(seed)
+    a, j = rng.uniform(1e3, 4e3, 4), 10 ** rng.uniform(4.5, 5.5, 4)
+    axes = {
+        letter: Axis(velocity=100.0 * unit, acceleration=a[k] * unit, jerk=j[k] * unit)
+        for k, (letter, unit) in enumerate(UNITS.items())
+    }
+    return problems.machine(**({"axes": axes, "tolerance": 10 ** rng.uniform(-2.0, -0.7)} | more))
+
+
+@pytest.mark.parametrize("method", HOLDING)
+@given(seed=seeds, axes=st.integers(2, 4))
+@settings(max_examples=8)
+def test_tolerance_and_limits_hold(method, seed, axes):
+    made = plan(random_job(seed, axes), machine(seed), method=method)
+    assert made.require().verdict.passed, made.verdict.faults
+    free = {"jerk"} if method == "toppra" else set()
+    for name, check in made.verdict.limits.items():
+        assert check.limited == (name.partition(".")[0] not in free)
+        assert check.ratio <= 1 + RATIO_ROUNDING or not check.limited
+    np.testing.assert_allclose(made.trajectory.position[-1], made.toolpath.end[-1], atol=1e-9)
+    if method in NOT_SLOWER:
+        assert made.trajectory.cycle_time <= made.stop_time * (1 + NOT_SLOWER[method])
+
+
+@given(seed=seeds, axes=st.integers(2, 4))
+@settings(max_examples=15)
+def test_the_plain_pulses_exceed_no_more_than_proved(seed, axes):
+    """PAPERS A, universal identity: |a| <= 2 V/T1 and |j| <= 4 V/(T1 T2) for any path; T1 = V/A and T2 = A/J are the paper's. The
+    deviation, by eq. 14 the tolerance, is at most it plus the bow between samples where blends stay apart."""
+    limits = problems.machine(
+        axes={k: Axis(velocity=100.0 * u, acceleration=2000.0 * u, jerk=2e5 * u) for k, u in UNITS.items()}
+    )
+    made = plan(random_job(seed, axes), limits, method="fir-plain")
+    for name, check in made.verdict.limits.items():
+        most = {"velocity": 1.0, "acceleration": 2.0, "jerk": 4.0, "feed": 1.0}[name.partition(".")[0]]
+        assert check.ratio <= most * (1 + 1e-6), name
+
+
+def test_the_plain_pulses_do_reach_it():
+    """PAPERS A: both factors are attained by zig-zags without dwell, that of the jerk by legs of 70 ms for filters of 50 and 30 ms;
+    almost, as complete reversals are stopped at."""
+    limits = problems.machine(jerk=2000.0 / 0.03, tolerance=50.0)
+    turn = np.deg2rad(87.0)
+    steps = 7.0 * np.array([[np.cos(turn), np.sin(turn) * (-1) ** k] for k in range(12)])
+    made = plan(through(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)])), limits, method="fir-plain")
+    assert made.verdict.limits["jerk.y"].ratio == pytest.approx(4 * np.sin(turn), rel=1e-6)
+    assert made.verdict.limits["acceleration.y"].ratio > 1.2
+    assert not made.verdict.passed
+
+
+# --- a corner by itself: the error is what is promised -----------------------------------------------------------------------
+
+corners = st.floats(1.0, 174.0).map(np.deg2rad)  # beyond, reversals are stopped at
+LONG = 60.0  # [mm]: any of these corners ends before the middle of the leg
+
+
+def corner_job(theta: float, axes: int, seed: int) -> Program:
+    """One corner in a random plane."""
+    rng = np.random.default_rng(seed)
+    u, v = np.linalg.qr(rng.normal(size=(axes, 2)))[0].T
+    return through([-LONG * u, np.zeros(axes), LONG * (np.cos(theta) * u + np.sin(theta) * v)])
+
+
+@given(theta=corners, axes=st.integers(2, 4), seed=seeds, eps=st.floats(-3.0, 0.0).map(lambda x: 10**x))
+@settings(max_examples=30)
+def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
+    """`fir-plain`: exactly, or by eps_2, the most that a complete overlap can. By the interior angle it would be another error."""
+    limits = problems.machine(
+        tolerance=eps, dt=2e-4,
+        axes={k: Axis(velocity=1e4 * u, acceleration=2000.0 * u, jerk=66_667.0 * u) for k, u in UNITS.items()},
+    )  # fmt: skip
+    made = plan(corner_job(theta, axes, seed), limits, method="fir-plain")
+    T1, T2, s = 0.05, 2000.0 / 66_667.0, np.sin(theta / 2)
+    expected = min(eps, 100.0 * s * (3 * T1**2 + T2**2) / (12 * T1))
+    bow = 2 * 2000.0 * limits.dt**2 / 8
+    assert made.verdict.vertex_error_mm == pytest.approx(expected, rel=1e-4, abs=bow)
+
+
+@given(theta=corners, axes=st.integers(2, 4), seed=seeds)
+@settings(max_examples=30)
+def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed):
+    """Where it is run through and the tolerance, not the feed, makes it as fast as it is; exactly 0 where it is stopped at."""
+    limits = machine(seed, dt=1e-4)
+    made = plan(corner_job(theta, axes, seed), limits, method="kinematic")
+    missed, bow = made.verdict.vertex_error_mm, 1e4 * limits.dt**2 / 8
+    assert missed <= limits.tolerance
+    if not len(made.corners):
+        assert missed <= bow
+    elif made.corners.limited_by[0] == "tolerance":
+        assert missed >= limits.tolerance * (1 - 2e-3) - bow
+
+
+@given(theta=corners, axes=st.integers(2, 4), seed=seeds)
+@settings(max_examples=15)
+def test_the_optimum_misses_the_vertex_by_the_share_of_its_rounding(theta, axes, seed):
+    """`optimal` and `toppra` stay on the rounded path: eps_ap of eq. (20) at the apex, and no more than the bow of a period beyond."""
+    limits = machine(seed, dt=1e-4)
+    for method in ("optimal", "toppra"):
+        made = plan(corner_job(theta, axes, seed), limits, method=method, corner="bezier")
+        assume(len(made.corners))
+        share, bow = made.corners.tol_ap[0], 1e4 * limits.dt**2 / 8
+        assert share * (1 - 1e-6) <= made.verdict.vertex_error_mm <= share + bow
+
+
+@given(theta=corners, axes=st.integers(2, 4), seed=seeds)
+@settings(max_examples=10)
+def test_stopping_misses_nothing(theta, axes, seed):
+    made = plan(corner_job(theta, axes, seed), machine(seed), method="stop")
+    bow = 1e4 * made.machine.dt**2 / 8
+    assert made.verdict.vertex_error_mm <= bow
+    assert made.verdict.contour_error_mm <= bow

@@ -177,11 +177,8 @@ def _stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
 def _plain(guide: Guide, machine: Machine) -> Held:
     """Paper 001 as it is: T1 = v_p/a, T2 = a/j with the largest v_p of each run, and v_sc."""
     acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
-    T1, T2, phi = (
-        guide.largest(guide.feed * (guide.length > 0)) / acceleration,
-        acceleration / jerk,
-        PHASE_LAG,
-    )
+    v_p = guide.largest(np.where(guide.length > 0, guide.feed, 0.0))
+    T1, T2, phi = v_p / acceleration, acceleration / jerk, PHASE_LAG
     if machine.fir is not None:
         T1, T2 = np.full(guide.runs, machine.fir.time_constants[0]), machine.fir.time_constants[1]
         phi = (machine.fir.phase_lag_max or PHASE_LAG / RAD_PER_DEG) * RAD_PER_DEG

@@ -23,6 +23,7 @@ from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Fir, Machine
 from planner.methods.fir_spline import CHORD_SHARE, FirSplineMethod
 from planner.methods.names import plan
+from planner.nc.reader import parse_program
 from planner.verify.pieces import RATIO_ROUNDING
 
 MACHINE = problems.machine()
@@ -311,6 +312,16 @@ def test_corners_of_a_program_are_rounded_or_stopped_at():
     plain = plan(problems.pentagon(), MACHINE, method="fir-spline-plain")
     assert plain.method == "fir-spline-plain"
     assert plain.trajectory.cycle_time > made.trajectory.cycle_time  # v_sc creeps through corners
+
+
+@pytest.mark.parametrize("plain", [True, False])
+def test_rapids_have_no_feed_and_stops_none_either(plain):
+    """G0 runs at the limits of the axes; its end, a full stop, is a point of the guide without a chord."""
+    made = FirSplineMethod(plain=plain).plan(
+        parse_program("G21 F3000\nG0 X10\nG1 X20 Y5\nG0 X0 Y0\n"), MACHINE
+    )
+    assert made.trajectory.feed.max() > 99.0
+    np.testing.assert_allclose(made.trajectory.position[-1], 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("filters", [(0.01,), (0.03, 0.02, 0.01)])

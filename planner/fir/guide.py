@@ -160,11 +160,12 @@ def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
 
 
 def guide_of_curve(
-    curve: Nurbs, machine: Machine, feed: float, tolerance: float, blocks: FloatArray
+    curve: Nurbs, machine: Machine, feed: float, tolerance: float, blocks: FloatArray, reversals: FloatArray
 ) -> Guide:
-    """The chords of a curve at `feed` [mm/s] within `tolerance` [mm]; full stops at its kinks.
+    """The chords of a curve at `feed` [mm/s] within `tolerance` [mm]; full stops at its kinks and reversals.
 
-    blocks : (B+1,) parameters of the ends of the program's blocks
+    blocks    : (B+1,) parameters of the ends of the program's blocks
+    reversals : (R,) those of them at which the blocks turn back: cusps sharper than the chords
     """
     u = curve.stations(SAGITTA * tolerance)
     kappa = [
@@ -175,7 +176,7 @@ def guide_of_curve(
     parts = np.maximum(np.ceil(turn / TURN), 1).astype(np.int64)
     share = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     u = np.append(np.repeat(u[:-1], parts) + share * np.repeat(np.diff(u) / parts, parts), u[-1])
-    stops = np.append(curve.kinks, u[-1])
+    stops = np.append(np.union1d(curve.kinks, reversals), u[-1])
     closing = np.insert(np.zeros(len(u) - 1, bool), np.searchsorted(u, stops), True)
     at = u[np.arange(len(closing)) - np.cumsum(closing) + closing]  # a kink's parameter is there twice
     start, end = curve.along(at), curve.along(np.append(at[1:], at[-1]), before=True)

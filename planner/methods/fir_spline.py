@@ -94,7 +94,9 @@ class FirSplineMethod:
             chords = CHORD_SHARE * whole
             program = curve.to_program(chords, feed)
             toolpath = toolpath_from_program(program, machine, whole)
-            guide = guide_of_curve(curve, machine, feed, whole - chords, curve.stations(chords))
+            ends = curve.stations(chords)
+            back = ends[1:][toolpath.block[np.flatnonzero(toolpath.joint[1:-1] == Joint.STOP)]]
+            guide = guide_of_curve(curve, machine, feed, whole - chords, ends, back)
         return self._finish(program, machine, toolpath, guide, None, stages)
 
     def _finish(

@@ -20,6 +20,7 @@ from planner.errors import InputError
 from planner.fir.guide import Guide, guide_of_curve
 from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
+from planner.geometry.toolpath import Joint
 from planner.machine import Axis, Fir, Machine
 from planner.methods.fir_spline import CHORD_SHARE, FirSplineMethod
 from planner.methods.names import plan
@@ -73,7 +74,7 @@ def mean_on_circle(rho: float, v: float, T1: float, T2: float) -> complex:
 
 
 def guide_on(curve: Nurbs, machine: Machine, feed: float = 100.0) -> Guide:
-    return guide_of_curve(curve, machine, feed, machine.tolerance, curve.breaks)
+    return guide_of_curve(curve, machine, feed, machine.tolerance, curve.breaks, np.zeros(0))
 
 
 # --- the closed forms on a circle -----------------------------------------------------------------------------------------
@@ -302,6 +303,13 @@ def test_a_kink_is_a_full_stop():
     assert made.verdict.passed, made.verdict.faults
     assert t.feed[near] < 1.0
     assert np.linalg.norm(t.position[near] - [10, 0]) < 1e-3
+
+
+def test_a_cusp_sharper_than_the_chords_is_a_full_stop():
+    """Found on a random curve: its chords turn back, where a program has a full stop, and the curve just so does not."""
+    made = FirSplineMethod().plan_curve(wave(441), problems.machine(tolerance=0.1), 100.0)
+    assert (made.toolpath.joint[1:-1] == Joint.STOP).any()
+    assert made.verdict.passed, made.verdict.faults
 
 
 def test_corners_of_a_program_are_rounded_or_stopped_at():

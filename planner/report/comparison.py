@@ -125,8 +125,8 @@ def comparison_table(rows: list[Row], title: str) -> Group:
             _number(row.cycle_time, ".4f"),
             _number(_to_best(row, best), ".4f"),
             *(_worst(row, quantity) for quantity in shown),
-            _number(row.contour_error, ".3f", MICROMETRE),
-            _number(row.vertex_error, ".3f", MICROMETRE),
+            _number(row.contour_error, ".4g", MICROMETRE),
+            _number(row.vertex_error, ".4g", MICROMETRE),
             _number(row.planning_time, ".3f"),
             Text(row.outcome, style="green" if row.passed else "bold red"),
         )

@@ -9,6 +9,8 @@ import numpy as np
 
 from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
+from planner.methods.plan import GridHistory
+from planner.methods.prices import PriceList
 from planner.nc.reader import parse_program
 from planner.trajectory import Trajectory
 
@@ -90,7 +92,14 @@ def make_corners() -> Any:
     )
 
 
-def make_plan(text: str = SQUARE, *, machine: str = "mill", passed: bool = True, solved: bool = True) -> Any:
+def make_plan(
+    text: str = SQUARE,
+    *,
+    machine: str = "mill",
+    passed: bool = True,
+    solved: bool = True,
+    prices: PriceList | None = None,
+) -> Any:
     limits = load_machine(machine)
     program = parse_program(text, limits, source="square.ngc")
     toolpath = toolpath_from_program(program, limits)
@@ -110,11 +119,17 @@ def make_plan(text: str = SQUARE, *, machine: str = "mill", passed: bool = True,
         verdict=make_verdict(passed=passed) if solved else None,
         stop_time=1.25,
         grid_points=40,
-        grid=SimpleNamespace(
-            t=t, s=t, feed=t, active=np.arange(40) % 3, active_names=("feed", "velocity.x", "acceleration.y")
+        grid=GridHistory(
+            t=t,
+            s=t,
+            feed=t,
+            active=np.arange(40) % 3,
+            active_names=("feed", "velocity.x", "acceleration.y", "none", "rest"),
+            share=np.array([0.25, 0.002, 0.7, 0.03, 0.018]),
         )
         if solved
         else None,
+        prices=prices,
         timings={"read": 0.01, "solve": 0.02},
         solved=solved,
     )

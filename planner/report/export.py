@@ -22,6 +22,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.errors import InputError
+from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import LAST, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
@@ -92,6 +93,7 @@ def summary(plan: Plan) -> dict[str, Any]:
                 if corners is not None and len(corners.line)
                 else None,
             },
+            **optimum_summary(plan.grid, plan.prices),
             "blocks": len(plan.program),
             "grid_points": plan.grid_points,
             "timings_s": plan.timings,

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.machine import LINEAR_AXES, Machine
+from planner.report.optimum import held_by_text, price_rows
 from planner.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ FAULTS_SHOWN = 8
 
 
 def plan_table(plan: Plan) -> Group:
-    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, time per stage."""
+    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage."""
     corner = f" on {plan.corner} corners" if plan.corner else ""
     title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
     table = _pairs()
@@ -43,6 +44,11 @@ def plan_table(plan: Plan) -> Group:
             "corners",
             f"{len(plan.corners.line):,}; fastest {ratio_text(plan.corners.worst_ratio())} of eq. 19-20",
         )
+    if plan.grid is not None:
+        table.add_row("held by", held_by_text(plan.grid))
+    if plan.prices is not None and plan.trajectory is not None:
+        for row in price_rows(plan.prices, plan.trajectory.cycle_time):
+            table.add_row(*row)
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")

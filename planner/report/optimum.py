@@ -1,0 +1,89 @@
+"""What a plan tells about the job beside its motion: what holds it, what more of it would save, and which corners are dear.
+
+The figures are those of methods/activity.py and methods/prices.py, in words for the terminal and as numbers for `summary.json`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planner.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from planner.methods.plan import GridHistory
+    from planner.methods.prices import PriceList
+
+SHARE_SHOWN = 0.01  # what holds less of the time is told as "others" [-]
+LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
+SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in the table [-]
+OTHERS = "others"
+NOTHING = "nothing"
+
+
+def held_by_text(grid: GridHistory) -> str:
+    """What holds the motion, with its share of the time: "jerk.y 41 %, feed 12 %, ..."."""
+    ranked = grid.ranked()
+    told = [(name, share) for name, share in ranked if share >= SHARE_SHOWN]
+    rest = sum(share for _, share in ranked) - sum(share for _, share in told)
+    if rest >= SHARE_SHOWN:
+        told.append((OTHERS, rest))
+    words = {"none": NOTHING, "rest": "dwells"}
+    return ", ".join(f"{words.get(name, name)} {100.0 * share:.0f} %" for name, share in told)
+
+
+def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
+    """Rows of the plan's table: what more of the limits saves, what more tolerance saves, and where."""
+    from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE
+
+    worth = [
+        f"{name} {saved:.3g} s"
+        for name, saved in prices.ranked()
+        if name != "tolerance" and saved >= SAVED_SHOWN * cycle_time
+    ]
+    rows = [(f"{100.0 * MORE_LIMIT:g} % more saves", ", ".join(worth[:LIMITS_SHOWN]) or NOTHING)]
+    more = f"{MORE_TOLERANCE / MICROMETRE:g} µm more"
+    if prices.tolerance is None:
+        return [*rows, (f"{more} tolerance", "not known on this path")]
+    saved = dict(prices.ranked()).get("tolerance")
+    rows.append((f"{more} tolerance", f"saves {saved:.3g} s" if saved is not None else f"saves {NOTHING}"))
+    if prices.corners is not None and len(prices.corners):
+        pairs = zip(prices.corners.line, prices.corners.saved, strict=True)
+        told = (f"{line} {1e3 * saved:.2g} ms" for line, saved in pairs)
+        rows.append((f"{more} at line", ", ".join(told)))
+    return rows
+
+
+def optimum_summary(grid: GridHistory | None, prices: PriceList | None) -> dict[str, Any]:
+    """`held_by` and `prices` of a plan in numbers; None for what is not known."""
+    return {
+        "held_by": dict(grid.ranked()) if grid is not None else None,
+        "prices": _price_summary(prices) if prices is not None else None,
+    }
+
+
+def _price_summary(prices: PriceList) -> dict[str, Any]:
+    from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE
+
+    dear = prices.corners
+    return {
+        "limits": prices.limits,
+        "feed": prices.feed,
+        "tolerance": prices.tolerance,
+        "more_limit": MORE_LIMIT,
+        "more_tolerance_mm": MORE_TOLERANCE,
+        "saved_s": prices.saved,
+        "corners": None
+        if dear is None
+        else [
+            {
+                "line": dear.line[k],
+                "position_mm": dear.position[k],
+                "theta_deg": np.rad2deg(dear.theta[k]),
+                "price_s_per_mm": dear.price[k],
+                "saved_s": dear.saved[k],
+            }
+            for k in range(len(dear))
+        ],
+    }

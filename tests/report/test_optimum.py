@@ -1,0 +1,113 @@
+"""What the tables and `summary.json` say of limits and prices: with plans made by hand, and of one real plan."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from hand_made import make_plan
+from test_tables import text
+
+import planner
+from planner.machine import load_machine
+from planner.methods.prices import DearCorners, PriceList
+from planner.nc.reader import parse_program
+from planner.report.export import summary
+from planner.report.optimum import held_by_text, price_rows
+from planner.report.tables import plan_table
+
+DEAR = DearCorners(
+    line=np.array([7, 4]),
+    position=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+    theta=np.array([np.pi / 2, np.pi / 3]),
+    price=np.array([-0.5, -0.25]),
+    saved=np.array([0.0044, 0.00216]),
+)
+PRICES = PriceList(
+    limits={"velocity.x": 0.0, "acceleration.y": -2e-5, "jerk.y": -3e-7},
+    feed=-0.4,
+    tolerance=-1.5,
+    saved={"velocity.x": 0.0, "acceleration.y": 0.0381, "jerk.y": 1e-5, "feed": 0.05, "tolerance": 0.0131},
+    corners=DEAR,
+)
+
+
+def test_what_holds_the_motion() -> None:
+    """The largest first; what holds less than a percent is gathered, and nothing is told of it if that is less still."""
+    grid = make_plan().grid
+    assert held_by_text(grid) == "acceleration.y 70 %, feed 25 %, nothing 3 %, dwells 2 %"
+    many = dataclasses.replace(grid, share=np.array([0.008, 0.007, 0.985, 0.0, 0.0]))
+    assert held_by_text(many) == "acceleration.y 98 %, others 2 %"
+
+
+def test_what_more_saves() -> None:
+    """0.8 s: what saves 10 us of them is not told."""
+    assert price_rows(PRICES, 0.8) == [
+        ("10 % more saves", "feed 0.05 s, acceleration.y 0.0381 s"),
+        ("10 µm more tolerance", "saves 0.0131 s"),
+        ("10 µm more at line", "7 4.4 ms, 4 2.2 ms"),
+    ]
+
+
+def test_where_more_saves_nothing() -> None:
+    saved = dict.fromkeys(PRICES.saved, 0.0) | {"tolerance": -0.001}  # corners that take from each other
+    no_corners = dataclasses.replace(
+        DEAR, **{name: getattr(DEAR, name)[:0] for name in ("line", "position", "theta", "price", "saved")}
+    )
+    assert price_rows(dataclasses.replace(PRICES, saved=saved, corners=no_corners), 0.8) == [
+        ("10 % more saves", "nothing"),
+        ("10 µm more tolerance", "saves nothing"),
+    ]
+
+
+def test_where_the_price_of_the_tolerance_is_not_known() -> None:
+    limits = {name: value for name, value in PRICES.saved.items() if name != "tolerance"}
+    unknown = dataclasses.replace(PRICES, tolerance=None, saved=limits, corners=None)
+    assert price_rows(unknown, 0.8)[1:] == [("10 µm more tolerance", "not known on this path")]
+    said = json.loads(json.dumps(summary(make_plan(prices=unknown)), allow_nan=False))["prices"]
+    assert said["tolerance"] is None
+    assert said["corners"] is None
+
+
+def test_the_plan_s_table() -> None:
+    said = text(plan_table(make_plan(prices=PRICES)))
+    assert "held by" in said
+    assert "feed 0.05 s" in said
+    assert "7 4.4 ms" in said
+    without = text(plan_table(make_plan()))
+    assert "held by" in without
+    assert "more saves" not in without
+    assert "held by" not in text(plan_table(make_plan(solved=False)))
+
+
+def test_the_summary() -> None:
+    said = json.loads(json.dumps(summary(make_plan(prices=PRICES)), allow_nan=False))
+    assert said["held_by"]["acceleration.y"] == 0.7
+    assert sum(said["held_by"].values()) == pytest.approx(1.0)
+    prices = said["prices"]
+    assert prices["limits"] == PRICES.limits
+    assert prices["saved_s"] == PRICES.saved
+    assert (prices["more_limit"], prices["more_tolerance_mm"]) == (0.1, 0.01)
+    assert [corner["line"] for corner in prices["corners"]] == [7, 4]
+    assert prices["corners"][0]["position_mm"] == [1.0, 2.0, 3.0]
+    assert prices["corners"][0]["theta_deg"] == pytest.approx(90.0)
+    assert prices["corners"][1]["saved_s"] == 0.00216
+    nothing = summary(make_plan(solved=False))
+    assert nothing["held_by"] is None
+    assert nothing["prices"] is None
+
+
+def test_a_real_plan() -> None:
+    machine = load_machine("mill")
+    program = parse_program("G21 G90\nG1 X20 F6000\nY10\nX0\nY0\n", machine)
+    plan = planner.plan(program, machine, method="optimal")
+    said = json.loads(json.dumps(summary(plan), allow_nan=False))
+    assert sum(said["held_by"].values()) == pytest.approx(1.0)
+    assert {corner["line"] for corner in said["prices"]["corners"]} == {2, 3, 4}
+    worth = max(
+        (name for name in said["prices"]["saved_s"] if name != "tolerance"), key=said["prices"]["saved_s"].get
+    )
+    assert f"10 % more saves {worth}" in " ".join(text(plan_table(plan)).split())
+    assert "more saves" not in text(plan_table(planner.plan(program, machine, method="toppra")))

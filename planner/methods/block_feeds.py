@@ -1,16 +1,27 @@
 """The feed of each block of a program in a planned motion: what an F word per block can say of it.
 
-A block's feed is its programmed length over its planned time, so that
+An ordinary control holds F in the middle of a block and puts its own ramps at the ends of it. What that asks of F depends on whether
+it has room for them. With v the highest planned feed in the block, and a what the axes' accelerations leave along it, a block is
 
-    sum over the feed blocks of length / feed  +  time of rapids and dwells  =  cycle time,
+* long, if the way from rest to v and to rest again fits in:  v^2/a <= length. Its F is v: the ramps are the control's.
+* dense, otherwise. Its F is the mean, its programmed length over its planned time: the feed changes from block to block, and the
+  F words are what keeps the control near the plan. Over dense blocks
 
-exactly, but for blocks whose quotient is above the programmed feed (the motion cuts corners, its path is shorter).
+      sum of length / feed  =  their planned time
 
-Why the mean and not the highest feed in the block: run by LinuxCNC 2.9 (axes at 100 mm/s and 2000 mm/s2, 0.05 mm), jerk-limited
-plans with mean feeds take 0.7 % more (circle of chords), 0.4 % less (spiral) and 4 % less (dense relief) than planned, with the
-highest feeds 0.3 % more, 3 % less and 44 % less: such a control has no jerk limit of its own, and the F words are what keeps it
-near the plan. On few long blocks, where the control's own ramps come on top, the mean costs 18 % (polygon, zig-zag), the highest
-feed 5 %.
+  exactly, but for blocks whose quotient is above the programmed feed (the motion cuts corners, its path is shorter).
+
+Run by LinuxCNC 2.9 (axes at 100 mm/s and 2000 mm/s2, no jerk limit of its own, G64 P0.05 Q0) at the feeds of jerk-limited plans
+(2e5 mm/s3), the programs took so much longer than planned:
+
+    feeds                        pentagon   zig-zag   circle of chords   spiral of chords   relief
+    means                        19.4 %     18.1 %    0.7 %              -0.3 %              2.7 %
+    highest                       5.1 %      6.1 %    0.4 %              -3.2 %             -8.3 %
+    highest if long, else mean    5.1 %      6.1 %    0.7 %              -0.9 %             -1.4 %
+
+What remains on the long blocks is how that control rounds corners. Beside full stops the plan is so slow that short blocks are long
+too; there a control without a jerk limit gets ahead by some milliseconds. A feed for which trapezoids between the planned feeds at the
+joints take the planned time was tried too: 8.0, 11.7, 0.7, -0.6, -2.3 %.
 
 The motion passes a joint between two samples, k the last before it. Along the programmed path the joint divides the
 distance between the two samples; with g = the share of it that lies before the joint, v0 and v1 the feeds at both samples
@@ -27,27 +38,45 @@ from __future__ import annotations
 import numpy as np
 
 from planner.arrays import FloatArray
+from planner.feedrate.rest_to_rest import block_limits
 from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
 from planner.trajectory import Trajectory
 
 
-def block_feeds(trajectory: Trajectory, toolpath: Toolpath, blocks: int) -> FloatArray:
-    """(blocks,) planned mean feed of each block [mm/s]; NaN for rapids and for blocks that move nowhere; inf where a block
-    takes no measurable time.
+def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
+    """(blocks,) feed of each block [mm/s]; NaN for rapids and for blocks that move nowhere; inf where a dense block takes no
+    measurable time.
 
     blocks : number of blocks of the program
     """
-    duration = block_times(trajectory, toolpath)
+    joint = _joint_times(trajectory, toolpath)
+    duration = _block_times(joint, toolpath)
     mean = np.full(len(toolpath), np.inf)
     np.divide(toolpath.length, duration, out=mean, where=duration > 0)
+    highest = _highest_feeds(trajectory, toolpath, joint)
+    _, acceleration, _ = block_limits(toolpath, machine)
+    feed = np.where(highest**2 <= acceleration * toolpath.length, highest, mean)
     feeds = np.full(blocks, np.nan)
-    feeds[toolpath.block[~toolpath.rapid]] = mean[~toolpath.rapid]
+    feeds[toolpath.block[~toolpath.rapid]] = feed[~toolpath.rapid]
     return feeds
 
 
 def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
     """(M,) planned time of each segment [s], dwells not included; with the dwells they add up to the cycle time."""
-    return np.maximum(np.diff(_joint_times(trajectory, toolpath)) - toolpath.dwell[1:], 0.0)
+    return _block_times(_joint_times(trajectory, toolpath), toolpath)
+
+
+def _block_times(joint: FloatArray, toolpath: Toolpath) -> FloatArray:
+    return np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
+
+
+def _highest_feeds(trajectory: Trajectory, toolpath: Toolpath, joint: FloatArray) -> FloatArray:
+    """(M,) highest planned feed on each segment, at its samples and, for segments between two samples, at its joints [mm/s]."""
+    passed = np.interp(joint, trajectory.t, trajectory.feed)
+    highest = np.maximum(passed[:-1], passed[1:])
+    np.maximum.at(highest, np.searchsorted(toolpath.block, trajectory.block), trajectory.feed)
+    return highest
 
 
 def _joint_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:

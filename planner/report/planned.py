@@ -50,7 +50,7 @@ def planned_program(plan: Plan) -> bytes:
         raise LeftOut(f"the program was not read from a file, or {source} is no longer there") from None
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
-    feeds = block_feeds(plan.trajectory, plan.toolpath, len(plan.program))
+    feeds = block_feeds(plan.trajectory, plan.toolpath, plan.machine, len(plan.program))
     if is_plotter_file(data, plan.program.source):
         return _written_anew(plan, feeds)
     text = retimed(data, plan.program, feeds)

@@ -34,8 +34,9 @@ def notes(out: Path) -> list[str]:
     return json.loads((out / "summary.json").read_text())["notes"]
 
 
-def test_every_block_has_its_mean_feed(job: Path, tmp_path: Path) -> None:
-    """10 mm in 0.2 s each: 50 mm/s, which is F3000, the programmed feed; at 0.5 s it is F1200."""
+def test_every_block_has_its_planned_feed(job: Path, tmp_path: Path) -> None:
+    """10 mm in 0.2 s each: more than F3000, the programmed feed. In 0.5 s: 15/8 of the mean of 20 mm/s, which is F2250; the blocks have
+    room for a control's own ramps."""
     plan = plan_of(job)
     names = write_plan(plan, tmp_path / "out")
     assert "planned.ngc" in names
@@ -45,7 +46,7 @@ def test_every_block_has_its_mean_feed(job: Path, tmp_path: Path) -> None:
     plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
     write_plan(plan, tmp_path / "out")
     text = (tmp_path / "out" / "planned.ngc").read_text()
-    assert text == "G21 G90 G17\nF3000\nG1 X10 F1200\nY10 F1200\nX0 F1200\nY0 F1200\nM2\n"
+    assert text == "G21 G90 G17\nF3000\nG1 X10 F2250\nY10 F2250\nX0 F2250\nY0 F2250\nM2\n"
 
 
 def test_a_program_that_is_no_file(tmp_path: Path) -> None:
@@ -96,7 +97,7 @@ def test_the_program_itself_is_never_replaced(
 
 
 def test_feeds_in_the_file_s_own_units(tmp_path: Path) -> None:
-    """10 inches in 0.5 s are F1200 in inches per minute."""
+    """10 inches in 0.5 s are 1200 inches per minute, 2250 at most."""
     job = tmp_path / "job.ngc"
     job.write_bytes(b"G20 F9000\r\nG20 F9000 G1 X10 (far)\r\n")
     machine = load_machine("mill")
@@ -106,5 +107,5 @@ def test_feeds_in_the_file_s_own_units(tmp_path: Path) -> None:
     plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
     write_plan(plan, tmp_path / "out")
     text = (tmp_path / "out" / "planned.ngc").read_bytes()
-    assert text == b"G20 F9000\r\nG20 F1200 G1 X10 (far)\r\n"
-    np.testing.assert_allclose(parse_program(text).feed, 254 / 0.5, rtol=1e-3)
+    assert text == b"G20 F9000\r\nG20 F2250 G1 X10 (far)\r\n"
+    np.testing.assert_allclose(parse_program(text).feed, 254 / 0.5 * 15 / 8, rtol=1e-3)

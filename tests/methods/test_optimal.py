@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import planner
 from benchmarks import problems
-from planner.methods.optimal import OptimalMethod
+from planner.constraints.assemble import CURVATURE_MARGIN
+from planner.corners.bezier import kappa_max
+from planner.corners.smooth import CLOSE
+from planner.methods.optimal import SIGMA2, OptimalMethod
 
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
@@ -27,3 +31,44 @@ def test_the_pentagon_is_faster_than_stopping_at_its_corners():
     plan = OptimalMethod().plan(problems.pentagon(), MACHINE)
     assert plan.trajectory.cycle_time == pytest.approx(0.989, rel=2e-3)
     assert plan.stop_time == pytest.approx(1.0651, rel=1e-4)
+
+
+TURNS = np.deg2rad([30.0, -60.0, 90.0, -120.0])
+ISOLATED = 20.0  # legs [mm]: far more than what a corner takes of them and needs to brake for
+
+
+def isolated_corners(jerk, dt, tolerance, normal):
+    """A plan through corners with nothing but their own speed to hold them: legs long, feed and velocities high."""
+    direction = np.concatenate([[0.0], np.cumsum(TURNS)])
+    steps = ISOLATED * np.stack([np.cos(direction), np.sin(direction)], axis=1)
+    program = problems.polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), feed=1e4)
+    machine = problems.machine(
+        velocity=1e3, jerk=jerk, dt=dt, tolerance=tolerance, normal_acceleration=normal
+    )
+    return OptimalMethod().plan(program, machine)
+
+
+@pytest.mark.parametrize(
+    ("dt", "tolerance", "normal", "holds"),
+    [(0.001, 0.05, 300.0, "normal_acceleration"), (0.008, 0.01, None, "chord_error")],
+    ids=["A below eps/2c", "eps/2c below A"],
+)
+def test_isolated_corners_are_passed_at_the_closed_form_s_speed(dt, tolerance, normal, holds):
+    """Paper 002, (17), (19), (20), written out here: c = dt^2/8, X = min(A, eps/2c), eps_ap = eps - c X, v = sqrt(X/kappa). With loose
+    jerk the apex speed is v, less the grid's margin; with tight jerk it stays below, and jerk is what holds it."""
+    rate = dt**2 / 8.0
+    share = min(normal or np.inf, tolerance / (2.0 * rate))
+    theta = np.abs(TURNS)
+    smaller = 2.5 * CLOSE  # corners use a little less than (20) lets them, so that they can close legs
+
+    corners = isolated_corners(1e7, dt, tolerance, normal).corners
+    np.testing.assert_allclose(corners.tol_ap, tolerance - rate * share, rtol=smaller)
+    speed = np.sqrt(share / kappa_max(corners.d_in, theta, SIGMA2))
+    np.testing.assert_allclose(corners.feed_closed_form, speed, rtol=smaller)
+    np.testing.assert_allclose(corners.feed_planned, speed * np.sqrt(1.0 - CURVATURE_MARGIN), rtol=smaller)
+    assert (corners.limited_by == holds).all()
+
+    tight = isolated_corners(500.0, dt, tolerance, normal).corners
+    np.testing.assert_allclose(tight.feed_closed_form, speed, rtol=smaller)
+    assert (tight.feed_planned < 0.97 * speed).all()
+    assert all(name.startswith("jerk.") for name in tight.limited_by)

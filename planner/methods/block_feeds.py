@@ -43,6 +43,9 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.trajectory import Trajectory
 
+# A highest feed within this share of the programmed one is the programmed one [-]: solvers stay a little away from their limits.
+SAME = 1e-3
+
 
 def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
     """(blocks,) feed of each block [mm/s]; NaN for rapids and for blocks that move nowhere; inf where a dense block takes no
@@ -56,7 +59,9 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
     np.divide(toolpath.length, duration, out=mean, where=duration > 0)
     highest = _highest_feeds(trajectory, toolpath, joint)
     _, acceleration, _ = block_limits(toolpath, machine)
-    feed = np.where(highest**2 <= acceleration * toolpath.length, highest, mean)
+    long = highest**2 <= acceleration * toolpath.length
+    full = highest >= toolpath.feed * (1.0 - SAME)
+    feed = np.where(long, np.where(full, toolpath.feed, highest), mean)
     feeds = np.full(blocks, np.nan)
     feeds[toolpath.block[~toolpath.rapid]] = feed[~toolpath.rapid]
     return feeds

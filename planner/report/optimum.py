@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 SHARE_SHOWN = 0.01  # what holds less of the time is told as "others" [-]
 LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
 SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in the table [-]
+MILLISECOND = 1e-3  # [s]
 OTHERS = "others"
 NOTHING = "nothing"
 
@@ -50,8 +51,8 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
     rows.append((f"{more} tolerance", f"saves {saved:.3g} s" if saved is not None else f"saves {NOTHING}"))
     if prices.corners is not None and len(prices.corners):
         pairs = zip(prices.corners.line, prices.corners.saved, strict=True)
-        told = (f"{line} {1e3 * saved:.2g} ms" for line, saved in pairs)
-        rows.append((f"{more} at line", ", ".join(told)))
+        told = (f"{line}: {saved / MILLISECOND:.2g}" for line, saved in pairs)
+        rows.append((f"{more} at line", f"saves, in ms, {', '.join(told)}"))
     return rows
 
 

@@ -96,6 +96,14 @@ def test_long_blocks_have_their_highest_feed_and_dense_ones_their_mean() -> None
     assert parts.min() < 0.95 * whole[0]
 
 
+def test_a_long_block_that_reaches_the_programmed_feed_keeps_it() -> None:
+    """Solvers end a little below it; an F word for that would say nothing."""
+    program = parse_program("G1 X50 F3000\nX0 F2000\n", MACHINE)
+    made = plan(program, MACHINE)
+    assert made.trajectory.feed.max() < program.feed.max()
+    np.testing.assert_array_equal(block_feeds(made.trajectory, made.toolpath, MACHINE, 2), program.feed)
+
+
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_where_a_block_begins_to_be_long(share: float) -> None:
     """v^2/a = length, for a line along x at the programmed feed."""

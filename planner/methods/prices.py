@@ -26,6 +26,11 @@ a corner goes with the root of its size, so savings by tolerance are extrapolate
 
 those by limits in the logarithm of the limit. Against plans made again, for 10 um at each of 40 corners of five jobs: mostly within
 10 % at a tolerance of 50 um; mostly within 15 % at 10 um, where three corners soon hit another limit and saved two thirds of it.
+All corners together are less certain where they share short legs, since every change of sizes there soon meets another corner. On eight
+programs and excerpts of 15 to 300 blocks, at 50 and 20 um, what 10 um save was foretold within 15 % where it was more than 1 % of the
+time (zig-zag), and within 0.2 % of the time on all others but one (KB-850, 0.5 and 1.2 %); on the two looked at closer (tiger, relief)
+the price itself held for 1 um. Rounding the path again with all of the 10 um, and going by the roots of the sizes found, was better on
+some of them and worse on others.
 """
 
 from __future__ import annotations

@@ -38,21 +38,26 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
     """Rows of the plan's table: what more of the limits saves, what more tolerance saves, and where."""
     from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE
 
+    least = SAVED_SHOWN * cycle_time
     worth = [
-        f"{name} {saved:.3g} s"
-        for name, saved in prices.ranked()
-        if name != "tolerance" and saved >= SAVED_SHOWN * cycle_time
+        f"{name} {saved:.3g} s" for name, saved in prices.ranked() if name != "tolerance" and saved >= least
     ]
     rows = [(f"{100.0 * MORE_LIMIT:g} % more saves", ", ".join(worth[:LIMITS_SHOWN]) or NOTHING)]
     more = f"{MORE_TOLERANCE / MICROMETRE:g} µm more"
     if prices.tolerance is None:
         return [*rows, (f"{more} tolerance", "not known on this path")]
-    saved = dict(prices.ranked()).get("tolerance")
-    rows.append((f"{more} tolerance", f"saves {saved:.3g} s" if saved is not None else f"saves {NOTHING}"))
+    saved = prices.saved["tolerance"]
+    if saved >= least:
+        told = f"saves {saved:.3g} s"
+    elif saved <= -least:
+        told = f"costs {-saved:.3g} s: on short legs corners take from each other"
+    else:
+        told = f"saves {NOTHING} to speak of"
+    rows.append((f"{more} tolerance", told))
     if prices.corners is not None and len(prices.corners):
         pairs = zip(prices.corners.line, prices.corners.saved, strict=True)
-        told = (f"{line}: {saved / MILLISECOND:.2g}" for line, saved in pairs)
-        rows.append((f"{more} at line", f"saves, in ms, {', '.join(told)}"))
+        by_line = ", ".join(f"{line}: {saved / MILLISECOND:.2g}" for line, saved in pairs)
+        rows.append((f"{more} at line", f"saves, in ms, {by_line}"))
     return rows
 
 

@@ -52,14 +52,28 @@ def test_what_more_saves() -> None:
 
 
 def test_where_more_saves_nothing() -> None:
-    saved = dict.fromkeys(PRICES.saved, 0.0) | {"tolerance": -0.001}  # corners that take from each other
+    saved = dict.fromkeys(PRICES.saved, 0.0)
     no_corners = dataclasses.replace(
         DEAR, **{name: getattr(DEAR, name)[:0] for name in ("line", "position", "theta", "price", "saved")}
     )
     assert price_rows(dataclasses.replace(PRICES, saved=saved, corners=no_corners), 0.8) == [
         ("10 % more saves", "nothing"),
-        ("10 µm more tolerance", "saves nothing"),
+        ("10 µm more tolerance", "saves nothing to speak of"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("saved", "told"),
+    [
+        (0.0131, "saves 0.0131 s"),
+        (0.0003, "saves nothing to speak of"),
+        (-0.0003, "saves nothing to speak of"),
+        (-0.0131, "costs 0.0131 s: on short legs corners take from each other"),
+    ],
+)
+def test_more_tolerance_may_cost_time(saved: float, told: str) -> None:
+    changed = dataclasses.replace(PRICES, saved=PRICES.saved | {"tolerance": saved})
+    assert price_rows(changed, 0.8)[1] == ("10 µm more tolerance", told)
 
 
 def test_where_the_price_of_the_tolerance_is_not_known() -> None:

@@ -16,18 +16,22 @@ from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.corners.elements import element_point, to_arc_length
+from planner.fir.schedule import lower_between
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 from planner.path import PathSamples
 
 SAGITTA = 0.01  # deviation of the chords from the path [share of the tolerance]
 TURN = 0.1  # from one chord to the next [rad]
+# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s].
+CUTS = 2e-3 * 1.6 ** np.arange(12)
 STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
 COLUMNS = (
     "point",
     "s",
     "length",
     "feed",
+    "programmed",
     "kappa",
     "v_acc",
     "v_jerk",
@@ -52,6 +56,7 @@ class Guide:
     s       : (P,) length along the chords from the start of the job [mm]
     length  : (P,) of the chord [mm]
     feed    : (P,) programmed feed, at most what the axes' velocities allow [mm/s]
+    programmed : (P,) programmed feed, inf for rapids [mm/s]
     kappa   : (P,) largest curvature of the path at the chord [1/mm]
     v_acc, v_jerk : (P,) speeds that the axes' accelerations and jerks allow on a circle of that curvature [mm/s]; inf if straight
     tol     : (P,) what filters and interpolation may use of the tolerance [mm]
@@ -68,6 +73,7 @@ class Guide:
     s: FloatArray
     length: FloatArray
     feed: FloatArray
+    programmed: FloatArray
     kappa: FloatArray
     v_acc: FloatArray
     v_jerk: FloatArray
@@ -84,7 +90,7 @@ class Guide:
         freeze(self, "point", np.float64, (points, len(self.axes)))
         for name in ("s", "length", "kappa", "tol", "sin_half", "whole"):
             freeze(self, name, np.float64, (points,))
-        for name in ("feed", "v_acc", "v_jerk"):
+        for name in ("feed", "programmed", "v_acc", "v_jerk"):
             freeze(self, name, np.float64, (points,), finite=False)
         for name in ("corner", "segment"):
             freeze(self, name, np.int64, (points,))
@@ -125,6 +131,52 @@ class Guide:
         )
 
 
+def cut_beside_slower(guide: Guide) -> Guide:
+    """The same guide with its chords cut beside feeds that are lower than theirs, by what those run in the times `CUTS`: filters make
+    them hold on there (`feeds_held`), and a long chord should not have to as a whole."""
+    change = np.flatnonzero(guide.programmed[1:] != guide.programmed[:-1]) + 1
+    change = change[np.diff(guide.run)[change - 1] == 0]
+    before, after = guide.programmed[change - 1], guide.programmed[change]
+    way = np.where(before < after, before, -after)[:, None] * CUTS
+    run = np.repeat(guide.run[change], len(CUTS))
+    s = (guide.s[change, None] + way).ravel()
+    inside = (s > guide.s[guide.first[run]]) & (s < guide.s[guide.first[run + 1] - 1])
+    s = np.setdiff1d(s[inside], guide.s)
+    at = np.searchsorted(guide.s, s, side="right") - 1  # the chord that is cut
+    rows = np.insert(np.arange(len(guide)), at + 1, at)
+    new = np.insert(np.zeros(len(guide), bool), at + 1, True)
+    columns = {name: getattr(guide, name)[rows] for name in COLUMNS}
+    columns["s"][new] = s
+    columns["point"][new] += (s - guide.s[at])[:, None] * guide.direction[at]
+    columns["length"] = np.where(columns["length"] > 0, np.append(np.diff(columns["s"]), 0.0), 0.0)
+    first = guide.first + np.searchsorted(at, guide.first - 1, side="right")
+    return Guide(axes=guide.axes, first=first, dwell=guide.dwell, **columns)
+
+
+def feeds_held(guide: Guide, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """Speeds (P,) up to which the chords keep the programmed feeds behind filters T1, T2 (G,) of the runs.
+
+    Where the filtered motion is at s, the command has been within V Td/2 of it if it ran there at V at most; so a feed V that is lower
+    than those beside it has to hold on V Td/2 before and behind.
+    """
+    speed = guide.programmed.copy()
+    new_run = np.diff(guide.run, prepend=-1) != 0
+    edge = np.flatnonzero(new_run | (guide.programmed != np.roll(guide.programmed, 1)))
+    run, value = guide.run[edge], guide.programmed[edge]
+    ends = np.append(edge[1:], len(guide))  # one behind the last chord of each feed
+    beside = np.append(run[1:] == run[:-1], False)
+    lower = np.append(value[1:] > value[:-1], False) & beside
+    lower[1:] |= (value[:-1] > value[1:]) & beside[:-1]
+    edge, ends, run, value = edge[lower], ends[lower], run[lower], value[lower]
+    reach = value * (T1 + T2)[run] / 2
+    low, high = guide.first[run], guide.first[run + 1] - 1
+    begin = np.searchsorted(guide.s, guide.s[edge] - reach, side="right") - 1
+    end = np.searchsorted(guide.s, guide.s[np.minimum(ends, high)] + reach, side="left")
+    order = np.argsort(value)
+    lower_between(order, value, np.maximum(begin, low), np.clip(end, edge + 1, high), speed)
+    return speed
+
+
 def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
     """The chords of a smooth path."""
     path, segment = samples.path, samples.segment
@@ -143,7 +195,7 @@ def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
     _evaluate(*samples.table, samples.element, samples.w0, samples.w1, parts, start, end)
     row = np.repeat(np.arange(len(samples)), parts)
     first = np.concatenate([[0], np.cumsum(parts)])[samples.piece]
-    return _guide(
+    made = _guide(
         machine,
         start,
         end,
@@ -157,6 +209,7 @@ def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
         whole=whole[row],
         segment=segment[row],
     )
+    return cut_beside_slower(made)
 
 
 def guide_of_curve(
@@ -224,6 +277,7 @@ def _guide(
         s=np.concatenate([[0.0], np.cumsum(length)[:-1]]),
         length=length,
         feed=np.minimum(feed, axes_allow),
+        programmed=feed,
         kappa=np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end))),
         v_acc=np.minimum(speeds[0][0], speeds[1][0]),
         v_jerk=np.minimum(speeds[0][1], speeds[1][1]),

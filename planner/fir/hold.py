@@ -9,7 +9,8 @@ What is exceeded is mended where it comes from:
 * error          the chords that turn, around the one that was commanded Td/2 before, get slower; a corner's then last as long as the
                  gap that paper 000 leaves between two pulses;
 * acceleration   T1 gets longer, up to 2 V/A: whatever the command, |a| <= 2 V/T1 (PAPERS, universal identity);
-* jerk           T1 T2 gets larger, up to 4 V/J: |j| <= 4 V/(T1 T2).
+* jerk           T1 T2 gets larger, up to 4 V/J: |j| <= 4 V/(T1 T2);
+* feed           a lower programmed feed holds on beside its block, for as long as the filters see it (`feeds_held`).
 
 Should that not come to an end, everything gets slower with the filters at twice their lengths. With filters that are given, all speeds
 are lowered instead of making the filters longer. Both end: slower motions have smaller errors, accelerations and jerks.
@@ -25,7 +26,7 @@ from numba import njit
 from planner.arrays import Array, FloatArray
 from planner.fir.audit import slowest
 from planner.fir.command import Command
-from planner.fir.guide import STRAIGHT, Guide
+from planner.fir.guide import STRAIGHT, Guide, feeds_held
 from planner.fir.spline_speeds import filter_lengths, first_speeds, guide_point
 from planner.fir.superpose import Pieces, superpose
 from planner.machine import LINEAR_AXES, Machine
@@ -213,6 +214,7 @@ def hold(guide: Guide, machine: Machine, start: Held, *, given: bool) -> Held:
             T1[open_], T2[open_] = filter_lengths(
                 guide.pick(open_), v[open_[guide.run]], acceleration, jerk, margins[:, open_]
             )
+            v = np.minimum(v, feeds_held(guide, T1, T2))
     return Held(v=v, T1=T1, T2=T2)
 
 
@@ -266,8 +268,9 @@ def _start(guide: Guide, machine: Machine, top: FloatArray) -> Held:
     if machine.fir is not None:
         long, short = sorted(machine.fir.time_constants, reverse=True)
         T1, T2 = long * ones[0], short * ones[0]
-        return Held(v=first_speeds(guide, most, acceleration, T1, T2), T1=T1, T2=T2)
-    T1, T2 = filter_lengths(guide, most, acceleration, jerk, ones)
-    v = first_speeds(guide, most, acceleration, T1, T2)
-    T1, T2 = filter_lengths(guide, v, acceleration, jerk, ones)
-    return Held(v=v, T1=T1, T2=T2)
+        v = first_speeds(guide, most, acceleration, T1, T2)
+    else:
+        T1, T2 = filter_lengths(guide, most, acceleration, jerk, ones)
+        v = first_speeds(guide, most, acceleration, T1, T2)
+        T1, T2 = filter_lengths(guide, v, acceleration, jerk, ones)
+    return Held(v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2)

@@ -219,7 +219,7 @@ def cells_of(course: Course, plan: Schedule) -> Cells:
     last = np.searchsorted(edge, end, side="left")
     leg = np.searchsorted(course.s, edge[:-1], side="right") - 1
     speed = plan.speed[leg].copy()
-    _paint(np.argsort(value), value, first, last, speed)
+    lower_between(np.argsort(value), value, first, last, speed)
 
     keep = np.insert(
         (np.diff(leg) > 0) | (np.diff(speed) != 0), 0, True
@@ -236,7 +236,7 @@ def plan_time(course: Course, plan: Schedule) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _paint(order, value, first, last, speed):
+def lower_between(order, value, first, last, speed):
     """speed[n] = min(speed[n], value[b]) for all cells first[b] <= n < last[b]; every cell is visited once, the lowest value first."""
     onward = np.arange(len(speed) + 1)  # the next cell that is not yet painted, or a step towards it
     for b in order:

@@ -322,6 +322,18 @@ def test_corners_of_a_program_are_rounded_or_stopped_at():
     assert plain.trajectory.cycle_time > made.trajectory.cycle_time  # v_sc creeps through corners
 
 
+@pytest.mark.parametrize("bend", [0.0, 2.0])
+def test_a_lower_feed_holds_beside_its_block(bend):
+    """The filters still see the faster feed when a slow block begins, and see it again before it ends; the plain mode says so. It has
+    to hold on for V Td/2, not along the whole of the next block."""
+    program = parse_program(f"G21\nG1 X10 F6000\nX20 Y{bend} F1200\nX30 F6000\n")
+    made, plain = (FirSplineMethod(plain=p).plan(program, MACHINE) for p in (False, True))
+    assert made.verdict.passed, made.verdict.faults
+    assert made.verdict.limits["feed"].ratio > 0.999
+    assert plain.verdict.limits["feed"].ratio > 1.5
+    assert made.trajectory.cycle_time < 1.1 * plain.trajectory.cycle_time
+
+
 @pytest.mark.parametrize("plain", [True, False])
 def test_rapids_have_no_feed_and_stops_none_either(plain):
     """G0 runs at the limits of the axes; its end, a full stop, is a point of the guide without a chord."""

@@ -17,14 +17,17 @@ if TYPE_CHECKING:
     from planner.nc.program import Program
     from planner.report.comparison import Row
 
+ALL = "all"
+
 
 @guarded
 def compare(
     job: Job,
     machine: MachineOption = None,
     method: Annotated[
-        str | None, typer.Option(metavar="A,B,...", help="methods to compare [default: all]")
-    ] = None,
+        str,
+        typer.Option("--method", "--methods", metavar="A,B,...", help="methods to compare, or all of them"),
+    ] = ALL,
     tolerance: ToleranceOption = None,
     output: Annotated[
         Path | None,
@@ -68,10 +71,10 @@ def compare(
         )
 
 
-def parse_methods(text: str | None) -> list[str]:
-    """The methods of `a,b,...`, all of them for None. Raises InputError for a name that is unknown or there twice."""
+def parse_methods(text: str) -> list[str]:
+    """The methods of `a,b,...`, or all of them. Raises InputError for a name that is unknown or there twice."""
     known = [method.value for method in Method]
-    if text is None:
+    if text == ALL:
         return known
     names = [name.strip() for name in text.split(",")]
     for name in names:

@@ -62,7 +62,7 @@ def jobs(files: list[Path], machine: Machine) -> dict[str, Program]:
         "five points": problems.five_points(),
         "butterfly": butterfly().to_program(CURVE_CHORDS * machine.tolerance, problems.FEED),
     }
-    return made | {file.name: read_program(file, machine) for file in files}
+    return made | {file.name.rpartition("__")[2]: read_program(file, machine) for file in files}
 
 
 def main() -> None:
@@ -156,7 +156,7 @@ def _excess(row: Row | None) -> str:
         (ratio, name) for quantity, (ratio, name) in row.worst.items() if quantity not in row.free
     )
     error = max(row.contour_error or 0.0, row.vertex_error or 0.0) / problems.machine().tolerance
-    return f"{name} {ratio:.3f}" if ratio > error else f"error {error:.3f}"
+    return f"{name} {ratio:.6g}" if ratio > error else f"error {error:.6g}"
 
 
 def _planning(row: Row | None) -> str:

@@ -30,6 +30,7 @@ LAYERS = (
     "planner.trajectory",
     "planner.timing",
     "planner.axis_motion",
+    "planner.tube",
     "planner.pulses",
     "planner.verify",
     "planner.methods",

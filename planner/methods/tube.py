@@ -1,0 +1,173 @@
+"""Method `tube`: geometry and feed found together, anywhere inside the tolerance: the physical limit, for short jobs.
+
+All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (tube/nlp.py), so
+nothing is given away between the two; what is still lost against the true limit is the step (1e-4) and what a better local optimum
+would gain. It takes seconds per corner where the others take milliseconds, hence `LEGS_MAX`.
+
+1. The path falls into courses between full stops, each a problem of its own (tube/course.py).
+2. Method `optimal` makes the motion from which the search starts (tube/guess.py).
+3. ipopt finds the motion; it is integrated exactly and slowed down by what rounding exceeds (tube/motion.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.axis_motion import AxisMotion
+from planner.errors import InputError
+from planner.feedrate.solution import Status
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.methods.optimal import OptimalMethod
+from planner.methods.plan import Plan
+from planner.methods.stages import Progress, Stages, deliver, stop_time
+from planner.nc.program import Program
+from planner.trajectory import Trajectory
+from planner.tube.course import Course, courses_of
+from planner.tube.guess import guess_from
+from planner.tube.motion import Steps, steps_of
+from planner.tube.nlp import TubeNLP
+
+# A job may have this many legs (arcs count as many as the steps they need): some minutes of computing, 2 GB.
+LEGS_MAX = 1000
+# The start is sampled at this share of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
+START_PERIOD, START_SAMPLES = 0.02, 200_000
+# Of the start, what is slower than this share of its fastest counts as standing [-].
+STANDING = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubeMethod:
+    """The free optimum inside the tolerance.
+
+    start  : the method whose motion the search starts from
+    solver : settings of the search
+    """
+
+    start: OptimalMethod = field(default_factory=OptimalMethod)
+    solver: TubeNLP = field(default_factory=TubeNLP)
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program. Raises InputError for what cannot be planned; an unsolved problem is the plan's status."""
+        stages = Stages(progress)
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+            courses = list(courses_of(toolpath, machine))
+            _check_size(courses, program)
+            stopping = stop_time(toolpath, machine)
+        with stages.stage("start"):
+            start = self.start.plan(program, _often_sampled(machine, toolpath, stopping), tolerance)
+        status, sentence, steps, places = start.status, start.sentence, [], []
+        with stages.stage("solve") as report:
+            for done, course in enumerate(courses if start.trajectory is not None else []):
+                window, vertex_time = _passed(course, start.trajectory, toolpath)
+                guess = guess_from(course, window, vertex_time)
+                solution = self.solver.solve(course, guess)
+                status, sentence = solution.status, solution.sentence
+                if solution.h is None or solution.place is None:
+                    sentence = f"lines {_lines(course, toolpath)}: {sentence}"
+                    break
+                steps.append(steps_of(course, guess, solution))
+                places.append((solution.place[:-1] + solution.place[1:]) / 2)
+                report((done + 1) / len(courses))
+        trajectory = verdict = None
+        if len(steps) == len(courses):
+            trajectory, verdict = deliver(
+                _motion(courses, steps, places, toolpath), toolpath, machine, stages
+            )
+            sentence += f"; {start.method} with corner {start.corner}, its start, took {start.trajectory.cycle_time:.6g} s"
+        return Plan(
+            method="tube",
+            corner=None,
+            solver=repr(self.solver),
+            program=program,
+            machine=machine,
+            toolpath=toolpath,
+            status=status,
+            sentence=sentence,
+            trajectory=trajectory,
+            verdict=verdict,
+            corners=None,
+            grid=None,
+            stop_time=stopping,
+            grid_points=sum(len(part.h) + 1 for part in steps),
+            timings=stages.timings,
+        )
+
+
+def _check_size(courses: list[Course], program: Program) -> None:
+    legs = sum(float(np.maximum(np.ceil(course.length / course.step_max), 1.0).sum()) for course in courses)
+    if legs > LEGS_MAX:
+        raise InputError(
+            f"{legs:.0f} lines and parts of arcs; method tube is for short jobs and takes at most {LEGS_MAX}: split the program, "
+            "or plan with method optimal",
+            source=program.source,
+        )
+
+
+def _often_sampled(machine: Machine, toolpath: Toolpath, stopping: float) -> Machine:
+    """The machine with a period short enough to see every phase of the start."""
+    ramp = machine.limits("acceleration", toolpath.axes) / machine.limits("jerk", toolpath.axes)
+    period = max(START_PERIOD * float(ramp.min()), stopping / START_SAMPLES)
+    return machine.model_copy(update={"dt": min(machine.dt, period)})
+
+
+def _passed(course: Course, start: Trajectory, toolpath: Toolpath) -> tuple[Trajectory, FloatArray]:
+    """The part of the start that runs a course from rest to rest, and when it passes the course's vertices (R+1,) [s]."""
+    begins = np.append(toolpath.block, toolpath.block[-1] + 1)[course.first]
+    sample = np.searchsorted(start.block, begins)
+    moving = sample[0] + np.flatnonzero(start.feed[sample[0] : sample[-1]] > STANDING * start.feed.max())
+    window = slice(max(moving[0] - 1, 0), moving[-1] + 2)
+    columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
+    part = dataclasses.replace(start, **{name: getattr(start, name)[window] for name in columns})
+    t = start.t[np.minimum(sample, len(start) - 1)].copy()
+    t[[0, -1]] = part.t[[0, -1]]
+    # Blocks so short that no sample falls on them share the time of their neighbours.
+    seen = np.append(np.diff(t) > 0, True)
+    return part, np.interp(course.offset, course.offset[seen], t[seen])
+
+
+def _motion(
+    courses: list[Course], steps: list[Steps], places: list[FloatArray], toolpath: Toolpath
+) -> AxisMotion:
+    """The motions along all courses, one after the other, with the dwells between them; places: of every step's middle [mm]."""
+    along = np.append(0.0, np.cumsum(toolpath.length))
+    h, segment = [], []
+    columns: dict[str, list[FloatArray]] = {"position": [], "velocity": [], "acceleration": [], "jerk": []}
+    for course, part, place in zip(courses, steps, places, strict=True):
+        first, last = course.first[0], course.first[-1]
+        standing = int(toolpath.dwell[first] > 0)  # a step without motion before the others
+        h += [toolpath.dwell[[first] * standing], part.h]
+        inside = np.searchsorted(along[first + 1 : last], along[first] + place, side="right")
+        segment += [[first] * standing, first + inside]
+        for name, column in columns.items():
+            whole = np.zeros((standing + len(part.h), len(toolpath.axes)))
+            if name == "position":
+                whole += toolpath.start[first]
+            whole[standing:, course.axis] = getattr(part, name)
+            column.append(whole)
+    t = np.append(0.0, np.cumsum(np.concatenate(h)))
+    of: Array = np.concatenate(segment).astype(np.int64)
+    return AxisMotion(
+        axes=toolpath.axes,
+        t=t[:-1],
+        block=toolpath.block[of],
+        line=toolpath.line[of],
+        end=float(t[-1] + toolpath.dwell[-1]),
+        **{name: np.concatenate(column) for name, column in columns.items()},
+    )
+
+
+def _lines(course: Course, toolpath: Toolpath) -> str:
+    return f"{toolpath.line[course.first[0]]} to {toolpath.line[course.first[-1] - 1]}"

@@ -1,0 +1,183 @@
+"""What the free optimum has to follow: the legs of the programmed path between two full stops, with their budgets and limits.
+
+A leg is a run of collinear lines with one feed and one budget, or an arc. Over the place x in [0, length] on it both are
+
+    P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
+
+with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what is left is for the
+chord error of the interpolation period and for the filters that follow (corners/allocation.py, eq. (18)-(20)), with the largest
+normal acceleration that the axes can give in any direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray, freeze
+from planner.corners.allocation import allocate, error_rate, normal_acceleration_max
+from planner.geometry.legs import legs_of
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+
+# Share of the budget that a step on an arc may use for bending away from its control points [-]: kappa dx^2/8 for a step over dx.
+ARC_SHARE = 0.1
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Course:
+    """R legs from rest to rest over the A axes that move on them, and the R+1 vertices around them.
+
+    axis                         : (A,) their indices among the axes of the toolpath
+    first                        : (R+1,) leg r holds the toolpath's segments first[r] : first[r+1]
+    length                       : (R,) [mm]
+    base, drift, e1, e2          : (R, A) the formula in the module's text [mm], [-]
+    radius, rate                 : (R,) [mm], [rad/mm]
+    curvature                    : (R,) bound of it on the leg [1/mm]
+    budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
+    normal_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
+                                   where the axes cannot exceed it
+    vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
+    velocity, acceleration, jerk : (A,) limits of the axes
+    """
+
+    axis: Array
+    first: Array
+    length: FloatArray
+    base: FloatArray
+    drift: FloatArray
+    e1: FloatArray
+    e2: FloatArray
+    radius: FloatArray
+    rate: FloatArray
+    curvature: FloatArray
+    budget: FloatArray
+    feed: FloatArray
+    normal_max: FloatArray
+    vertex: FloatArray
+    vertex_budget: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+    def __post_init__(self) -> None:
+        legs, axes = len(self.length), len(self.axis)
+        freeze(self, "axis", np.int64, (axes,))
+        freeze(self, "first", np.int64, (legs + 1,))
+        for name in ("length", "radius", "rate", "curvature", "budget"):
+            freeze(self, name, np.float64, (legs,))
+        for name in ("feed", "normal_max"):
+            freeze(self, name, np.float64, (legs,), finite=False)
+        for name in ("base", "drift", "e1", "e2"):
+            freeze(self, name, np.float64, (legs, axes))
+        freeze(self, "vertex", np.float64, (legs + 1, axes))
+        freeze(self, "vertex_budget", np.float64, (legs + 1,))
+        for name in ("velocity", "acceleration", "jerk"):
+            freeze(self, name, np.float64, (axes,))
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    @property
+    def step_max(self) -> FloatArray:
+        """(R,) largest part of a leg that one step may cover [mm]: where it bends away by `ARC_SHARE` of the budget; inf on lines."""
+        with np.errstate(divide="ignore"):
+            return np.sqrt(8.0 * ARC_SHARE * self.budget / self.curvature)
+
+    @property
+    def room(self) -> FloatArray:
+        """(R,) how far control points of a step may be from their places on the leg [mm]."""
+        return np.where(self.curvature > 0, 1.0 - ARC_SHARE, 1.0) * self.budget
+
+    @property
+    def offset(self) -> FloatArray:
+        """(R+1,) place of the vertices along the course [mm]."""
+        return np.append(0.0, np.cumsum(self.length))
+
+    def points(self, leg: Array, x: FloatArray) -> FloatArray:
+        """(n, A) the path at the places x (n,) [mm] on the legs (n,)."""
+        turned = (self.rate[leg] * x)[:, None]
+        circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
+        return self.base[leg] + self.drift[leg] * x[:, None] + self.radius[leg, None] * circle
+
+    def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
+        """(n, A) dP/dx there [-]."""
+        turned = (self.rate[leg] * x)[:, None]
+        across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
+        return self.drift[leg] + (self.radius * self.rate)[leg, None] * across
+
+
+def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
+    """The courses between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
+    limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}  # type: ignore[arg-type]
+    reachable = min(float(np.linalg.norm(limits["acceleration"])), machine.normal_acceleration or np.inf)
+    rate = error_rate(machine)
+    budget = np.maximum(
+        toolpath.tolerance[:-1], toolpath.tolerance[1:]
+    )  # of a segment: the larger of its joints'
+    edges = _edges(toolpath, budget)
+    stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
+    for begin, end in zip(stops[:-1], stops[1:], strict=True):
+        first = edges[begin : end + 1]
+        row = first[:-1]  # the segment that stands for its leg
+        tol_leg = budget[row]
+        tol_ap = allocate(tol_leg, np.full(len(row), reachable), rate)
+        left = normal_acceleration_max(tol_leg, tol_ap, np.full(len(row), reachable), rate)
+        vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
+        at_vertex = np.minimum(
+            toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
+        )
+        vertex_ap = allocate(at_vertex, np.full(len(first), reachable), rate)
+        vertex_ap[[0, -1]] = 0.0
+        shape = _shapes(toolpath, row, vertex)
+        moves = (
+            np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
+        ).any(axis=0)
+        held = left < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
+        yield Course(
+            axis=np.flatnonzero(moves),
+            first=first,
+            curvature=toolpath.curvature[row],
+            budget=tol_ap,
+            feed=toolpath.feed[row],
+            normal_max=np.where(held, left, np.inf),
+            vertex=vertex[:, moves],
+            vertex_budget=vertex_ap,
+            **{name: limit[moves] for name, limit in limits.items()},
+            **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
+        )
+
+
+def _edges(toolpath: Toolpath, budget: FloatArray) -> Array:
+    """Joints between legs: those of geometry/legs.py, and where feed or budget change on a line."""
+    edge = np.zeros(len(toolpath) + 1, dtype=bool)
+    edge[legs_of(toolpath).first] = True
+    edge[1:-1] |= (np.diff(toolpath.feed) != 0) & (toolpath.feed[1:] != toolpath.feed[:-1]) | (
+        np.diff(budget) != 0
+    )
+    return np.flatnonzero(edge)
+
+
+def _shapes(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, FloatArray]:
+    """The coefficients of the legs that begin with the segments `row`."""
+    arc, arcs = toolpath.arc[row], toolpath.arcs
+    chord = np.diff(vertex, axis=0)
+    length = np.where(arc < 0, np.linalg.norm(chord, axis=1), toolpath.length[row])
+    shape = {
+        "length": length,
+        "base": vertex[:-1].copy(),
+        "drift": chord / length[:, None],
+        "e1": np.zeros_like(chord),
+        "e2": np.zeros_like(chord),
+        "radius": np.zeros(len(row)),
+        "rate": np.zeros(len(row)),
+    }
+    curved = arc >= 0
+    for name, source in (
+        ("base", "center"),
+        *((same, same) for same in ("drift", "e1", "e2", "radius", "rate")),
+    ):
+        shape[name][curved] = getattr(arcs, source)[arc[curved]]
+    return shape

@@ -1,0 +1,113 @@
+"""Where the search begins: the motion of another method, cut into steps.
+
+The steps between two vertices share what happens there: the time in which the jerk is at its limit counts `STEPS_PER_RAMP` for every
+time a/j that an axis needs to reach its acceleration, and the leg's whole time counts `STEPS_OF_LEG`. Phases of full jerk, in which
+a corner is shaped, get short steps, and cruises a few long ones.
+
+Every step is a cubic in time with the control points
+
+    c0 = p0,   c1 = p0 + h v0/3,   c2 = p1 - h v1/3,   c3 = p1
+
+and each of them has its place on the course, the nearest one, never going back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray, freeze
+from planner.trajectory import Trajectory
+from planner.tube.course import Course
+
+# Twice as many find motions 1e-5 to 5e-5 faster, half as many lose 1e-3 and more (single corners, pentagon; peers' machine).
+STEPS_PER_RAMP = 6.0
+STEPS_OF_LEG = 2.0
+# Steps on arcs are at most this share of what the problem allows them (course.py) [-], which leaves room to move.
+ARC_STEP = 0.8
+# Gauss-Newton steps to the nearest place on an arc, from the place that the length run so far gives.
+NEAREST_STEPS = 5
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Guess:
+    """N steps along a course, the N+1 nodes around them, A axes.
+
+    leg   : (N,) leg of each step
+    h     : (N,) duration [s], > 0
+    state : (N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]
+    place : (N, 4) places of the control points along the course [mm], non-decreasing
+    """
+
+    leg: Array
+    h: FloatArray
+    state: FloatArray
+    place: FloatArray
+
+    def __post_init__(self) -> None:
+        steps = len(self.h)
+        freeze(self, "leg", np.int64, (steps,))
+        freeze(self, "h", np.float64, (steps,))
+        freeze(self, "state", np.float64, (steps + 1, 3, None))
+        freeze(self, "place", np.float64, (steps, 4))
+        if not (self.h > 0).all():
+            raise ValueError("Guess.h: every step must last longer than 0 s")
+
+    def __len__(self) -> int:
+        return len(self.h)
+
+
+def guess_from(course: Course, motion: Trajectory, vertex_time: FloatArray) -> Guess:
+    """Cut a motion along the course into steps. vertex_time: (R+1,) when it passes the vertices [s], strictly ascending."""
+    leg, nodes = _steps(course, motion, vertex_time)
+    of_axes = (getattr(motion, name)[:, course.axis] for name in ("position", "velocity", "acceleration"))
+    state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
+    state[[0, -1], 1:] = 0.0
+    state[[0, -1], 0] = course.vertex[[0, -1]]
+    h = np.diff(nodes)
+    place = _places(course, leg, h, state, np.interp(nodes, motion.t, motion.s))
+    return Guess(leg=leg, h=h, state=state, place=place)
+
+
+def _steps(course: Course, motion: Trajectory, vertex_time: FloatArray) -> tuple[Array, FloatArray]:
+    """(N,) legs and (N+1,) times of the nodes [s]."""
+    ramp = float((course.acceleration / course.jerk).min())
+    busy = np.minimum((np.abs(motion.jerk[:, course.axis]) / course.jerk).max(axis=1), 1.0)
+    lasting = np.diff(motion.t)
+    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * STEPS_PER_RAMP / ramp
+    needed = np.ceil(course.length / (ARC_STEP * course.step_max))
+    steps, times = np.empty(len(course), np.int64), []
+    for r, (begin, end) in enumerate(zip(vertex_time[:-1], vertex_time[1:], strict=True)):
+        inside = motion.t[(motion.t > begin) & (motion.t < end)]
+        t = np.concatenate([[begin], inside, [end]])
+        even = (t - begin) / (end - begin)
+        share = np.interp(t, motion.t, spent)
+        share += (STEPS_OF_LEG + needed[r]) * even - share[0]
+        steps[r] = int(np.ceil(share[-1]))
+        times.append(np.interp(share[-1] * np.arange(steps[r]) / steps[r], share, t))
+    return np.repeat(np.arange(len(course)), steps), np.append(np.concatenate(times), vertex_time[-1])
+
+
+def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArray:
+    return np.stack([np.interp(at, t, values) for values in column.T], axis=1)
+
+
+def _places(course: Course, leg: Array, h: FloatArray, state: FloatArray, run: FloatArray) -> FloatArray:
+    """(N, 4) places of the control points; run: (N+1,) length that the motion has run at the nodes [mm]."""
+    p, v = state[:, 0], state[:, 1]
+    third = h[:, None] / 3
+    controls = np.stack([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])
+    last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
+    begin = np.append(0, last[:-1] + 1)
+    of_run = course.length / (run[last + 1] - run[begin])
+    places = np.empty((len(leg), 4))
+    for k, (control, share) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
+        there = (1 - share) * run[:-1] + share * run[1:]
+        x = (there - run[begin][leg]) * of_run[leg]
+        for _ in range(NEAREST_STEPS):
+            miss, along = control - course.points(leg, x), course.tangents(leg, x)
+            x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, course.length[leg])
+        places[:, k] = x
+    places[begin, 0], places[last, 3] = 0.0, course.length
+    return np.maximum.accumulate((places + course.offset[leg][:, None]).ravel()).reshape(-1, 4)

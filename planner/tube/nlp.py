@@ -1,0 +1,275 @@
+"""The free optimum inside the tolerance: the motion of the axes itself is what is sought, its path included.
+
+A course of R legs is run in N steps of duration h_i and constant jerk j_i (a vector over the axes); nodes between them have position
+p_i, velocity v_i, acceleration a_i. The kinematics are exact, and every programmed vertex has a node. A step is a Bezier cubic with the
+control points
+
+    c0 = p_i,   c1 = p_i + h v_i/3,   c2 = p_{i+1} - h v_{i+1}/3,   c3 = p_{i+1};     s0 <= s1 <= s2 <= s3 their places on the leg.
+
+    minimise   T = sum_i h_i
+    subject to p_{i+1} = p_i + v_i h + a_i h^2/2 + j_i h^3/6,    v_{i+1} = v_i + a_i h + j_i h^2/2,    a_{i+1} = a_i + j_i h
+               |v_i|, |v_i + a_i h/2| <= v,    |a_i| <= a,    |j_i| <= j               per axis
+               |v_i|, |v_i + a_i h/2| <= F                                             in the norm
+               |c_k - P(s_k)| <= room,    s3 - s0 <= step_max (arcs)                   the tolerance, both sides, in order
+               |v x a| <= a_n |v|                                                      at nodes and half-way, where the machine limits it
+               node at a vertex: s = the vertex;     v = a = 0, p = the vertex at both ends.
+
+What holds for the control points holds for the whole step: acceleration is linear and velocity a parabola with the Bezier ordinates
+v_i, v_i + a_i h/2, v_{i+1}, so all limits but the normal acceleration hold at every time. With the Bernstein weights B_k the motion
+sum B_k c_k runs along P(sum B_k s_k) with a place that never goes back, and
+
+    |sum B_k c_k - P(sum B_k s_k)| <= max |c_k - P(s_k)| + kappa (s3 - s0)^2/8
+
+(the second term is what the mean of points on an arc is off the arc, half of kappa times the variance of their places): motion and
+path are within the budget in the sense of Frechet, which is what the tolerance asks for: in order, every vertex reached, both sides.
+
+Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and ipopt trickling among them: a
+weak pull of every h to its guess makes it one, `PULL`. It is not convex and has no certificate: what is found is the best near the guess.
+All quantities are in units in which the mean step of the guess has length 1 and duration 1, so that scaling a job scales its plan.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.feedrate.solution import Status
+from planner.tube.course import Course
+from planner.tube.guess import Guess
+
+# Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
+# iterations on single corners; without it, the pentagon does not converge in 500. 1e-2 costs 5e-4.
+PULL = 1e-4
+# Steps may become this much longer or shorter than they were guessed [-].
+LONGER = 4.0
+# The search ends when the time changes by less than this share in each of so many iterations [-], with all rows kept.
+SETTLED, SETTLED_ITERATIONS = 2e-6, 5
+# Residual of the rows [-], and the largest that a motion may have: what is left is integrated away (methods/tube.py).
+FEASIBILITY, VIOLATION_MAX = 1e-8, 1e-6
+# Complementarity at which the search may end [-]: the time is then good to 1e-5.
+COMPLEMENTARITY = 1e-4
+# The tolerance is narrowed by this share [-], so that rounding stays inside it.
+ROUNDING = 1e-5
+
+FOUND = (Status.OPTIMAL, "the best motion near its start, geometry and feed together")
+OUTCOMES = {
+    "Solve_Succeeded": FOUND,
+    "Solved_To_Acceptable_Level": FOUND,
+    "Maximum_Iterations_Exceeded": (
+        Status.ITERATION_LIMIT,
+        "not converged within the iterations allowed; raise max_iterations, or plan with method optimal",
+    ),
+    "Infeasible_Problem_Detected": (
+        Status.INFEASIBLE,
+        "no motion inside the tolerance was found from its start; raise the tolerance, or plan with method optimal",
+    ),
+}
+BROKE_DOWN = (
+    Status.NUMERICAL_ERROR,
+    "the solver broke down; change the tolerance a little, or plan with method optimal",
+)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TubeSolution:
+    """How the search ended, and N steps over A axes unless it failed (then None).
+
+    h        : (N,) durations [s]
+    jerk     : (N, A) [mm/s3]
+    place    : (N+1,) places of the nodes along the course [mm]
+    """
+
+    status: Status
+    sentence: str
+    iterations: int
+    solve_time: float
+    h: FloatArray | None = None
+    jerk: FloatArray | None = None
+    place: FloatArray | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubeNLP:
+    """The free optimum by ipopt. tol: relative tolerance of optimality [-]; max_iterations: per course."""
+
+    tol: float = 1e-5
+    max_iterations: int = 500
+
+    def __post_init__(self) -> None:
+        if not self.tol > 0:
+            raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
+
+    def solve(self, course: Course, guess: Guess) -> TubeSolution:
+        """Transcribe and solve; the whole formulation, from top to bottom."""
+        import casadi as ca
+
+        began = time.perf_counter()
+        steps, axes, leg = len(guess), len(course.axis), guess.leg
+        at_vertex = np.flatnonzero(np.diff(leg)) + 1  # nodes
+
+        # ---- scaling: units in which the mean step has length 1 and duration 1 ---------------------------------------------
+        second, length = guess.h.mean(), course.offset[-1] / steps
+        speed, acc, jerk = length / second, length / second**2, length / second**3
+        v_max, a_max, j_max = course.velocity / speed, course.acceleration / acc, course.jerk / jerk
+
+        # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
+        node, step = ca.MX.sym("node", 3 * axes + 1, steps + 1), ca.MX.sym("step", axes + 3, steps)
+
+        # ---- objective ------------------------------------------------------------------------------------------------------
+        h_guess = guess.h / second
+        h_all = step[axes, :]
+        merit = ca.sum2(h_all) + PULL * ca.sumsqr(h_all / ca.DM(h_guess).T - 1)
+
+        # ---- dynamics of one step -------------------------------------------------------------------------------------------
+        p, v, a, p1, v1, a1, j = (ca.SX.sym(name, axes) for name in ("p", "v", "a", "p1", "v1", "a1", "j"))
+        s0, s1, s2, s3, h = (ca.SX.sym(name) for name in ("s0", "s1", "s2", "s3", "h"))
+        gap = ca.vertcat(
+            p + h * (v + h * (a / 2 + h * j / 6)) - p1, v + h * (a + h * j / 2) - v1, a + h * j - a1
+        )
+
+        # ---- constraints of one step; its numbers are parameters -------------------------------------------------------------
+        base, drift, e1, e2 = (ca.SX.sym(name, axes) for name in ("base", "drift", "e1", "e2"))
+        scalars = ("begin", "radius", "rate", "room", "room_end", "step_max", "feed", "feed_end", "normal")
+        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal = map(ca.SX.sym, scalars)
+
+        def apart(point: Any, place: Any) -> Any:
+            turned = rate * (place - begin)
+            circle = ca.cos(turned) * e1 + ca.sin(turned) * e2
+            return ca.sumsqr(point - base - drift * (place - begin) - radius * circle)
+
+        def excess(velocity: Any, acceleration: Any) -> Any:
+            """(|v x a| / normal)^2 - |v|^2"""
+            speed_sq, along = ca.sumsqr(velocity), ca.dot(velocity, acceleration)
+            return (speed_sq * ca.sumsqr(acceleration) - along**2) / normal**2 - speed_sq
+
+        ordinate = v + a * h / 2
+        rows: list[tuple[Any, float, float]] = [
+            (gap, 0.0, 0.0),
+            (ca.vertcat(apart(p + h * v / 3, s1), apart(p1 - h * v1 / 3, s2)) / room**2, -np.inf, 1.0),
+            (apart(p1, s3) / room_end**2, -np.inf, 1.0),
+            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2), 0.0, np.inf),
+        ]
+        if (course.feed > course.velocity.min()).any():
+            rows.append((ordinate / v_max, -1.0, 1.0))
+        if (course.feed < np.linalg.norm(course.velocity)).any():
+            rows.append(
+                (ca.vertcat(ca.sumsqr(ordinate) / feed**2, ca.sumsqr(v1) / feed_end**2), -np.inf, 1.0)
+            )
+        if (course.curvature > 0).any():
+            rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
+        if np.isfinite(course.normal_max).any():
+            middle = excess(v + h * (a / 2 + h * j / 8), a + h * j / 2)
+            rows.append((ca.vertcat(middle, excess(v1, a1)), -np.inf, 0.0))
+
+        # ---- constraints of all steps ---------------------------------------------------------------------------------------
+        states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2)]
+        numbers = ca.vertcat(
+            base, drift, e1, e2, *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal)
+        )
+        of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
+        data = ca.DM(_step_numbers(course, guess, length, speed, acc).T)
+        constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
+        row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
+        row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
+
+        # ---- limits and boundary ----------------------------------------------------------------------------------------------
+        node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
+        node_min = -node_max
+        node_min[at_vertex, -1] = node_max[at_vertex, -1] = course.offset[leg[at_vertex]] / length
+        for end in (0, -1):
+            rest = np.concatenate(
+                [course.vertex[end] / length, np.zeros(2 * axes), [course.offset[end] / length]]
+            )
+            node_min[end] = node_max[end] = rest
+        step_high = np.column_stack(
+            [np.tile(j_max, (steps, 1)), h_guess * LONGER, np.full((steps, 2), np.inf)]
+        )
+        step_low = np.column_stack(
+            [np.tile(-j_max, (steps, 1)), h_guess / LONGER, np.full((steps, 2), -np.inf)]
+        )
+
+        # ---- initial guess ----------------------------------------------------------------------------------------------------
+        p0, v0, a0 = guess.state[:, 0] / length, guess.state[:, 1] / speed, guess.state[:, 2] / acc
+        place = np.append(guess.place[:, 0], course.offset[-1]) / length
+        node_start = np.column_stack([p0, v0, a0, place])
+        step_start = np.column_stack(
+            [np.diff(a0, axis=0) / h_guess[:, None], h_guess, guess.place[:, 1:3] / length]
+        )
+
+        # ---- solve --------------------------------------------------------------------------------------------------------------
+        program = {"x": ca.vertcat(ca.vec(node), ca.vec(step)), "f": merit, "g": constraints}
+        solver = ca.nlpsol("solver", "ipopt", program, _options(self))
+        lower, upper = (np.append(*pair) for pair in ((node_min, step_low), (node_max, step_high)))
+        result = solver(x0=np.append(node_start, step_start), lbx=lower, ubx=upper, lbg=row_min, ubg=row_max)
+        stats = solver.stats()
+        status, sentence = OUTCOMES.get(stats["return_status"], BROKE_DOWN)
+        g = np.array(result["g"]).ravel()
+        if status is Status.OPTIMAL and not max((g - row_max).max(), (row_min - g).max()) <= VIOLATION_MAX:
+            status, sentence = BROKE_DOWN
+        took, iterations = time.perf_counter() - began, int(stats["iter_count"])
+        if status is not Status.OPTIMAL:
+            return TubeSolution(status=status, sentence=sentence, iterations=iterations, solve_time=took)
+
+        # ---- unpack -------------------------------------------------------------------------------------------------------------
+        x = np.array(result["x"]).ravel()
+        nodes = x[: node_start.size].reshape(node_start.shape)
+        found = x[node_start.size :].reshape(step_start.shape)
+        return TubeSolution(
+            status=status,
+            sentence=sentence,
+            iterations=iterations,
+            solve_time=took,
+            h=found[:, axes] * second,
+            jerk=found[:, :axes] * jerk,
+            place=nodes[:, -1] * length,
+        )
+
+
+def _step_numbers(course: Course, guess: Guess, length: float, speed: float, acc: float) -> FloatArray:
+    """(N, 4 A + 9) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
+    leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
+    room, feed = course.room[leg] * (1.0 - ROUNDING), course.feed[leg]
+    room_end, feed_end = room.copy(), feed.copy()
+    beside = np.minimum(course.room[:-1], course.room[1:])
+    room_end[last] = np.minimum(course.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
+    feed_end[last] = np.minimum(feed[last], feed[last + 1])
+    fastest = np.linalg.norm(course.velocity)  # instead of inf, where nothing else limits
+    strongest = 2.0 * np.linalg.norm(course.acceleration)
+    return np.column_stack(
+        [
+            course.base[leg] / length,
+            course.drift[leg],
+            course.e1[leg],
+            course.e2[leg],
+            course.offset[leg] / length,
+            course.radius[leg] / length,
+            course.rate[leg] * length,
+            room / length,
+            room_end / length,
+            np.minimum(course.step_max[leg], course.offset[-1]) / length,
+            np.minimum(feed, fastest) / speed,
+            np.minimum(feed_end, fastest) / speed,
+            np.minimum(course.normal_max[leg], strongest) / acc,
+        ]
+    )
+
+
+def _options(settings: TubeNLP) -> dict[str, Any]:
+    return {
+        "print_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.mu_strategy": "adaptive",
+        "ipopt.tol": settings.tol,
+        "ipopt.max_iter": settings.max_iterations,
+        "ipopt.constr_viol_tol": FEASIBILITY,
+        "ipopt.acceptable_tol": 1e10,  # not asked for: the multipliers of equal optima need not settle
+        "ipopt.acceptable_compl_inf_tol": COMPLEMENTARITY,
+        "ipopt.acceptable_constr_viol_tol": FEASIBILITY,
+        "ipopt.acceptable_obj_change_tol": SETTLED,
+        "ipopt.acceptable_iter": SETTLED_ITERATIONS,
+    }

@@ -22,6 +22,7 @@ class Method(StrEnum):
     fir_plain = "fir-plain"
     fir_spline = "fir-spline"
     fir_spline_plain = "fir-spline-plain"
+    tube = "tube"
     stop = "stop"
 
 

@@ -17,6 +17,7 @@ from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages
 from planner.methods.stop import StopMethod
 from planner.methods.toppra import SOLVERS, ToppraMethod
+from planner.methods.tube import TubeMethod
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 
@@ -30,6 +31,7 @@ METHODS = (
     "fir-plain",
     "fir-spline",
     "fir-spline-plain",
+    "tube",
     "stop",
 )
 
@@ -98,6 +100,8 @@ def _method(name: str, corner: str, solver: str) -> Method:
         return FirMethod(plain=name == "fir-plain")
     if name in ("fir-spline", "fir-spline-plain"):
         return FirSplineMethod(plain=name == "fir-spline-plain")
+    if name == "tube":
+        return TubeMethod()
     if name == "stop":
         return StopMethod()
     raise InputError(f"no method '{name}'; there are {', '.join(METHODS)}")

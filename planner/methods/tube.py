@@ -19,7 +19,6 @@ import numpy as np
 from planner.arrays import Array, FloatArray
 from planner.axis_motion import AxisMotion
 from planner.errors import InputError
-from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -70,7 +69,9 @@ class TubeMethod:
             start = self.start.plan(program, _often_sampled(machine, toolpath, stopping), tolerance)
         status, sentence, steps, places = start.status, start.sentence, [], []
         with stages.stage("solve") as report:
-            for done, course in enumerate(courses if start.trajectory is not None else []):
+            for done, course in enumerate(courses):
+                if start.trajectory is None:
+                    break
                 window, vertex_time = _passed(course, start.trajectory, toolpath)
                 guess = guess_from(course, window, vertex_time)
                 solution = self.solver.solve(course, guess)
@@ -82,7 +83,7 @@ class TubeMethod:
                 places.append((solution.place[:-1] + solution.place[1:]) / 2)
                 report((done + 1) / len(courses))
         trajectory = verdict = None
-        if len(steps) == len(courses):
+        if start.trajectory is not None and len(steps) == len(courses):
             trajectory, verdict = deliver(
                 _motion(courses, steps, places, toolpath), toolpath, machine, stages
             )

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -111,7 +112,7 @@ class Course:
 
 def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
     """The courses between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
-    limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}  # type: ignore[arg-type]
+    limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
     reachable = min(float(np.linalg.norm(limits["acceleration"])), machine.normal_acceleration or np.inf)
     rate = error_rate(machine)
     budget = np.maximum(
@@ -119,7 +120,7 @@ def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
     )  # of a segment: the larger of its joints'
     edges = _edges(toolpath, budget)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
-    for begin, end in zip(stops[:-1], stops[1:], strict=True):
+    for begin, end in pairwise(stops):
         first = edges[begin : end + 1]
         row = first[:-1]  # the segment that stands for its leg
         tol_leg = budget[row]

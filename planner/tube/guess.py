@@ -13,7 +13,8 @@ and each of them has its place on the course, the nearest one, never going back.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,6 +58,10 @@ class Guess:
     def __len__(self) -> int:
         return len(self.h)
 
+    def slower(self, by: float) -> Guess:
+        """The same way in `by` times the time."""
+        return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
+
 
 def guess_from(course: Course, motion: Trajectory, vertex_time: FloatArray) -> Guess:
     """Cut a motion along the course into steps. vertex_time: (R+1,) when it passes the vertices [s], strictly ascending."""
@@ -78,7 +83,7 @@ def _steps(course: Course, motion: Trajectory, vertex_time: FloatArray) -> tuple
     spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * STEPS_PER_RAMP / ramp
     needed = np.ceil(course.length / (ARC_STEP * course.step_max))
     steps, times = np.empty(len(course), np.int64), []
-    for r, (begin, end) in enumerate(zip(vertex_time[:-1], vertex_time[1:], strict=True)):
+    for r, (begin, end) in enumerate(pairwise(vertex_time)):
         inside = motion.t[(motion.t > begin) & (motion.t < end)]
         t = np.concatenate([[begin], inside, [end]])
         even = (t - begin) / (end - begin)

@@ -1,8 +1,8 @@
 """Where the search begins: the motion of another method, cut into steps.
 
-The steps between two vertices share what happens there: the time in which the jerk is at its limit counts `STEPS_PER_RAMP` for every
-time a/j that an axis needs to reach its acceleration, and the leg's whole time counts `STEPS_OF_LEG`. Phases of full jerk, in which
-a corner is shaped, get short steps, and cruises a few long ones.
+A corner is shaped by jerk, within the time in which full jerk moves an axis by the tolerance, (eps/j)^(1/3), or takes it to its
+full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it has `STEPS_PER_UNIT` steps, and all of a leg
+at least `STEPS_OF_LEG` and one in `LONGEST` units. So phases of full jerk get short steps and cruises a few long ones.
 
 Every step is a cubic in time with the control points
 
@@ -23,8 +23,10 @@ from planner.trajectory import Trajectory
 from planner.tube.course import Course
 
 # Twice as many find motions 1e-5 to 5e-5 faster, half as many lose 1e-3 and more (single corners, pentagon; peers' machine).
-STEPS_PER_RAMP = 6.0
+STEPS_PER_UNIT = 4.0
 STEPS_OF_LEG = 2.0
+# Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
+LONGEST, MOST_FOR_LENGTH = 8.0, 30
 # Steps on arcs are at most this share of what the problem allows them (course.py) [-], which leaves room to move.
 ARC_STEP = 0.8
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length run so far gives.
@@ -77,18 +79,21 @@ def guess_from(course: Course, motion: Trajectory, vertex_time: FloatArray) -> G
 
 def _steps(course: Course, motion: Trajectory, vertex_time: FloatArray) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
-    ramp = float((course.acceleration / course.jerk).min())
+    unit = float(
+        min((course.acceleration / course.jerk).min(), np.cbrt(course.budget.min() / course.jerk.max()))
+    )
     busy = np.minimum((np.abs(motion.jerk[:, course.axis]) / course.jerk).max(axis=1), 1.0)
     lasting = np.diff(motion.t)
-    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * STEPS_PER_RAMP / ramp
-    needed = np.ceil(course.length / (ARC_STEP * course.step_max))
+    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * STEPS_PER_UNIT / unit
+    least = STEPS_OF_LEG + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
+    least = np.maximum(least, course.length / (ARC_STEP * course.step_max))
     steps, times = np.empty(len(course), np.int64), []
     for r, (begin, end) in enumerate(pairwise(vertex_time)):
         inside = motion.t[(motion.t > begin) & (motion.t < end)]
         t = np.concatenate([[begin], inside, [end]])
         even = (t - begin) / (end - begin)
         share = np.interp(t, motion.t, spent)
-        share += (STEPS_OF_LEG + needed[r]) * even - share[0]
+        share += least[r] * even - share[0]
         steps[r] = int(np.ceil(share[-1]))
         times.append(np.interp(share[-1] * np.arange(steps[r]) / steps[r], share, t))
     return np.repeat(np.arange(len(course)), steps), np.append(np.concatenate(times), vertex_time[-1])

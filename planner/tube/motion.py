@@ -16,8 +16,8 @@ from planner.tube.course import Course
 from planner.tube.guess import Guess
 from planner.tube.nlp import TubeSolution
 
-# Places in every step at which the normal acceleration is measured [share of the step].
-MEASURED_AT = (0.0, 0.25, 0.5, 0.75, 1.0)
+# Places in every step at which the normal acceleration is measured [share of the step]; between them it is above by less than 1e-6.
+MEASURED_AT = np.linspace(0.0, 1.0, 257)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

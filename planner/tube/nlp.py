@@ -55,6 +55,8 @@ SLOWER = (1.2, 1.5, 1.0)
 BARRIER = 0.1
 # The search ends when the time changes by less than this share in each of so many iterations [-], with all rows kept.
 SETTLED, SETTLED_ITERATIONS = 1e-5, 4
+# It may also come to rest far from any optimum: what is slower than the guess by more than this share [-] does not count.
+NOT_SLOWER = 1e-4
 # Residual of the rows [-]: what is left is integrated away (tube/motion.py).
 FEASIBILITY = 1e-6
 # Complementarity at which the search may end [-]: the time is then good to 1e-5.
@@ -78,6 +80,10 @@ OUTCOMES = {
 BROKE_DOWN = (
     Status.NUMERICAL_ERROR,
     "the solver broke down; change the tolerance a little, or plan with method optimal",
+)
+STUCK = (
+    Status.ITERATION_LIMIT,
+    "the search came to rest at a motion slower than its start; change the tolerance a little, or plan with method optimal",
 )
 
 
@@ -111,12 +117,14 @@ class TubeNLP:
             raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
 
     def solve(self, course: Course, guess: Guess) -> TubeSolution:
-        """The best motion near the guess; a failure from every start is the status of the last."""
+        """The best motion near the guess, never slower than it; a failure from every start is the status of the last."""
         iterations, took = 0, 0.0
         for slower in SLOWER:
             found = self._solve(course, guess.slower(slower))
             iterations, took = iterations + found.iterations, took + found.solve_time
-            if found.status is Status.OPTIMAL:
+            if found.h is not None and found.h.sum() > guess.h.sum() * (1.0 + NOT_SLOWER):
+                found = TubeSolution(status=STUCK[0], sentence=STUCK[1], iterations=0, solve_time=0.0)
+            if found.h is not None:
                 break
         return replace(found, iterations=iterations, solve_time=took)
 
@@ -134,7 +142,12 @@ class TubeNLP:
         v_max, a_max, j_max = course.velocity / speed, course.acceleration / acc, course.jerk / jerk
 
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
-        node, step = ca.MX.sym("node", 3 * axes + 1, steps + 1), ca.MX.sym("step", axes + 3, steps)
+        # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
+        part = (course.length / np.bincount(leg))[np.append(leg, leg[-1])]
+        unit = ca.DM(part / length).T
+        w_node, w_step = ca.MX.sym("node", 3 * axes + 1, steps + 1), ca.MX.sym("step", axes + 3, steps)
+        node = ca.vertcat(w_node[:-1, :], w_node[-1, :] * unit)
+        step = ca.vertcat(w_step[:-2, :], w_step[-2:, :] * ca.repmat(unit[:, :-1], 2, 1))
 
         # ---- objective ------------------------------------------------------------------------------------------------------
         h_guess = guess.h / second
@@ -150,8 +163,21 @@ class TubeNLP:
 
         # ---- constraints of one step; its numbers are parameters -------------------------------------------------------------
         base, drift, e1, e2 = (ca.SX.sym(name, axes) for name in ("base", "drift", "e1", "e2"))
-        scalars = ("begin", "radius", "rate", "room", "room_end", "step_max", "feed", "feed_end", "normal")
-        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal = map(ca.SX.sym, scalars)
+        scalars = (
+            "begin",
+            "radius",
+            "rate",
+            "room",
+            "room_end",
+            "step_max",
+            "feed",
+            "feed_end",
+            "normal",
+            "part",
+        )
+        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace = map(
+            ca.SX.sym, scalars
+        )
 
         def apart(point: Any, place: Any) -> Any:
             turned = rate * (place - begin)
@@ -168,7 +194,7 @@ class TubeNLP:
             (gap, 0.0, 0.0),
             (ca.vertcat(apart(p + h * v / 3, s1), apart(p1 - h * v1 / 3, s2)) / room**2, -np.inf, 1.0),
             (apart(p1, s3) / room_end**2, -np.inf, 1.0),
-            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2), 0.0, np.inf),
+            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_part, 0.0, np.inf),
         ]
         if (course.feed > course.velocity.min()).any():
             rows.append((ordinate / v_max, -1.0, 1.0))
@@ -180,15 +206,16 @@ class TubeNLP:
             rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
         if np.isfinite(course.normal_max).any():
             middle = excess(v + h * (a / 2 + h * j / 8), a + h * j / 2)
-            rows.append((ca.vertcat(middle, excess(v1, a1)), -np.inf, 0.0))
+            rows.append((ca.vertcat(middle, excess(v1, a1)) / pace**2, -np.inf, 0.0))
 
         # ---- constraints of all steps ---------------------------------------------------------------------------------------
         states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2)]
         numbers = ca.vertcat(
-            base, drift, e1, e2, *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal)
+            *(base, drift, e1, e2),
+            *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace),
         )
         of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
-        data = ca.DM(_step_numbers(course, guess, length, speed, acc).T)
+        data = ca.DM(_step_numbers(course, guess, part[:-1], length, speed, acc).T)
         constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
         row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
         row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
@@ -196,10 +223,10 @@ class TubeNLP:
         # ---- limits and boundary ----------------------------------------------------------------------------------------------
         node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
         node_min = -node_max
-        node_min[at_vertex, -1] = node_max[at_vertex, -1] = course.offset[leg[at_vertex]] / length
+        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (course.offset[leg] / part[:-1])[at_vertex]
         for end in (0, -1):
             rest = np.concatenate(
-                [course.vertex[end] / length, np.zeros(2 * axes), [course.offset[end] / length]]
+                [course.vertex[end] / length, np.zeros(2 * axes), [course.offset[end] / part[end]]]
             )
             node_min[end] = node_max[end] = rest
         step_high = np.column_stack(
@@ -211,24 +238,21 @@ class TubeNLP:
 
         # ---- initial guess ----------------------------------------------------------------------------------------------------
         p0, v0, a0 = guess.state[:, 0] / length, guess.state[:, 1] / speed, guess.state[:, 2] / acc
-        place = np.append(guess.place[:, 0], course.offset[-1]) / length
+        place = np.append(guess.place[:, 0], course.offset[-1]) / part
         node_start = np.column_stack([p0, v0, a0, place])
         step_start = np.column_stack(
-            [np.diff(a0, axis=0) / h_guess[:, None], h_guess, guess.place[:, 1:3] / length]
+            [np.diff(a0, axis=0) / h_guess[:, None], h_guess, guess.place[:, 1:3] / part[:-1, None]]
         )
 
         # ---- solve --------------------------------------------------------------------------------------------------------------
-        program = {"x": ca.vertcat(ca.vec(node), ca.vec(step)), "f": merit, "g": constraints}
+        program = {"x": ca.vertcat(ca.vec(w_node), ca.vec(w_step)), "f": merit, "g": constraints}
         solver = ca.nlpsol("solver", "ipopt", program, _options(self))
         lower, upper = (np.append(*pair) for pair in ((node_min, step_low), (node_max, step_high)))
         result = solver(x0=np.append(node_start, step_start), lbx=lower, ubx=upper, lbg=row_min, ubg=row_max)
         stats = solver.stats()
         status, sentence = OUTCOMES.get(stats["return_status"], BROKE_DOWN)
         g = np.array(result["g"]).ravel()
-        if (
-            status is Status.OPTIMAL
-            and not max((g - row_max).max(), (row_min - g).max()) <= 10.0 * FEASIBILITY
-        ):
+        if status is Status.OPTIMAL and not max((g - row_max).max(), (row_min - g).max()) <= 10 * FEASIBILITY:
             status, sentence = BROKE_DOWN
         took, iterations = time.perf_counter() - began, int(stats["iter_count"])
         if status is not Status.OPTIMAL:
@@ -245,18 +269,24 @@ class TubeNLP:
             solve_time=took,
             h=found[:, axes] * second,
             jerk=found[:, :axes] * jerk,
-            place=nodes[:, -1] * length,
+            place=nodes[:, -1] * part,
         )
 
 
-def _step_numbers(course: Course, guess: Guess, length: float, speed: float, acc: float) -> FloatArray:
-    """(N, 4 A + 9) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
+def _step_numbers(
+    course: Course, guess: Guess, part: FloatArray, length: float, speed: float, acc: float
+) -> FloatArray:
+    """(N, 4 A + 11) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
     leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
     room, feed = course.room[leg] * (1.0 - ROUNDING), course.feed[leg]
     room_end, feed_end = room.copy(), feed.copy()
     beside = np.minimum(course.room[:-1], course.room[1:])
     room_end[last] = np.minimum(course.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
     feed_end[last] = np.minimum(feed[last], feed[last + 1])
+    at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
+    pace = np.maximum(
+        at_nodes[:-1], at_nodes[1:]
+    )  # near rest the normal acceleration needs rows as small as the speed
     fastest = np.linalg.norm(course.velocity)  # instead of inf, where nothing else limits
     strongest = 2.0 * np.linalg.norm(course.acceleration)
     return np.column_stack(
@@ -274,6 +304,8 @@ def _step_numbers(course: Course, guess: Guess, length: float, speed: float, acc
             np.minimum(feed, fastest) / speed,
             np.minimum(feed_end, fastest) / speed,
             np.minimum(course.normal_max[leg], strongest) / acc,
+            part / length,
+            np.maximum(pace, pace.max() * 1e-3) / speed,
         ]
     )
 

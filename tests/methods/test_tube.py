@@ -1,0 +1,251 @@
+"""Method `tube`: verified motions that no rounding of the corners beats, the laws of an optimum, refusals and failures."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import planner
+from benchmarks import problems
+from planner.errors import InputError, NotSolvedError
+from planner.feedrate.solution import Status
+from planner.geometry.build import toolpath_from_program
+from planner.machine import Fir
+from planner.methods.optimal import OptimalMethod
+from planner.methods.plan import Plan
+from planner.methods.tube import LEGS_MAX, TubeMethod
+from planner.nc.reader import parse_program
+from planner.tube import course as courses
+from planner.tube.course import Course, courses_of
+from planner.tube.guess import Guess
+from planner.tube.motion import _closing, _integrated
+from planner.tube.nlp import TubeNLP
+
+MACHINE = problems.machine()
+LEG = 4.0  # [mm]: room for a corner, and few steps
+# Local optima found from slightly different numbers, or on slightly different steps, are this close [-]: tube/nlp.py settles at 1e-5
+# per iteration, and steps twice as short gain 1e-5 to 5e-5.
+SAME = 5e-4
+
+
+def corner(degrees: float, leg: float = LEG, first: float = 0.0, scale: float = 1.0):
+    at = np.deg2rad([first, first + degrees])
+    steps = scale * leg * np.stack([np.cos(at), np.sin(at)], axis=1)
+    return problems.polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), feed=scale * problems.FEED)
+
+
+JOBS = {f"corner of {degrees} degrees": corner(degrees) for degrees in (30, 90, 150)}
+JOBS["pentagon"] = problems.pentagon()
+JOBS["line and arcs"] = parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n")
+
+
+@cache
+def tube(name: str) -> Plan:
+    return TubeMethod().plan(JOBS[name], MACHINE)
+
+
+def verified(program, machine=MACHINE) -> Plan:
+    made = TubeMethod().plan(program, machine).require()
+    assert made.verdict.passed, made.verdict.faults
+    assert all(check.limited for check in made.verdict.limits.values())
+    return made
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_jobs_are_verified_and_faster_than_on_rounded_corners(name):
+    made = tube(name).require()
+    assert made.verdict.passed, made.verdict.faults
+    rounded = OptimalMethod().plan(JOBS[name], MACHINE).trajectory.cycle_time
+    assert made.trajectory.cycle_time < rounded
+    said = float(re.search(r"its start, took ([0-9.]+) s", made.sentence)[1])  # sampled more often
+    assert said == pytest.approx(rounded, rel=1e-3)
+    np.testing.assert_allclose(made.trajectory.position[-1], made.toolpath.end[-1], atol=1e-9)
+    assert not made.trajectory.velocity[-1].any()
+    assert (np.diff(made.trajectory.block) >= 0).all()
+    assert set(made.trajectory.block) == set(made.toolpath.block)
+
+
+def test_the_pentagon_takes_what_free_motion_is_known_to_take():
+    """DESIGN 8: 0.957 s by another transcription."""
+    assert tube("pentagon").trajectory.cycle_time == pytest.approx(0.9577, rel=SAME)
+
+
+def test_something_is_at_its_limit_all_the_time():
+    """Along a time-optimal motion some axis is at a limit or the tolerance is used up; without the latter nearly always too."""
+    motion = tube("corner of 90 degrees").trajectory
+    ratio = np.max(
+        [
+            np.abs(motion.velocity).max(axis=1) / 100.0,
+            np.abs(motion.acceleration).max(axis=1) / 2000.0,
+            np.abs(motion.jerk).max(axis=1) / 2e5,
+            motion.feed / problems.FEED,
+        ],
+        axis=0,
+    )
+    assert np.mean(ratio > 0.98) > 0.9
+
+
+def test_scaled_lengths_and_limits_take_the_same_time():
+    k = 7.0
+    large = problems.machine(velocity=100 * k, acceleration=2000 * k, jerk=2e5 * k, tolerance=0.05 * k)
+    made = verified(corner(90, scale=k), large)
+    assert made.trajectory.cycle_time == pytest.approx(
+        tube("corner of 90 degrees").trajectory.cycle_time, rel=SAME
+    )
+
+
+def test_turned_by_a_right_angle_takes_the_same_time():
+    made = verified(corner(90, first=90.0))
+    assert made.trajectory.cycle_time == pytest.approx(
+        tube("corner of 90 degrees").trajectory.cycle_time, rel=SAME
+    )
+
+
+def test_more_tolerance_takes_less_time():
+    wide = verified(corner(90), problems.machine(tolerance=0.2)).trajectory.cycle_time
+    fine = verified(corner(90), problems.machine(tolerance=0.001)).trajectory.cycle_time
+    assert wide < tube("corner of 90 degrees").trajectory.cycle_time * (1 - 5e-3) < fine * (1 - 2e-2)
+
+
+def test_stops_and_dwells_add_up():
+    """Exact stops make courses of their own; a dwell stands between two of them."""
+    job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nY0\nM2\n")
+    made = verified(job)
+    half = verified(corner(90)).trajectory.cycle_time
+    assert made.trajectory.cycle_time == pytest.approx(2 * half + 0.25, rel=SAME)
+    still = ~made.trajectory.velocity.any(axis=1)
+    assert still.sum() >= 249
+    np.testing.assert_allclose(
+        made.trajectory.position[still][1:-1], [[4.0, 4.0, 0.0]] * (still.sum() - 2), atol=1e-9
+    )
+
+
+def test_normal_acceleration_is_kept_and_used():
+    limit = 300.0
+    check = verified(corner(60), problems.machine(normal_acceleration=limit)).verdict.limits[
+        "normal_acceleration"
+    ]
+    assert 0.9 * limit < check.value <= limit * (1 + 1e-6)
+
+
+def test_filters_that_follow_get_their_share_of_the_tolerance():
+    plain = tube("corner of 90 degrees").trajectory.cycle_time
+    made = verified(corner(90), problems.machine(fir=Fir(time_constants=(0.02,))))
+    assert made.trajectory.cycle_time > plain * (1 + 1e-3)
+    assert made.verdict.contour_error_mm < 0.05 / 2 * (
+        1 + 1e-3
+    )  # eq. (20) leaves half where filters are what limits
+
+
+def test_a_lower_feed_holds_on_its_block():
+    job = problems.polyline([[0, 0], [4, 0], [8, 0], [8, 4]], feed=np.array([100.0, 20.0, 100.0]))
+    made = verified(job)
+    assert made.trajectory.feed[made.trajectory.block == 1].max() <= 20.0 * (1 + 1e-6)
+    assert made.trajectory.feed.max() > 30.0
+
+
+# --- what the problem is made of ---------------------------------------------------------------------------------------------
+
+
+def only_course(program) -> Course:
+    (course,) = courses_of(toolpath_from_program(program, MACHINE), MACHINE)
+    return course
+
+
+def test_cutting_a_line_changes_no_leg():
+    whole = only_course(problems.polyline([[0, 0], [4, 0], [4, 4]]))
+    cut = only_course(problems.polyline([[0, 0], [1, 0], [2.5, 0], [4, 0], [4, 4]]))
+    for name in ("length", "base", "drift", "budget", "vertex", "vertex_budget", "feed"):
+        np.testing.assert_allclose(getattr(cut, name), getattr(whole, name), atol=1e-12)
+    assert list(whole.axis) == [0, 1]  # z stands still
+
+
+def test_a_course_is_the_programmed_path():
+    toolpath = toolpath_from_program(JOBS["line and arcs"], MACHINE)
+    course = only_course(JOBS["line and arcs"])
+    legs = np.arange(len(course))
+    np.testing.assert_allclose(course.points(legs, np.zeros(3)), toolpath.start, atol=1e-9)
+    np.testing.assert_allclose(course.points(legs, course.length), toolpath.end, atol=1e-9)
+    step = 1e-6
+    slope = (
+        course.points(legs, course.length / 2 + step) - course.points(legs, course.length / 2 - step)
+    ) / (2 * step)
+    np.testing.assert_allclose(course.tangents(legs, course.length / 2), slope, atol=1e-8)
+
+
+@given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
+@settings(max_examples=200, deadline=None)
+def test_a_step_on_an_arc_bends_away_by_no_more_than_its_share(places, t):
+    """The mean of points on the arc with Bernstein weights is within ARC_SHARE of the budget of the point at the mean place."""
+    course = only_course(JOBS["line and arcs"])
+    for leg in (1, 2):
+        s = np.sort(places) * course.step_max[leg]
+        weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
+        rows = np.full(4, leg)
+        off = weights @ course.points(rows, s) - course.points(rows[:1], (weights @ s)[None])[0]
+        assert np.linalg.norm(off) <= courses.ARC_SHARE * course.budget[leg] * (1 + 1e-9)
+
+
+def test_the_closing_jerks_are_what_the_motion_runs_too_far():
+    course = only_course(corner(90))
+    rng = np.random.default_rng(1)
+    h, jerk = rng.uniform(1e-3, 5e-3, 30), rng.normal(size=(30, 2))
+    steps = _integrated(course, h, jerk - _closing(course, h, jerk))
+    last, tau = (
+        {name: getattr(steps, name)[-1] for name in ("position", "velocity", "acceleration", "jerk")},
+        h[-1],
+    )
+    p, v, a, j = last.values()
+    np.testing.assert_allclose(p + tau * (v + tau * (a / 2 + tau * j / 6)), course.vertex[-1], atol=1e-9)
+    np.testing.assert_allclose(v + tau * (a + tau * j / 2), 0.0, atol=1e-8)
+    np.testing.assert_allclose(a + tau * j, 0.0, atol=1e-6)
+
+
+# --- refusals and failures ---------------------------------------------------------------------------------------------------
+
+
+class NeverAsked(OptimalMethod):
+    def plan(self, *given, **named):
+        raise AssertionError("work was done before the refusal")
+
+
+def test_a_job_that_is_too_long_is_refused_before_any_work():
+    job = problems.star_spiral(LEGS_MAX // 4)
+    points = np.vstack([[0.0, 0.0], *(np.asarray(job.end)[:, :2] for _ in range(5))])
+    with pytest.raises(InputError, match=f"at most {LEGS_MAX}.*split the program"):
+        TubeMethod(start=NeverAsked()).plan(problems.polyline(points), MACHINE)
+    turns = parse_program(f"G21 G17 G90 F6000\nG2 X0 Y0 I50 P{LEGS_MAX}\nM2\n")
+    with pytest.raises(InputError, match="parts of arcs"):
+        TubeMethod(start=NeverAsked()).plan(turns, MACHINE)
+
+
+def test_what_does_not_converge_is_a_status_with_its_lines():
+    job = parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n")
+    made = TubeMethod(solver=TubeNLP(max_iterations=2)).plan(job, MACHINE)
+    assert made.status is Status.ITERATION_LIMIT
+    assert made.sentence.startswith("lines 2 to 3: not converged")
+    assert "max_iterations" in made.sentence
+    assert not made.solved
+    with pytest.raises(NotSolvedError, match="lines 2 to 3"):
+        made.require()
+
+
+def test_settings_and_guesses_are_checked():
+    with pytest.raises(ValueError, match="tol: 0"):
+        TubeNLP(tol=0)
+    with pytest.raises(ValueError, match=r"Guess\.h"):
+        Guess(leg=np.zeros(1), h=np.zeros(1), state=np.zeros((2, 3, 2)), place=np.zeros((1, 4)))
+
+
+def test_it_has_a_name():
+    made = planner.plan(dataclasses.replace(corner(90)), MACHINE, method="tube")
+    assert made.method == "tube"
+    assert made.trajectory.cycle_time == pytest.approx(
+        tube("corner of 90 degrees").trajectory.cycle_time, rel=1e-9
+    )

@@ -11,12 +11,13 @@ control points
                |v_i|, |v_i + a_i h/2| <= v,    |a_i| <= a,    |j_i| <= j               per axis
                |v_i|, |v_i + a_i h/2| <= F                                             in the norm
                |c_k - P(s_k)| <= room,    s3 - s0 <= step_max (arcs)                   the tolerance, both sides, in order
-               |v x a| <= a_n |v|                                                      at nodes and half-way, if limited
+               |a - u v| <= a_n                                                        for some u, at places of a step, if limited
                node at a vertex: s = the vertex;     v = a = 0, p = the vertex at both ends.
 
-What holds for the control points holds for the whole step: acceleration is linear and velocity a parabola with the Bezier ordinates
-v_i, v_i + a_i h/2, v_{i+1}, so all limits but the normal acceleration hold at every time. With the Bernstein weights B_k the motion
-sum B_k c_k runs along P(sum B_k s_k) with a place that never goes back, and
+The smallest |a - u v| over u is the normal acceleration; rows of this kind have good derivatives down to rest, |v x a| <= a_n |v| has
+not. What holds for the control points holds for the whole step: acceleration is linear and velocity a parabola with the Bezier
+ordinates v_i, v_i + a_i h/2, v_{i+1}, so all limits but the normal acceleration hold at every time. With the Bernstein weights B_k the
+motion sum B_k c_k runs along P(sum B_k s_k) with a place that never goes back, and
 
     |sum B_k c_k - P(sum B_k s_k)| <= max |c_k - P(s_k)| + kappa (s3 - s0)^2/8
 
@@ -53,6 +54,9 @@ LONGER = 4.0
 # ones drop early, hug the limits and trickle (pentagon: more than 300 iterations instead of 112).
 SLOWER = (1.2, 1.5, 1.0)
 BARRIER = 0.1
+# Where normal acceleration is limited it is watched at these places of every step [-], and steps become no more than this much longer:
+# with the others' freedom one step reaches round the whole corner, with twice the limit between two places.
+WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
 # The search ends when the time changes by less than this share in each of so many iterations [-], with all rows kept.
 SETTLED, SETTLED_ITERATIONS = 1e-5, 4
 # It may also come to rest far from any optimum: what is slower than the guess by more than this share [-] does not count.
@@ -141,13 +145,19 @@ class TubeNLP:
         speed, acc, jerk = length / second, length / second**2, length / second**3
         v_max, a_max, j_max = course.velocity / speed, course.acceleration / acc, course.jerk / jerk
 
+        watched = len(WATCHED) if np.isfinite(course.normal_max).any() else 0
+
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
         part = (course.length / np.bincount(leg))[np.append(leg, leg[-1])]
         unit = ca.DM(part / length).T
-        w_node, w_step = ca.MX.sym("node", 3 * axes + 1, steps + 1), ca.MX.sym("step", axes + 3, steps)
+        w_node, w_step = (
+            ca.MX.sym("node", 3 * axes + 1, steps + 1),
+            ca.MX.sym("step", axes + 3 + watched, steps),
+        )
         node = ca.vertcat(w_node[:-1, :], w_node[-1, :] * unit)
-        step = ca.vertcat(w_step[:-2, :], w_step[-2:, :] * ca.repmat(unit[:, :-1], 2, 1))
+        inner = w_step[axes + 1 : axes + 3, :] * ca.repmat(unit[:, :-1], 2, 1)
+        step = ca.vertcat(w_step[: axes + 1, :], inner, w_step[axes + 3 :, :])
 
         # ---- objective ------------------------------------------------------------------------------------------------------
         h_guess = guess.h / second
@@ -174,6 +184,7 @@ class TubeNLP:
             "feed_end",
             "normal",
             "part",
+            "pace",
         )
         begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace = map(
             ca.SX.sym, scalars
@@ -183,11 +194,6 @@ class TubeNLP:
             turned = rate * (place - begin)
             circle = ca.cos(turned) * e1 + ca.sin(turned) * e2
             return ca.sumsqr(point - base - drift * (place - begin) - radius * circle)
-
-        def excess(velocity: Any, acceleration: Any) -> Any:
-            """(|v x a| / normal)^2 - |v|^2"""
-            speed_sq, along = ca.sumsqr(velocity), ca.dot(velocity, acceleration)
-            return (speed_sq * ca.sumsqr(acceleration) - along**2) / normal**2 - speed_sq
 
         ordinate = v + a * h / 2
         rows: list[tuple[Any, float, float]] = [
@@ -204,12 +210,14 @@ class TubeNLP:
             )
         if (course.curvature > 0).any():
             rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
-        if np.isfinite(course.normal_max).any():
-            middle = excess(v + h * (a / 2 + h * j / 8), a + h * j / 2)
-            rows.append((ca.vertcat(middle, excess(v1, a1)) / pace**2, -np.inf, 0.0))
+        along = ca.SX.sym("along", watched)  # u of the places that are watched, times the pace
+        for k, q in enumerate(WATCHED[:watched]):
+            velocity, acceleration = v + h * q * (a + h * q * j / 2), a + h * q * j
+            across = acceleration - along[k] * velocity / pace
+            rows.append((ca.sumsqr(across) / normal**2, -np.inf, 1.0))
 
         # ---- constraints of all steps ---------------------------------------------------------------------------------------
-        states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2)]
+        states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2, along)]
         numbers = ca.vertcat(
             *(base, drift, e1, e2),
             *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace),
@@ -229,11 +237,12 @@ class TubeNLP:
                 [course.vertex[end] / length, np.zeros(2 * axes), [course.offset[end] / part[end]]]
             )
             node_min[end] = node_max[end] = rest
+        longer = LONGER_WATCHED if watched else LONGER
         step_high = np.column_stack(
-            [np.tile(j_max, (steps, 1)), h_guess * LONGER, np.full((steps, 2), np.inf)]
+            [np.tile(j_max, (steps, 1)), h_guess * longer, np.full((steps, 2 + watched), np.inf)]
         )
         step_low = np.column_stack(
-            [np.tile(-j_max, (steps, 1)), h_guess / LONGER, np.full((steps, 2), -np.inf)]
+            [np.tile(-j_max, (steps, 1)), h_guess / LONGER, np.full((steps, 2 + watched), -np.inf)]
         )
 
         # ---- initial guess ----------------------------------------------------------------------------------------------------
@@ -241,7 +250,12 @@ class TubeNLP:
         place = np.append(guess.place[:, 0], course.offset[-1]) / part
         node_start = np.column_stack([p0, v0, a0, place])
         step_start = np.column_stack(
-            [np.diff(a0, axis=0) / h_guess[:, None], h_guess, guess.place[:, 1:3] / part[:-1, None]]
+            [
+                np.diff(a0, axis=0) / h_guess[:, None],
+                h_guess,
+                guess.place[:, 1:3] / part[:-1, None],
+                np.tile(_along(guess)[:, None] / acc, (1, watched)),
+            ]
         )
 
         # ---- solve --------------------------------------------------------------------------------------------------------------
@@ -305,9 +319,22 @@ def _step_numbers(
             np.minimum(feed_end, fastest) / speed,
             np.minimum(course.normal_max[leg], strongest) / acc,
             part / length,
-            np.maximum(pace, pace.max() * 1e-3) / speed,
+            pace / speed,
         ]
     )
+
+
+def _pace(guess: Guess) -> FloatArray:
+    """(N,) speed of each step [mm/s]; at most a thousand times below the fastest."""
+    at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
+    pace: FloatArray = np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * at_nodes.max())
+    return pace
+
+
+def _along(guess: Guess) -> FloatArray:
+    """(N,) pace times u = v.a/|v|^2 in the middle of each step [mm/s2]."""
+    v, a = (guess.state[:-1, k] / 2 + guess.state[1:, k] / 2 for k in (1, 2))
+    return _pace(guess) * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * _pace(guess)) ** 2)
 
 
 def _options(settings: TubeNLP) -> dict[str, Any]:

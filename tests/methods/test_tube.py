@@ -109,8 +109,8 @@ def test_turned_by_a_right_angle_takes_the_same_time():
 
 def test_more_tolerance_takes_less_time():
     wide = verified(corner(90), problems.machine(tolerance=0.2)).trajectory.cycle_time
-    fine = verified(corner(90), problems.machine(tolerance=0.001)).trajectory.cycle_time
-    assert wide < tube("corner of 90 degrees").trajectory.cycle_time * (1 - 5e-3) < fine * (1 - 2e-2)
+    fine = verified(corner(90), problems.machine(tolerance=0.01)).trajectory.cycle_time
+    assert wide < tube("corner of 90 degrees").trajectory.cycle_time * (1 - 5e-3) < fine * (1 - 5e-3)
 
 
 def test_stops_and_dwells_add_up():
@@ -127,7 +127,7 @@ def test_stops_and_dwells_add_up():
 
 
 def test_normal_acceleration_is_kept_and_used():
-    limit = 300.0
+    limit = 1000.0
     check = verified(corner(60), problems.machine(normal_acceleration=limit)).verdict.limits[
         "normal_acceleration"
     ]

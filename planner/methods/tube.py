@@ -1,8 +1,8 @@
 """Method `tube`: geometry and feed found together, anywhere inside the tolerance: the physical limit, for short jobs.
 
 All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (tube/nlp.py), so
-nothing is given away between the two; what is still lost against the true limit is the step (1e-4) and what a better local optimum
-would gain. It takes seconds per corner where the others take milliseconds, hence `LEGS_MAX`.
+nothing is given away between the two; what is still lost against the true limit is the step (5e-5) and what a better local optimum
+would gain. It takes about a second per corner where the others take milliseconds, hence `LEGS_MAX`.
 
 1. The path falls into courses between full stops, each a problem of its own (tube/course.py).
 2. Method `optimal` makes the motion from which the search starts (tube/guess.py).
@@ -19,6 +19,7 @@ import numpy as np
 from planner.arrays import Array, FloatArray
 from planner.axis_motion import AxisMotion
 from planner.errors import InputError
+from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -32,7 +33,8 @@ from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of
 from planner.tube.nlp import TubeNLP
 
-# A job may have this many legs (arcs count as many as the steps they need): some minutes of computing, 2 GB.
+# A job may have this many legs (arcs count as many as the steps they need). A spiral of 400 chords takes two minutes and 0.44 GB, a
+# tenth of the limit seconds; time and memory grow a little faster than the legs.
 LEGS_MAX = 1000
 # The start is sampled at this share of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
@@ -67,7 +69,9 @@ class TubeMethod:
             stopping = stop_time(toolpath, machine)
         with stages.stage("start"):
             start = self.start.plan(program, _often_sampled(machine, toolpath, stopping), tolerance)
-        status, sentence, steps, places = start.status, start.sentence, [], []
+        status, sentence = start.status, start.sentence
+        steps: list[Steps] = []
+        places: list[FloatArray] = []
         with stages.stage("solve") as report:
             for done, course in enumerate(courses):
                 if start.trajectory is None:
@@ -75,10 +79,12 @@ class TubeMethod:
                 window, vertex_time = _passed(course, start.trajectory, toolpath)
                 guess = guess_from(course, window, vertex_time)
                 solution = self.solver.solve(course, guess)
-                status, sentence = solution.status, solution.sentence
                 if solution.h is None or solution.place is None:
-                    sentence = f"lines {_lines(course, toolpath)}: {sentence}"
+                    status = solution.status
+                    sentence = f"lines {_lines(course, toolpath)}: {solution.sentence}"
                     break
+                if not steps or solution.status is Status.ACCEPTABLE:  # the worse one stands for all courses
+                    status, sentence = solution.status, solution.sentence
                 steps.append(steps_of(course, guess, solution))
                 places.append((solution.place[:-1] + solution.place[1:]) / 2)
                 report((done + 1) / len(courses))

@@ -22,7 +22,7 @@ from planner.arrays import Array, FloatArray, freeze
 from planner.trajectory import Trajectory
 from planner.tube.course import Course
 
-# Twice as many find motions 1e-5 to 5e-5 faster, half as many lose 1e-3 and more (single corners, pentagon; peers' machine).
+# Twice as many find motions 2e-5 to 5e-5 faster in three times the time; half as many do not converge (corner of 90 degrees, pentagon).
 STEPS_PER_UNIT = 4.0
 STEPS_OF_LEG = 2.0
 # Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.

@@ -33,9 +33,9 @@ from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of
 from planner.tube.nlp import TubeNLP
 
-# A job may have this many legs (arcs count as many as the steps they need). A spiral of 400 chords takes two minutes and 0.44 GB, a
-# tenth of the limit seconds; time and memory grow a little faster than the legs.
-LEGS_MAX = 1000
+# A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
+# 7 s, one of 400 two minutes and 0.44 GB.
+LEGS_MAX = 500
 # The start is sampled at this share of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
 # Of the start, what is slower than this share of its fastest counts as standing [-].

@@ -30,7 +30,8 @@ from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
-from planner.path_grid import evaluate, make_grid
+from planner.path_grid import divide, evaluate, grade
+from planner.path_rows import cut_path
 
 # Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is then 0.6e-3 to 3e-3
 # above that of an infinitely fine grid on the shared jobs (tests/path): first order in the step, because u is constant on it.
@@ -128,23 +129,26 @@ def sample_path(
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
     if machine.normal_acceleration is not None:
         acceleration = np.minimum(acceleration, machine.normal_acceleration)
-    element, w0, w1, segment, last = make_grid(
-        table.legs,
-        table.corners,
+    rows = cut_path(
+        *table,
         path.legs.first,
-        path.legs.offset,
+        path.legs.place,
         path.d_in,
         path.d_out,
+        path.d > 0.0,
         path.joint == Joint.STOP,
         _corner_breaks(path),
+        path.run,
+        path.spline.first,
         path.toolpath.feed,
         velocity,
         acceleration,
-        jerk,
-        resolution,
         longest,
-        shortest,
     )
+    rows = divide(*table, rows, path.toolpath.feed, velocity, acceleration, jerk, resolution, shortest)
+    if third_order:
+        rows = grade(table.legs, rows)
+    element, w0, w1, segment, last = (rows[name] for name in ("curve", "w0", "w1", "segment", "last"))
     ends = np.flatnonzero(last)  # the points that close a piece
     piece = np.concatenate([[0], ends + 1])
     stop = np.flatnonzero(path.joint == Joint.STOP)
@@ -184,7 +188,7 @@ def _evaluated(
         "kappa_left",
         "kappa_right",
     )
-    columns = evaluate(table.legs, table.corners, element, w0, w1, segment, last, *limits)
+    columns = evaluate(*table, element, w0, w1, segment, last, *limits)
     return dict(zip(names, columns, strict=True))
 
 
@@ -220,7 +224,7 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
     """
     table = samples.table
     element = samples.element[interval]
-    if (element < 0).any() or table.legs["round"][np.maximum(element, 0)].any():
+    if not straight(table.legs, element).all():
         raise ValueError("insert_points: only straight intervals can be split")
     after = interval + 1
     ds = s - samples.s[interval]
@@ -254,6 +258,12 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
         kappa_left=put(samples.kappa_left, 0.0),
         kappa_right=put(samples.kappa_right, 0.0),
     )
+
+
+def straight(legs: Array, element: Array) -> Array:
+    """True for the elements that are the free part of a straight leg."""
+    leg = (element >= 0) & (element < len(legs))
+    return leg & ~legs["round"][np.where(leg, element, 0)]
 
 
 def _corner_breaks(path: SmoothPath) -> FloatArray:

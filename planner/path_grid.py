@@ -1,7 +1,7 @@
 """The kernels behind path.py: where the grid points go, and what the path is there.
 
-`make_grid` walks over the elements of the path and halves their intervals until the errors of path.py's text are small enough;
-`evaluate` then fills in arc length, derivatives, margins and effective curvatures. Both are linear in the number of points.
+`divide` halves the rows of path_rows.py until the errors of path.py's text are small enough, `grade` until no interval is much longer
+than its neighbours; `evaluate` then fills in arc length, derivatives, margins and effective curvatures. Both are linear in the number of points.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from planner.corners.blend import shape_at
-from planner.corners.elements import element_length, element_point, to_arc_length
+from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
+from planner.path_rows import grown, set_row
 
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
 MARGIN_SAFETY = 1.25
@@ -18,14 +18,10 @@ MARGIN_SAFETY = 1.25
 JERK_SHARE = 5.0
 # Halvings of one interval at most; 2^-20 of a corner is below a nanometre.
 HALVINGS_MAX = 20
-# Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
-ARC_STEP = np.pi / 8
-# ... and with so many at least, so that a short arc between two stops can start and stop.
-ARC_PARTS_MIN = 4
-# Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
-FREE_PART_MIN = 1e-9
 # Intervals may be this share of their distance from the nearest full stop [-], for solvers of third order.
 REST_GROWTH = 0.5
+# Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by this share of the distance.
+STEEPEST, SLOPE = 4.0, 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -70,14 +66,14 @@ def _fastest(point, feed, velocity, acceleration, jerk):
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(legs, corners, element, wa, wb, feed, velocity, acceleration, jerk, work, points):
+def _measure(legs, corners, spans, element, wa, wb, feed, velocity, acceleration, jerk, work, points):
     """Evaluate an interval at left end, middle and right end into points (3, 4, A); returns its interpolation error."""
     w_ref = 0.5 * (wa + wb)
     x_ends = 0.0
     x, u, speed = 0.0, 0.0, 0.0
     for j in range(3):
         w = wa if j == 0 else (w_ref if j == 1 else wb)
-        element_point(legs, corners, element, w, w_ref, work, points[j])
+        element_point(legs, corners, spans, element, w, w_ref, work, points[j])
         speed_here = to_arc_length(points[j])
         x_here, u_here = _fastest(points[j], feed, velocity, acceleration, jerk)
         if j == 1:
@@ -89,7 +85,7 @@ def _measure(legs, corners, element, wa, wb, feed, velocity, acceleration, jerk,
 
 @njit(cache=True, error_model="numpy")
 def _subdivide(
-    legs, corners, element, wa, wb, feed, velocity, acceleration, jerk, resolution, rest, work, points, out
+    legs, corners, spans, element, wa, wb, feed, velocity, acceleration, jerk, resolution, rest, work, points, out
 ):
     """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number.
 
@@ -105,7 +101,7 @@ def _subdivide(
     while depth > 0:
         right = stack[depth - 1]
         error = _measure(
-            legs, corners, element, left, right, feed, velocity, acceleration, jerk, work, points
+            legs, corners, spans, element, left, right, feed, velocity, acceleration, jerk, work, points
         )
         share = (0.5 * (left + right) - wa) / (wb - wa)
         away = from_a + (from_b - from_a) * share
@@ -124,169 +120,100 @@ def _subdivide(
 
 
 @njit(cache=True, error_model="numpy")
-def _corner_parameter(corners, k, z):
-    """w of corner k whose matched point lies z [mm] after the vertex, Y(w) - X(w) = z (corners/blend.py)."""
-    wa, wb = 0.0, 1.0
-    for _ in range(60):
-        w = 0.5 * (wa + wb)
-        X, Y = shape_at(corners[k], w, w)
-        if Y[0] - X[0] < z:
-            wa = w
-        else:
-            wb = w
-    return 0.5 * (wa + wb)
+def divide(legs, corners, spans, rows, feed, velocity, acceleration, jerk, resolution, shortest):
+    """The rows of path_rows.py with those on curves divided into the intervals of the grid.
 
-
-@njit(cache=True, error_model="numpy")
-def _grown(array, needed):
-    if needed <= len(array):
-        return array
-    out = np.empty(max(2 * len(array), needed), array.dtype)
-    for i in range(len(array)):  # a slice assignment costs 4 s of compilation for its error message
-        out[i] = array[i]
-    return out
-
-
-@njit(cache=True, error_model="numpy")
-def _arc_feed(leg, feed, velocity, acceleration):
-    """A bound of the feed on an arc: programmed, what all axes reach together, and what they can turn with."""
-    v_sq, a_sq = 0.0, 0.0
-    for k in range(len(velocity)):
-        v_sq += velocity[k] * velocity[k]
-        a_sq += acceleration[k] * acceleration[k]
-    return min(feed, np.sqrt(v_sq), np.sqrt(np.sqrt(a_sq) / (leg.radius * leg.rate * leg.rate)))
-
-
-@njit(cache=True, error_model="numpy")
-def make_grid(
-    legs,
-    corners,
-    first,
-    offset,
-    d_in,
-    d_out,
-    is_stop,
-    breaks,
-    feed,
-    velocity,
-    acceleration,
-    jerk,
-    resolution,
-    longest,
-    shortest,
-):
-    """Intervals of the whole path in order; a closing row (w0 = w1) where a piece ends.
-
-    longest  : duration of an interval on arcs at the fastest feed [s]
-    shortest : length of the first interval after a full stop [mm]; both inf for second-order solvers
-
-    Returns element, w0, w1, segment (P,) and `last` (P,), True on closing rows.
+    shortest : length of the first interval after a full stop [mm]; inf for second-order solvers
     """
     axes = len(velocity)
     work = np.empty((2, 4, axes))
     points = np.empty((3, 4, axes))
     ends = np.empty(1 << 14)
-    size = 8 * len(legs) + 64
-    element, segment = np.empty(size, np.int64), np.empty(size, np.int64)
-    w0, w1 = np.empty(size), np.empty(size)
-    last = np.empty(size, np.bool_)
+    out = np.empty(2 * len(rows) + 64, rows.dtype)
     n = 0
-    since, to_next = (
-        0.0,
-        0.0,
-    )  # distance of the leg's start from the last full stop, and of the next stop from it
-    for leg in range(len(legs)):
-        length = legs[leg].length
-        if is_stop[leg]:
-            since, to_next = 0.0, 0.0
-            for ahead in range(leg, len(legs)):
-                to_next += legs[ahead].length
-                if is_stop[ahead + 1]:
-                    break
-        curved = legs[leg].round
-        # The leg's free part, then the corner behind it: spans (curve, wa, wb, seg) cut at the block boundaries.
-        for half in range(3):  # 0: free part, 1: corner before its apex, 2: after it
-            k = leg + 1
-            if half == 0:
-                if length - d_out[leg] - d_in[k] <= FREE_PART_MIN * length:
-                    continue
-            elif d_in[k] <= 0.0:
-                continue
-            owner = k if half == 2 else leg
-            for seg in range(first[owner], first[owner + 1]):
-                begin = offset[seg]
-                end = offset[seg + 1] if seg + 1 < first[owner + 1] else legs[owner].length
-                if half == 0:
-                    wa, wb = max(begin, d_out[leg]), min(end, length - d_in[k])
-                    if wb - wa <= FREE_PART_MIN * length:
-                        continue
-                    curve = leg
-                elif half == 1:
-                    if end <= length - d_in[k]:
-                        continue
-                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d_in[k] else 0.0
-                    wb = _corner_parameter(corners, k, end - length) if seg + 1 < first[owner + 1] else 0.5
-                    curve = ~k
-                else:
-                    if begin >= d_out[k]:
-                        break
-                    wa = _corner_parameter(corners, k, begin) if seg > first[owner] else 0.5
-                    wb = _corner_parameter(corners, k, end) if end < d_out[k] else 1.0
-                    curve = ~k
-                parts = 1
-                if half == 0 and curved:
-                    reach = longest * _arc_feed(legs[leg], feed[seg], velocity, acceleration)
-                    parts = max(abs(legs[leg].rate) * (wb - wa) / ARC_STEP, (wb - wa) / reach, ARC_PARTS_MIN)
-                    parts = int(np.ceil(parts))
-                cut = 0
-                left = wa
-                while left < wb:
-                    right = wb
-                    if half == 0:
-                        cut += 1
-                        if cut < parts:
-                            right = wa + (wb - wa) * cut / parts
-                    else:
-                        while cut < breaks.shape[1] and breaks[k, cut] <= left:
-                            cut += 1
-                        if cut < breaks.shape[1]:
-                            right = min(wb, breaks[k, cut])
-                    count = 1
-                    ends[0] = right
-                    if half > 0 or curved:
-                        if half == 0:
-                            rest = (since + left, since + right, to_next, shortest)
-                        else:
-                            vertex = since + length
-                            X, Y = shape_at(corners[k], left, left)
-                            from_left = vertex + Y[0] - X[0]
-                            X, Y = shape_at(corners[k], right, right)
-                            rest = (from_left, vertex + Y[0] - X[0], to_next, shortest)
-                        count = _subdivide(
-                            legs, corners, curve, left, right, feed[seg], velocity, acceleration, jerk, resolution,
-                            rest, work, points, ends,
-                        )  # fmt: skip
-                    if n + count + 1 > len(w0):
-                        element, segment = _grown(element, n + count + 1), _grown(segment, n + count + 1)
-                        w0, w1, last = (
-                            _grown(w0, n + count + 1),
-                            _grown(w1, n + count + 1),
-                            _grown(last, n + count + 1),
-                        )
-                    for c in range(count):
-                        element[n], segment[n], last[n] = curve, seg, False
-                        w0[n], w1[n] = left, ends[c]
-                        left = ends[c]
-                        n += 1
-        since += length
-        if is_stop[leg + 1]:
-            if n + 1 > len(w0):
-                element, segment = _grown(element, n + 1), _grown(segment, n + 1)
-                w0, w1, last = _grown(w0, n + 1), _grown(w1, n + 1), _grown(last, n + 1)
-            element[n], segment[n], last[n] = element[n - 1], segment[n - 1], True
-            w0[n], w1[n] = w1[n - 1], w1[n - 1]
+    since, beyond = 0.0, 0.0  # the last full stop and the next one
+    fresh = True
+    for r in range(len(rows)):
+        row = rows[r]
+        if fresh:
+            since, ahead = row.begin, r
+            while not rows[ahead].last:
+                ahead += 1
+            beyond = rows[ahead].begin
+        fresh = row.last
+        count = 1
+        ends[0] = row.w1
+        if not row.last and not is_straight(legs, row.curve):
+            rest = (row.begin - since, row.end - since, beyond - since, shortest)
+            count = _subdivide(
+                legs, corners, spans, row.curve, row.w0, row.w1, feed[row.segment], velocity, acceleration, jerk, resolution,
+                rest, work, points, ends,
+            )  # fmt: skip
+        out = grown(out, n + count)
+        left = row.w0
+        for c in range(count):
+            _set_part(out[n], row, left, ends[c])
+            left = ends[c]
             n += 1
-    return element[:n].copy(), w0[:n].copy(), w1[:n].copy(), segment[:n].copy(), last[:n].copy()
+    return out[:n].copy()
+
+
+@njit(cache=True, error_model="numpy")
+def _set_part(out, row, w0, w1):
+    """The part of a row from w0 to w1."""
+    rate = (row.end - row.begin) / (row.w1 - row.w0) if row.w1 > row.w0 else 0.0
+    begin, end = row.begin + rate * (w0 - row.w0), row.begin + rate * (w1 - row.w0)
+    set_row(out, row.curve, row.segment, w0, w1, begin, end, row.last)
+
+
+@njit(cache=True, error_model="numpy")
+def grade(legs, rows):
+    """Halve intervals on curves until they are no longer than `STEEPEST` times their neighbours plus `SLOPE` times the distance from
+    them: between a short and a long interval the kinematics of a jerk-limited profile are far from linear."""
+    size = np.empty(len(rows) + 1)  # at the start of each row; a closing row parts what is before it from what is after it
+    for r in range(len(rows)):
+        here = rows[r].end - rows[r].begin
+        if rows[r].last:
+            size[r] = np.inf if r == 0 else rows[r - 1].end - rows[r - 1].begin
+        elif r == 0 or rows[r - 1].last:
+            size[r] = here
+        else:
+            size[r] = min(here, rows[r - 1].end - rows[r - 1].begin)
+    size[len(rows)] = np.inf
+    for r in range(1, len(rows)):
+        if not rows[r - 1].last:
+            size[r] = min(size[r], size[r - 1] + SLOPE * (rows[r - 1].end - rows[r - 1].begin))
+    for r in range(len(rows) - 2, -1, -1):
+        if not rows[r].last:
+            size[r] = min(size[r], size[r + 1] + SLOPE * (rows[r].end - rows[r].begin))
+    out = np.empty(2 * len(rows), rows.dtype)
+    stack = np.empty(HALVINGS_MAX + 1)
+    n = 0
+    for r in range(len(rows)):
+        row = rows[r]
+        if row.last or is_straight(legs, row.curve):
+            out = grown(out, n + 1)
+            _set_part(out[n], row, row.w0, row.w1)
+            n += 1
+            continue
+        stack[0] = row.w1
+        depth = 1
+        left = row.w0
+        whole = row.end - row.begin
+        while depth > 0:
+            right = stack[depth - 1]
+            a, b = (left - row.w0) / (row.w1 - row.w0), (right - row.w0) / (row.w1 - row.w0)
+            allowed = min(size[r] + SLOPE * whole * a, size[r + 1] + SLOPE * whole * (1.0 - b))
+            if (b - a) * whole > STEEPEST * allowed and depth <= HALVINGS_MAX:
+                stack[depth] = 0.5 * (left + right)
+                depth += 1
+            else:
+                out = grown(out, n + 1)
+                _set_part(out[n], row, left, right)
+                n += 1
+                depth -= 1
+                left = right
+    return out[:n].copy()
 
 
 @njit(cache=True, error_model="numpy")
@@ -311,7 +238,7 @@ def _effective_curvature(points):
 
 
 @njit(cache=True, error_model="numpy")
-def evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acceleration, jerk):
+def evaluate(legs, corners, spans, element, w0, w1, segment, last, feed, velocity, acceleration, jerk):
     """Arc length, position, derivatives and margins at all points; see `PathSamples`."""
     points, axes = len(w0), len(velocity)
     s = np.zeros(points)
@@ -335,6 +262,7 @@ def evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acce
         error = _measure(
             legs,
             corners,
+            spans,
             element[i],
             w0[i],
             w1[i],
@@ -358,7 +286,7 @@ def evaluate(legs, corners, element, w0, w1, segment, last, feed, velocity, acce
             d2_left[i + 1, k], d3_left[i + 1, k] = right[2, k], right[3, k]
         fresh = False
         w_ref = 0.5 * (w0[i] + w1[i])
-        h = element_length(legs, corners, element[i], w0[i], w1[i], w_ref, left)
+        h = element_length(legs, corners, spans, element[i], w0[i], w1[i], w_ref, left)
         s[i + 1] = max(
             s[i] + h, np.nextafter(s[i], np.inf)
         )  # metres into a job h may be below the last digit of s

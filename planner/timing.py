@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
-from planner.corners.elements import element_length, element_point, to_arc_length
+from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
 from planner.errors import InputError
 from planner.feedrate.solution import FeedrateSolution
 from planner.path import PathSamples
@@ -229,9 +229,10 @@ def _sample_times(end: float, dt: float) -> FloatArray:
 def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     samples, law = motion.samples, motion.law
     toolpath = samples.path.toolpath
-    *columns, point = _sample(
+    *columns, point, parameter = _sample(
         samples.table.legs,
         samples.table.corners,
+        samples.table.spans,
         times,
         law.t,
         law.s,
@@ -248,7 +249,7 @@ def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
         samples.position,
     )
     names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
-    segment = samples.segment[point]
+    segment = _segment(samples, point, parameter)
     return Trajectory(
         axes=toolpath.axes,
         dt=dt,
@@ -259,20 +260,33 @@ def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     )
 
 
+def _segment(samples: PathSamples, point: Array, parameter: FloatArray) -> Array:
+    """The toolpath segment of each sample; an interval of a span may cover several."""
+    segment = samples.segment[point]
+    span = samples.element[point] - len(samples.table.legs)
+    at = np.flatnonzero(span >= 0)
+    if len(at):
+        spans = samples.table.spans[span[at]]
+        place = spans["begin"] + spans["width"] * parameter[at]
+        ends = samples.path.legs.place
+        segment[at] = np.clip(np.searchsorted(ends, place, side="right") - 1, 0, len(ends) - 2)
+    return segment
+
+
 @njit(cache=True, error_model="numpy")
-def _invert(legs, corners, element, w0, w1, h, work, out, c):
+def _invert(legs, corners, spans, element, w0, w1, h, work, out, c):
     """Quintic c (6,) with w = w0 + (w1 - w0) sum c_n q^n, q = ds/h, matching w(s) and two derivatives at both ends.
 
     Returns whether it is accurate to `LENGTH_ROUNDING` in the middle, where it is worst.
     """
     c[:] = 0.0
     c[1] = 1.0
-    if element >= 0 and not legs[element].round:
+    if is_straight(legs, element):
         return True
     w_ref, dw = 0.5 * (w0 + w1), w1 - w0
     slope, bend = np.empty(2), np.empty(2)  # dw/dq and d2w/dq2 over dw, at both ends
     for e in range(2):
-        element_point(legs, corners, element, w1 if e else w0, w_ref, work, out)
+        element_point(legs, corners, spans, element, w1 if e else w0, w_ref, work, out)
         speed_sq, along = 0.0, 0.0
         for k in range(out.shape[1]):
             speed_sq += out[1, k] * out[1, k]
@@ -283,7 +297,7 @@ def _invert(legs, corners, element, w0, w1, h, work, out, c):
     p, v, a = 1.0 - c[1] - c[2], slope[1] - c[1] - 2.0 * c[2], bend[1] - 2.0 * c[2]
     c[3], c[4], c[5] = 10.0 * p - 4.0 * v + 0.5 * a, -15.0 * p + 7.0 * v - a, 6.0 * p - 3.0 * v + 0.5 * a
     middle = w0 + dw * _horner(c, 0.5)
-    return abs(element_length(legs, corners, element, w0, middle, w_ref, out) / h - 0.5) <= LENGTH_ROUNDING
+    return abs(element_length(legs, corners, spans, element, w0, middle, w_ref, out) / h - 0.5) <= LENGTH_ROUNDING
 
 
 @njit(cache=True, error_model="numpy")
@@ -292,14 +306,14 @@ def _horner(c, q):
 
 
 @njit(cache=True, error_model="numpy")
-def _refine(legs, corners, element, w0, w1, w, ds, h, work, out):
+def _refine(legs, corners, spans, element, w0, w1, w, ds, h, work, out):
     """Solve for the arc length ds from w0, starting from a good w: the inverse function's series to second order."""
     w_ref = 0.5 * (w0 + w1)
     for _ in range(REFINE_STEPS):
-        miss = element_length(legs, corners, element, w0, w, w_ref, out) - ds
+        miss = element_length(legs, corners, spans, element, w0, w, w_ref, out) - ds
         if abs(miss) <= LENGTH_ROUNDING * h:
             break
-        element_point(legs, corners, element, w, w_ref, work, out)
+        element_point(legs, corners, spans, element, w, w_ref, work, out)
         speed_sq, along = 0.0, 0.0
         for k in range(out.shape[1]):
             speed_sq += out[1, k] * out[1, k]
@@ -325,14 +339,14 @@ def _last_not_after(values, limit, first, last):
 
 @njit(cache=True, error_model="numpy")
 def _sample(
-    legs, corners, times, t, s_law, feed, acc_s, jerk_s, run, end, piece, s, element, w0, w1, position
+    legs, corners, spans, times, t, s_law, feed, acc_s, jerk_s, run, end, piece, s, element, w0, w1, position
 ):  # fmt: skip
-    """Positions and derivatives at ascending times (T,); also the grid point whose interval each lies in."""
+    """Positions and derivatives at ascending times (T,); also the grid point whose interval each lies in, and its parameter there."""
     count, axes = len(times), position.shape[1]
     out_position, out_velocity = np.empty((count, axes)), np.empty((count, axes))
     out_acceleration, out_jerk = np.empty((count, axes)), np.empty((count, axes))
     out_s, out_feed = np.empty(count), np.empty(count)
-    point = np.empty(count, np.int64)
+    point, parameter = np.empty(count, np.int64), np.empty(count)
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     inverse, inverse_of, exact = np.zeros(6), -1, False
     m = _last_not_after(t, times[0], 0, len(t) - 1)
@@ -359,12 +373,13 @@ def _sample(
         h = s[i + 1] - s[i]
         ds = min(max(s_here - s[i], 0.0), h)
         if inverse_of != i:
-            exact = _invert(legs, corners, element[i], w0[i], w1[i], h, work, here, inverse)
+            exact = _invert(legs, corners, spans, element[i], w0[i], w1[i], h, work, here, inverse)
             inverse_of = i
         w = w0[i] + (w1[i] - w0[i]) * _horner(inverse, ds / h)
         if not exact:
-            w = _refine(legs, corners, element[i], w0[i], w1[i], w, ds, h, work, here)
-        element_point(legs, corners, element[i], w, 0.5 * (w0[i] + w1[i]), work, here)
+            w = _refine(legs, corners, spans, element[i], w0[i], w1[i], w, ds, h, work, here)
+        parameter[n] = w
+        element_point(legs, corners, spans, element[i], w, 0.5 * (w0[i] + w1[i]), work, here)
         to_arc_length(here)
         for k in range(axes):
             out_position[n, k] = here[0, k]
@@ -372,4 +387,4 @@ def _sample(
             out_acceleration[n, k] = here[1, k] * u + here[2, k] * v * v
             out_jerk[n, k] = here[1, k] * j + 3.0 * here[2, k] * v * u + here[3, k] * v * v * v
         out_s[n], out_feed[n] = s[i] + ds, v
-    return out_position, out_velocity, out_acceleration, out_jerk, out_s, out_feed, point
+    return out_position, out_velocity, out_acceleration, out_jerk, out_s, out_feed, point, parameter

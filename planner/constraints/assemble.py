@@ -88,7 +88,10 @@ def _remaining_budget(samples: PathSamples, machine: Machine) -> FloatArray:
     joint = np.where(corner, ~element, 0)
     tolerance = path.toolpath.tolerance
     whole = np.minimum(tolerance[samples.segment], tolerance[samples.segment + 1])
-    return np.where(corner, path.tol[joint] - path.tol_ap[joint], whole)
+    budget = np.where(corner, path.tol[joint] - path.tol_ap[joint], whole)
+    span = element - len(path.legs)
+    budget[span >= 0] = path.spline.budget[span[span >= 0]]
+    return budget
 
 
 def _curvature_bounds(

@@ -1,6 +1,7 @@
-"""Elements: the smooth path as a sequence of curves, the free part of a leg or a corner, each over its own parameter w.
+"""Elements: the smooth path as a sequence of curves, the free part of a leg, a corner or a span, each over its own parameter w.
 
-An element is numbered r >= 0 for the free part of leg r (w is the leg's x [mm]) and ~k < 0 for the corner at joint k (w in [0, 1]).
+Of a path with R legs an element is numbered r in [0, R) for the free part of leg r (w is the leg's x [mm]), ~k < 0 for the corner at
+joint k (w in [0, 1]), and R + i for span i of the spline (w in [0, 1]).
 This file is the one place where an element's geometry is turned from w to arc length:
 
     r'   = T = B'/|B'|
@@ -21,6 +22,7 @@ from planner.arrays import Array
 from planner.corners.blend import CORNER_DTYPE, corner_point, shape_at
 from planner.corners.smooth import SmoothPath
 from planner.geometry.legs import leg_point, leg_tangent
+from planner.geometry.spline import span_point, span_tangent
 
 # Eight-point Gauss-Legendre rule on [0, 1]: on the widest grid interval, a quarter of a corner, good to 1e-10 of the length (four
 # points leave 4e-6, which shows as feed when positions are differenced).
@@ -33,6 +35,7 @@ class ElementTable(NamedTuple):
 
     legs: Array  # (R,) records, geometry/legs.py
     corners: Array  # (R+1,) records, corners/blend.py
+    spans: Array  # (S,) records, geometry/spline.py
 
 
 def element_table(path: SmoothPath) -> ElementTable:
@@ -40,13 +43,21 @@ def element_table(path: SmoothPath) -> ElementTable:
     corners = np.zeros(len(path.params), CORNER_DTYPE)
     corners["shape"], corners["params"] = int(path.corner.shape), path.params
     corners["stretch"] = path.stretch
-    return ElementTable(path.legs.table, corners)
+    return ElementTable(path.legs.table, corners, path.spline.spans)
 
 
 @njit(cache=True, error_model="numpy")
-def element_point(legs, corners, element, w, w_ref, work, out):
+def is_straight(legs, element):
+    """True on the free part of a straight leg."""
+    return 0 <= element < len(legs) and not legs[element].round
+
+
+@njit(cache=True, error_model="numpy")
+def element_point(legs, corners, spans, element, w, w_ref, work, out):
     """Point and three w-derivatives of an element at w, into out (4, A); work is (2, 4, A) scratch."""
-    if element >= 0:
+    if element >= len(legs):
+        span_point(spans, element - len(legs), w, out)
+    elif element >= 0:
         leg_point(legs, element, w, out)
     else:
         corner_point(legs, corners, ~element, w, w_ref, work[0], work[1], out)
@@ -79,9 +90,11 @@ def to_arc_length(out):
 
 
 @njit(cache=True, error_model="numpy")
-def _element_speed(legs, corners, element, w, w_ref, out):
+def _element_speed(legs, corners, spans, element, w, w_ref, out):
     """|dB/dw| at w; out (4, A) is scratch."""
-    if element >= 0:
+    if element >= len(legs):
+        span_tangent(spans, element - len(legs), w, out[0])
+    elif element >= 0:
         leg_tangent(legs, element, w, out[0])
     else:
         k = ~element
@@ -97,12 +110,12 @@ def _element_speed(legs, corners, element, w, w_ref, out):
 
 
 @njit(cache=True, error_model="numpy")
-def element_length(legs, corners, element, w0, w1, w_ref, out):
+def element_length(legs, corners, spans, element, w0, w1, w_ref, out):
     """Arc length of an element between w0 and w1 [mm]; out (4, A) is scratch."""
-    if element >= 0 and not legs[element].round:
+    if is_straight(legs, element):
         return w1 - w0
     total = 0.0
     for g in range(len(GAUSS_NODES)):
         w = w0 + (w1 - w0) * GAUSS_NODES[g]
-        total += GAUSS_WEIGHTS[g] * _element_speed(legs, corners, element, w, w_ref, out)
+        total += GAUSS_WEIGHTS[g] * _element_speed(legs, corners, spans, element, w, w_ref, out)
     return total * (w1 - w0)

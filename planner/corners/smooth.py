@@ -21,6 +21,7 @@ from planner.corners.allocation import (
 from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_from_tolerance
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
+from planner.geometry.spline import Spline, no_spline
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
@@ -64,6 +65,7 @@ class SmoothPath:
     tol         : (R+1,) contour error budget eps [mm]
     tol_ap      : (R+1,) what the rounding uses of it, E(m) [mm]
     normal_max  : (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
+    spline      : runs of joints that are replaced by curves, where d is 0
     """
 
     toolpath: Toolpath
@@ -76,6 +78,7 @@ class SmoothPath:
     tol: FloatArray
     tol_ap: FloatArray
     normal_max: FloatArray
+    spline: Spline
 
     def __post_init__(self) -> None:
         joints = len(self.legs) + 1
@@ -87,13 +90,32 @@ class SmoothPath:
 
     @property
     def d_in(self) -> FloatArray:
-        """(R+1,) tangent length before each vertex [mm]."""
-        return self.d * self.stretch[:, 0]
+        """(R+1,) what corner or spline take of the leg before each joint [mm]."""
+        taken, spline, length = self.d * self.stretch[:, 0], self.spline, self.legs.length
+        inside = self._inside_runs()
+        taken[inside] = length[inside - 1]
+        taken[spline.joint_first] = length[spline.joint_first - 1] - spline.x_first
+        return taken
 
     @property
     def d_out(self) -> FloatArray:
-        """(R+1,) tangent length after each vertex [mm]."""
-        return self.d * self.stretch[:, 1]
+        """(R+1,) what corner or spline take of the leg after each joint [mm]."""
+        taken = self.d * self.stretch[:, 1]
+        taken[self.spline.joint_last] = self.spline.x_last
+        return taken
+
+    @property
+    def run(self) -> Array:
+        """(R+1,) the run of the spline that begins before each joint, or -1."""
+        run = np.full(len(self.d), -1)
+        run[self.spline.joint_first] = np.arange(len(self.spline))
+        return run
+
+    def _inside_runs(self) -> Array:
+        """Joints of runs but for the first of each."""
+        count = self.spline.joint_last - self.spline.joint_first
+        first = np.repeat(self.spline.joint_first - (np.cumsum(count) - count), count)
+        return first + np.arange(count.sum()) + 1
 
     @property
     def theta(self) -> FloatArray:
@@ -171,6 +193,7 @@ def round_corners(
         tol=tol,
         tol_ap=tol_ap,
         normal_max=normal_acceleration_max(tol, tol_ap, reachable, rate),
+        spline=no_spline(len(toolpath.axes)),
     )
 
 

@@ -116,7 +116,7 @@ def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _bends(legs, corners, element, w0, w1, limits, bends, which):
+def _bends(legs, corners, spans, element, w0, w1, limits, bends, which):
     """max_k |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and the axes k into which (n, 2)."""
     axes = limits.shape[1]
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
@@ -124,7 +124,7 @@ def _bends(legs, corners, element, w0, w1, limits, bends, which):
     for i in range(len(element)):
         w_ref = 0.5 * (w0[i] + w1[i])
         for p in range(PARTS + 1):
-            element_point(legs, corners, element[i], w0[i] + (w1[i] - w0[i]) * p / PARTS, w_ref, work, here)
+            element_point(legs, corners, spans, element[i], w0[i] + (w1[i] - w0[i]) * p / PARTS, w_ref, work, here)
             to_arc_length(here)
             for k in range(axes):
                 values[0, k, p], values[1, k, p] = here[2, k], here[3, k]

@@ -31,7 +31,7 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
-from planner.path import PathSamples, insert_points
+from planner.path import PathSamples, insert_points, straight
 
 # Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit.
 SWITCH_MIN = 1e-9
@@ -129,5 +129,4 @@ def _spread(whole: FloatArray, finer: float) -> tuple[Array, FloatArray]:
 def _straight(samples: PathSamples) -> Array:
     """Indices of the intervals on straight legs."""
     interval = samples.intervals
-    element = samples.element[interval]
-    return interval[(element >= 0) & ~samples.table.legs["round"][np.maximum(element, 0)]]
+    return interval[straight(samples.table.legs, samples.element[interval])]

@@ -300,7 +300,7 @@ def _circle_speeds(
 
 
 @njit(cache=True, error_model="numpy")
-def _evaluate(legs, corners, element, w0, w1, parts, start, end):
+def _evaluate(legs, corners, spans, element, w0, w1, parts, start, end):
     """Point and arc-length derivatives at start and end of all parts of the intervals, into start and end (n, 4, A)."""
     work = np.empty((2, 4, start.shape[2]))
     n = 0
@@ -310,6 +310,6 @@ def _evaluate(legs, corners, element, w0, w1, parts, start, end):
             for side in range(2):
                 out = start[n] if side == 0 else end[n]
                 w = w0[i] + (w1[i] - w0[i]) * (p + side) / parts[i]
-                element_point(legs, corners, element[i], w, w_ref, work, out)
+                element_point(legs, corners, spans, element[i], w, w_ref, work, out)
                 to_arc_length(out)
             n += 1

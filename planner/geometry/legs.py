@@ -45,6 +45,12 @@ class Legs:
     def __len__(self) -> int:
         return len(self.length)
 
+    @property
+    def place(self) -> FloatArray:
+        """(M+1,) where each segment starts, counted along the legs from the start of the job [mm]; last, where the job ends."""
+        start = np.concatenate([[0.0], np.cumsum(self.length)])
+        return np.append(np.repeat(start[:-1], np.diff(self.first)) + self.offset, start[-1])
+
 
 def leg_dtype(axes: int) -> np.dtype:
     """Record of one leg over `axes` axes; formulas and meaning of the fields: geometry/toolpath.py."""

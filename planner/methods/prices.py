@@ -48,7 +48,7 @@ from planner.feedrate.lagrangian import Lagrangian, lagrangian
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 from planner.path import PathSamples, moved_grid
-from planner.path_grid import FREE_PART_MIN
+from planner.path_rows import FREE_PART_MIN
 
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
 MORE_TOLERANCE = 0.01  # ... and for so much more tolerance [mm]

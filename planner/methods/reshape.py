@@ -1,0 +1,155 @@
+"""Geometry and feed in turns: a spline reshaped within the tolerance by what its time-optimal motion pays for.
+
+Let x(t) be the time-optimal motion along a spline and lambda its multipliers, those of the axis jerks for instance. With the spline's
+parameter as a function of time held fixed, a small change of the control points changes the optimal time by
+
+    dT = sum over grid points and axes of  |lambda| d(|jerk| / limit)  +  the same of accelerations, velocities and feed,
+
+which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape, a convex quadratic in the control points because the
+motion is linear in them. A round minimises it, with a pull towards the present shape,
+
+    sum |lambda|/2 (jerk/limit)^2 + ...  +  force/2 integral ((jerk - jerk_now)/limit)^2 dt,
+
+inside the tube (smoothing/), and solves the feedrate problem on the new path. The runs that got faster keep their new shape and are
+pulled less in the next round, the others keep the old one and are pulled more. Where nothing can be gained to first order any more,
+shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.constraints.assemble import feedrate_problem
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.grid import refine_for_jerk
+from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.solution import FeedrateSolution
+from planner.machine import Machine
+from planner.path import PathSamples, sample_path
+from planner.smoothing.basis import DEGREE
+from planner.smoothing.relax import reshape
+from planner.smoothing.spline_path import SplineShape, with_spline
+
+SHARE = 0.5
+FIRST_FORCE = 1.0
+LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
+GAP = 1e-4  # of a round, share of the cycle time [-]
+GAIN_MIN = 1e-4  # a run that gained less in a round is left alone after that [-]
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Planned:
+    """A shape with its time-optimal motion."""
+
+    shape: SplineShape
+    path: SmoothPath
+    samples: PathSamples
+    problem: FeedrateProblem
+    solution: FeedrateSolution
+
+
+def plan_shape(rounded: SmoothPath, shape: SplineShape, machine: Machine, solver: JerkLimited, resolution: float | None = None) -> Planned:
+    """The time-optimal motion on a shape."""
+    path = with_spline(rounded, shape)
+    samples = refine_for_jerk(sample_path(path, machine, resolution, third_order=True), machine)
+    problem = feedrate_problem(samples, machine)
+    return Planned(shape=shape, path=path, samples=samples, problem=problem, solution=solver.solve(problem))
+
+
+def reshaped(
+    rounded: SmoothPath, planned: Planned, machine: Machine, solver: JerkLimited, rounds: int, told: Callable[[float], None] | None = None,
+    resolution: float | None = None,
+) -> Planned:  # fmt: skip
+    """The best of some rounds of reshaping; `rounded` is the path with the corners that the runs replace."""
+    force = np.where(planned.shape.laid.fits, FIRST_FORCE, np.inf)
+    best = planned
+    memory = np.zeros((len(planned.problem.axes), len(planned.shape.laid.control), 6))
+    for n in range(rounds):
+        tried = plan_shape(rounded, _reshape(best, machine, force, memory, 1.0 if n==0 else SHARE), machine, solver, resolution)
+        if not tried.solution.solved:
+            break
+        before, after = run_times(best), run_times(tried)
+        better = after < before
+        if tried.solution.cycle_time < best.solution.cycle_time and (better | ~np.isfinite(force)).all():
+            best = tried
+        else:
+            mixed = plan_shape(rounded, _chosen(best.shape, tried.shape, better), machine, solver, resolution)
+            candidates = [p for p in (best, tried, mixed) if p.solution.solved]
+            best = min(candidates, key=lambda p: p.solution.cycle_time)
+        force = np.where(better, LESS * force, MORE * force)
+        if told:
+            told((n + 1) / rounds)
+    return best
+
+
+def run_times(planned: Planned) -> FloatArray:
+    """(Q,) time on each run of the shape [s]; 0 for runs that do not fit."""
+    span = planned.samples.element - len(planned.samples.table.legs)
+    on = np.flatnonzero(span >= 0)
+    kept = np.flatnonzero(planned.shape.laid.fits)
+    run = kept[np.searchsorted(planned.path.spline.first, span[on], side="right") - 1]
+    return np.asarray(np.bincount(run, planned.solution.duration[on], len(planned.shape.laid.fits)), dtype=np.float64)
+
+
+def _chosen(old: SplineShape, new: SplineShape, better: Array) -> SplineShape:
+    """The new shape in the runs that are better, else the old one."""
+    runs = len(better)
+    of_control = np.repeat(better, np.diff(old.laid.span_first) + DEGREE)
+    of_site = np.repeat(better, np.diff(old.laid.site_first))
+    of_span = np.repeat(better, np.diff(old.laid.span_first))
+    assert runs == len(old.laid.fits)
+    control = np.where(of_control[:, None], new.laid.control, old.laid.control)
+    return dataclasses.replace(
+        old,
+        laid=old.laid._replace(control=control),
+        used=np.where(of_site, new.used, old.used),
+        left=np.where(of_span, new.left, old.left),
+    )
+
+
+def _reshape(planned: Planned, machine: Machine, force: FloatArray, memory, share) -> SplineShape:
+    """The shape after one round."""
+    shape, samples, problem, solution = planned.shape, planned.samples, planned.problem, planned.solution
+    laid, runs, chain = shape.laid, shape.runs, shape.guide
+    axes = problem.axes
+    span = samples.element - len(samples.table.legs)
+    on = np.flatnonzero((span >= 0) & problem.interval)
+    kept = np.flatnonzero(laid.fits)
+    row = np.searchsorted(planned.path.spline.first, span[on], side="right") - 1
+    within = span[on] - planned.path.spline.first[row]
+    interval = np.searchsorted(kept[row], np.arange(len(laid.fits) + 1))
+    v = np.sqrt(solution.feed_sq)
+    duration, jerk = solution.duration[on], solution.jerk_s[on]
+    acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
+    control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
+    limits = np.stack([problem.acceleration, problem.jerk])
+    times = np.maximum(run_times(planned), 1e-12)
+    reshape(
+        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control, laid.site_first, laid.span, laid.weights, laid.place, laid.target,
+        laid.along, laid.slide, used, laid.fits, runs.fixed_first, runs.fixed_last, left, interval, within,
+        np.stack([samples.w0[on], samples.w1[on]], axis=1), np.stack([v[on], v[on + 1]], axis=1), acc, jerk, duration,
+        _prices(problem, solution, on), limits, force, GAP * times, memory, share,
+    )  # fmt: skip
+    return dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
+
+
+def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> FloatArray:
+    """(I, 2, A, 3) weights of squared velocity, acceleration and jerk at both ends of the intervals `on` (module text) [s]."""
+    assert solution.multipliers is not None
+    axes = len(problem.axes)
+    rows = np.abs(solution.multipliers.rows[on])
+    price = np.zeros((len(on), 2, axes, 3))
+    price[:, 0, :, 1], price[:, 1, :, 1] = 0.5 * rows[:, :, 0], 0.5 * rows[:, :, 3]
+    price[:, 0, :, 2], price[:, 1, :, 2] = 0.5 * rows[:, :, 1], 0.5 * rows[:, :, 2]
+    name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
+    feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_max[on]
+    price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
+    for k, axis in enumerate(problem.axes):
+        at = name == f"velocity.{axis}"
+        price[at, 0, k, 0] = feed[at] / problem.d1[on[at], k] ** 2
+    return price

@@ -1,0 +1,77 @@
+"""Quintic B-splines in the form the kernels use: on every span, six polynomials of a local parameter.
+
+A spline over the knots k_0 <= ... <= k_{n+5} with the control points c_0 .. c_{n-1} is, on the span k_i <= u <= k_{i+1} with
+h = k_{i+1} - k_i and tau = (u - k_i)/h in [0, 1],
+
+    p(u) = sum_b N_b(tau) c_{i-5+b},     N_b(tau) = sum_m basis[span, b, m] tau^m,     b, m = 0..5.
+
+The polynomials come from the recursion of Cox and de Boor, carried out on polynomials of tau.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from planner.arrays import FloatArray
+
+DEGREE = 5
+ORDER = DEGREE + 1
+
+
+def clamped(breaks: FloatArray) -> FloatArray:
+    """Knots (n + 6,) of splines that begin and end at their first and last control point, from the spans' ends (S + 1,)."""
+    return np.concatenate([np.full(DEGREE, breaks[0]), breaks, np.full(DEGREE, breaks[-1])])
+
+
+def greville(knots: FloatArray) -> FloatArray:
+    """(n,) the places whose values as control points give back a straight line."""
+    sums = np.concatenate([[0.0], np.cumsum(knots)])
+    return (sums[ORDER:-1] - sums[1:-ORDER]) / DEGREE
+
+
+@njit(cache=True, error_model="numpy")
+def span_basis(knots):
+    """(S, 6, 6) basis polynomials of all spans of clamped knots (module text)."""
+    spans = len(knots) - 2 * DEGREE - 1
+    basis = np.zeros((spans, ORDER, ORDER))
+    lower = np.zeros((ORDER, ORDER))
+    for span in range(spans):
+        i = span + DEGREE
+        h = knots[i + 1] - knots[i]
+        out = basis[span]
+        out[0, 0] = 1.0
+        for p in range(1, ORDER):
+            for b in range(p):
+                for m in range(p):
+                    lower[b, m] = out[b, m]
+                    out[b, m] = 0.0
+            for b in range(p + 1):  # N_{i-p+b} of degree p from N_{i-p+b} and N_{i-p+b+1} of degree p - 1
+                for m in range(ORDER):
+                    out[b, m] = 0.0
+                if b > 0:
+                    first = knots[i - p + b]
+                    width = knots[i + b] - first
+                    for m in range(p):
+                        out[b, m] += lower[b - 1, m] * (knots[i] - first) / width
+                        out[b, m + 1] += lower[b - 1, m] * h / width
+                if b < p:
+                    last = knots[i + b + 1]
+                    width = last - knots[i - p + b + 1]
+                    for m in range(p):
+                        out[b, m] += lower[b, m] * (last - knots[i]) / width
+                        out[b, m + 1] -= lower[b, m] * h / width
+    return basis
+
+
+@njit(cache=True, error_model="numpy")
+def derivatives(poly, tau, h, out):
+    """Values and first three u-derivatives of the six polynomials `poly` (6, 6) at tau, into out (4, 6)."""
+    for b in range(ORDER):
+        value, first, second, third = 0.0, 0.0, 0.0, 0.0
+        for m in range(DEGREE, -1, -1):
+            third = third * tau + 3.0 * second
+            second = second * tau + 2.0 * first
+            first = first * tau + value
+            value = value * tau + poly[b, m]
+        out[0, b], out[1, b], out[2, b], out[3, b] = value, first / h, second / (h * h), third / (h * h * h)

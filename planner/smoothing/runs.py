@@ -1,0 +1,80 @@
+"""Runs: which stretches of the path are replaced by one curve each.
+
+A run goes from full stop to full stop, or from and to the middle parts of long straight legs, which stay as they are: no motion needs
+more than a way to brake, and room for the knots of a smooth end, to prepare for a corner.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.corners.smooth import SmoothPath
+from planner.geometry.toolpath import Joint
+from planner.machine import Machine
+from planner.smoothing.basis import DEGREE
+
+BRAKING_WAYS = 1.5  # of a straight leg that belong to the run beside it ...
+ROOM = 6.0  # ... and so many of the longest spans, five of which end on the straight line
+LONGEST_DELAY = 1.0  # a span lasts at most so many times a/j ...
+LONGEST_WAY = 0.2  # ... or takes this share of feed^2/a, if that is more ...
+LONGEST_TOLERANCE = 4.0  # ... or so many tolerances [-]
+
+
+class Runs(NamedTuple):
+    """Q runs in the order of the path (geometry/spline.py); free_first, free_last: control points that are fixed at either end, 1 at a
+    full stop, 5 on a straight leg."""
+
+    joint_first: Array
+    joint_last: Array
+    x_first: FloatArray
+    x_last: FloatArray
+    fixed_first: Array
+    fixed_last: Array
+
+
+def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatArray:
+    """(R,) the longest that a span may be on each leg [mm]; `tol` (R,)."""
+    feed, a, j = _motion(path, machine)
+    return np.maximum(np.maximum(LONGEST_DELAY * feed * a / j, LONGEST_WAY * feed**2 / a), LONGEST_TOLERANCE * tol)
+
+
+def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray, cut: Array) -> Runs:
+    """The runs of a path; `cut` (R+1,) True at joints that no run may contain."""
+    legs = path.legs
+    feed, a, j = _motion(path, machine)
+    reach = BRAKING_WAYS * (feed**2 / (2.0 * a) + feed * a / (2.0 * j)) + ROOM * longest
+    inside = ~cut
+    ends = cut[:-1].astype(int) + cut[1:]  # of each leg that are no joints of runs
+    split = ~legs.table["round"] & (legs.length > (2.5 - ends) * reach)
+    before = np.concatenate([[True], split])  # the leg before each joint is split
+    after = np.concatenate([split, [True]])
+    first = np.flatnonzero(inside & (before | np.concatenate([[True], cut[:-1]])))
+    last = np.flatnonzero(inside & (after | np.concatenate([cut[1:], [True]])))
+    return Runs(
+        joint_first=first,
+        joint_last=last,
+        x_first=np.where(split[first - 1], legs.length[first - 1] - reach[first - 1], 0.0),
+        x_last=np.where(split[last], reach[last], legs.length[last]),
+        fixed_first=np.where(split[first - 1], DEGREE, 1),
+        fixed_last=np.where(split[last], DEGREE, 1),
+    )
+
+
+def stops(path: SmoothPath) -> Array:
+    """(R+1,) True at full stops."""
+    return path.joint == Joint.STOP
+
+
+def _motion(path: SmoothPath, machine: Machine) -> tuple[FloatArray, float, float]:
+    """Feed (R,) of the fastest block of each leg, finite; acceleration and jerk of the slowest axis."""
+    toolpath = path.toolpath
+    fastest = np.linalg.norm(machine.limits("velocity", toolpath.axes))
+    feed = np.maximum.reduceat(np.minimum(toolpath.feed, fastest), path.legs.first[:-1])
+    return (
+        feed,
+        float(machine.limits("acceleration", toolpath.axes).min()),
+        float(machine.limits("jerk", toolpath.axes).min()),
+    )

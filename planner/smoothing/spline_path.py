@@ -1,0 +1,102 @@
+"""From a path with rounded corners to one with a spline: `smoothed`."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.corners.allocation import allocate, error_rate
+from planner.corners.smooth import SmoothPath
+from planner.geometry.spline import Spline, span_dtype
+from planner.machine import Machine
+from planner.smoothing.basis import DEGREE, clamped, span_basis
+from planner.smoothing.guide import Guide, guide
+from planner.smoothing.lay import Laid, lay
+from planner.smoothing.relax import TUBE, relax
+from planner.smoothing.runs import Runs, find_runs, longest_span, stops
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class SplineShape:
+    """The spline of a path with what is needed to change its shape within the tolerance."""
+
+    runs: Runs
+    guide: Guide
+    laid: Laid
+    left: FloatArray  # (S,) of the tolerance, per span [mm]
+    reserve: float
+    used: FloatArray  # (J,) radius that each site may use [mm]
+    iterations: Array
+
+
+def smoothed(path: SmoothPath, machine: Machine) -> SmoothPath:
+    """Replace all runs of corners by splines inside the tolerance; where none fits the corners stay."""
+    return with_spline(path, shape(path, machine))
+
+
+def shape(path: SmoothPath, machine: Machine) -> SplineShape:
+    tolerance = path.toolpath.tolerance
+    axes = path.toolpath.axes
+    reach = np.full(len(tolerance), np.linalg.norm(machine.limits("acceleration", axes)))
+    tol = allocate(tolerance, reach, error_rate(machine))
+    at = path.legs.first
+    of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
+    longest = longest_span(path, machine, of_leg)
+    cut = stops(path)
+    runs = find_runs(path, machine, longest, cut)
+    chain = guide(path, runs, tol)
+    # the longest span of a run: of its slowest leg
+    of_run = _smallest(longest, runs)
+    laid = lay(chain, runs, of_run)
+    left, iterations = np.empty(laid.span_first[-1]), np.empty(len(of_run), np.int64)
+    used = TUBE * laid.radius
+    jerk = machine.limits("jerk", axes)
+    relax(
+        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, laid.control,
+        laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
+        runs.fixed_first, runs.fixed_last, (jerk.min() / jerk) ** 2, left, iterations,
+    )  # fmt: skip
+    return SplineShape(runs=runs, guide=chain, laid=laid, left=left, reserve=float((tolerance - tol).min()), used=used, iterations=iterations)
+
+
+def _smallest(longest: FloatArray, runs: Runs) -> FloatArray:
+    """(Q,) smallest of `longest` over the legs of each run."""
+    if not len(runs.joint_first):
+        return np.zeros(0)
+    edges = np.stack([runs.joint_first - 1, runs.joint_last + 1], axis=1).ravel()
+    return np.minimum.reduceat(np.append(longest, np.inf), edges)[::2]
+
+
+def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
+    """The path with the runs that fit."""
+    runs, laid = shape.runs, shape.laid
+    axes = len(path.toolpath.axes)
+    kept = np.flatnonzero(laid.fits)
+    tables = []
+    for q in kept:
+        s0, s1 = laid.span_first[q], laid.span_first[q + 1]
+        cut = laid.breaks[s0 + q : s1 + q + 1]
+        c = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
+        basis = span_basis(clamped(cut))
+        table = np.zeros(s1 - s0, span_dtype(axes))
+        table["begin"], table["width"] = cut[:-1], np.diff(cut)
+        index = np.arange(s1 - s0)[:, None] + np.arange(DEGREE + 1)
+        table["coef"] = np.einsum("sbm,sbk->smk", basis, c[index])
+        tables.append(table)
+    count = laid.span_first[kept + 1] - laid.span_first[kept]
+    of_span = np.repeat(laid.fits, np.diff(laid.span_first))
+    spline = Spline(
+        first=np.concatenate([[0], np.cumsum(count)]),
+        joint_first=runs.joint_first[kept],
+        joint_last=runs.joint_last[kept],
+        x_first=runs.x_first[kept],
+        x_last=runs.x_last[kept],
+        spans=np.concatenate(tables) if tables else np.zeros(0, span_dtype(axes)),
+        budget=shape.left[of_span] + shape.reserve,
+    )
+    d = path.d.copy()
+    for first, last in zip(spline.joint_first, spline.joint_last, strict=True):
+        d[first : last + 1] = 0.0
+    return dataclasses.replace(path, d=d, spline=spline)

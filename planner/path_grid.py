@@ -1,7 +1,8 @@
 """The kernels behind path.py: where the grid points go, and what the path is there.
 
-`divide` halves the rows of path_rows.py until the errors of path.py's text are small enough, `grade` until no interval is much longer
-than its neighbours; `evaluate` then fills in arc length, derivatives, margins and effective curvatures. Both are linear in the number of points.
+`divide` halves the rows of path_rows.py until the errors of path.py's text are small enough, `grade` until no interval is much
+longer than its neighbours; `evaluate` then fills in arc length, derivatives, margins and effective curvatures. All are linear in the
+number of points.
 """
 
 from __future__ import annotations
@@ -85,7 +86,21 @@ def _measure(legs, corners, spans, element, wa, wb, feed, velocity, acceleration
 
 @njit(cache=True, error_model="numpy")
 def _subdivide(
-    legs, corners, spans, element, wa, wb, feed, velocity, acceleration, jerk, resolution, rest, work, points, out
+    legs,
+    corners,
+    spans,
+    element,
+    wa,
+    wb,
+    feed,
+    velocity,
+    acceleration,
+    jerk,
+    resolution,
+    rest,
+    work,
+    points,
+    out,
 ):
     """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number.
 
@@ -170,7 +185,9 @@ def _set_part(out, row, w0, w1):
 def grade(legs, rows):
     """Halve intervals on curves until they are no longer than `STEEPEST` times their neighbours plus `SLOPE` times the distance from
     them: between a short and a long interval the kinematics of a jerk-limited profile are far from linear."""
-    size = np.empty(len(rows) + 1)  # at the start of each row; a closing row parts what is before it from what is after it
+    size = np.empty(
+        len(rows) + 1
+    )  # at the start of each row; a closing row parts what is before it from what is after it
     for r in range(len(rows)):
         here = rows[r].end - rows[r].begin
         if rows[r].last:

@@ -173,9 +173,7 @@ def cut_path(
         if run[k] >= 0:
             seg = first[leg]
             for i in range(run_first[run[k]], run_first[run[k] + 1]):
-                rows, n, seg = _cut_span(
-                    rows, n, spans[i], len(legs) + i, seg, place, feed, longest, speed
-                )
+                rows, n, seg = _cut_span(rows, n, spans[i], len(legs) + i, seg, place, feed, longest, speed)
         elif blended[k]:
             vertex = start + length
             for seg in range(first[leg], first[k]):

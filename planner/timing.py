@@ -297,7 +297,10 @@ def _invert(legs, corners, spans, element, w0, w1, h, work, out, c):
     p, v, a = 1.0 - c[1] - c[2], slope[1] - c[1] - 2.0 * c[2], bend[1] - 2.0 * c[2]
     c[3], c[4], c[5] = 10.0 * p - 4.0 * v + 0.5 * a, -15.0 * p + 7.0 * v - a, 6.0 * p - 3.0 * v + 0.5 * a
     middle = w0 + dw * _horner(c, 0.5)
-    return abs(element_length(legs, corners, spans, element, w0, middle, w_ref, out) / h - 0.5) <= LENGTH_ROUNDING
+    return (
+        abs(element_length(legs, corners, spans, element, w0, middle, w_ref, out) / h - 0.5)
+        <= LENGTH_ROUNDING
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -22,6 +22,7 @@ LAYERS = (
     "planner.nc",
     "planner.geometry",
     "planner.corners",
+    "planner.smoothing",
     "planner.path_rows",
     "planner.path_grid",
     "planner.path",

@@ -27,8 +27,10 @@ class Method(StrEnum):
 
 
 class Corner(StrEnum):
-    """Names of the corner shapes."""
+    """How the path is smoothed."""
 
+    auto = "auto"
+    spline = "spline"
     bezier = "bezier"
     fir = "fir"
     kinematic = "kinematic"

@@ -29,8 +29,11 @@ def plan(
     machine: MachineOption = None,
     method: Annotated[Method, typer.Option(help="how to plan")] = Method.optimal,
     corner: Annotated[
-        Corner, typer.Option(help="shape of the rounded corners, for toppra and optimal")
-    ] = Corner.bezier,
+        Corner,
+        typer.Option(
+            help="how toppra and optimal smooth the path: one spline, single corners, or the better of spline and bezier"
+        ),
+    ] = Corner.auto,
     solver: Annotated[
         Solver, typer.Option(help="of method toppra: our kernel, or the package toppra for comparison")
     ] = Solver.reachability,

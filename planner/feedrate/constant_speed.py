@@ -124,7 +124,9 @@ def _bends(legs, corners, spans, element, w0, w1, limits, bends, which):
     for i in range(len(element)):
         w_ref = 0.5 * (w0[i] + w1[i])
         for p in range(PARTS + 1):
-            element_point(legs, corners, spans, element[i], w0[i] + (w1[i] - w0[i]) * p / PARTS, w_ref, work, here)
+            element_point(
+                legs, corners, spans, element[i], w0[i] + (w1[i] - w0[i]) * p / PARTS, w_ref, work, here
+            )
             to_arc_length(here)
             for k in range(axes):
                 values[0, k, p], values[1, k, p] = here[2, k], here[3, k]

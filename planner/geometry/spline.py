@@ -18,9 +18,7 @@ DEGREE = 5
 
 def span_dtype(axes: int) -> np.dtype:
     """Record of one span over `axes` axes (module text)."""
-    return np.dtype(
-        [("begin", np.float64), ("width", np.float64), ("coef", np.float64, (DEGREE + 1, axes))]
-    )
+    return np.dtype([("begin", np.float64), ("width", np.float64), ("coef", np.float64, (DEGREE + 1, axes))])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -55,7 +55,7 @@ def plan(
     machine: Machine | str | Path | None = None,
     *,
     method: str | Method = "optimal",
-    corner: str = "bezier",
+    corner: str = "auto",
     solver: str = "reachability",
     tolerance: float | None = None,
     progress: Progress | None = None,
@@ -65,7 +65,7 @@ def plan(
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `METHODS`, or a method with settings of your own
-    corner    : "bezier", "fir" or "kinematic"; for "toppra" and "optimal"
+    corner    : "auto", "spline", "bezier", "fir" or "kinematic"; for "toppra" and "optimal"
     solver    : "reachability" or "toppra"; for "toppra"
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done

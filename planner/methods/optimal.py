@@ -18,7 +18,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
-from planner.corners.smooth import CornerShape, round_corners
+from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
 from planner.geometry.build import toolpath_from_program
@@ -26,12 +26,14 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.activity import history
 from planner.methods.closed_form import corner_table
+from planner.methods.geometry import AUTO, SPLINE, on_spline
 from planner.methods.plan import Plan
 from planner.methods.prices import price_list
+from planner.methods.reshape import OnPath
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.methods.toppra import corner_shape
 from planner.nc.program import Program
-from planner.path import sample_path
+from planner.path import RESOLUTION, sample_path
 from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
 
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
@@ -48,12 +50,14 @@ EXCESS_ROUNDING = 1e-9
 class OptimalMethod:
     """Time-optimal planning with jerk limits on rounded corners.
 
-    corner : name of the corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
+    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : a solver of third order
+    rounds : of reshaping splines (methods/reshape.py); None for as many as the size of the job lets pay
     """
 
-    corner: str | CornerShape = "bezier"
+    corner: str | CornerShape = AUTO
     solver: JerkLimited = field(default_factory=JerkLimited)
+    rounds: int | None = None
 
     def plan(
         self,
@@ -66,17 +70,25 @@ class OptimalMethod:
         stages = Stages(progress)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
+            spline = self.corner in (SPLINE, AUTO)
             shape = (
                 BezierCorner(sigma2=SIGMA2)
-                if self.corner == "bezier"
+                if spline or self.corner == "bezier"
                 else corner_shape(self.corner, machine, toolpath)
             )
             path = round_corners(toolpath, machine, shape, blend_tangents=True)
-            samples = sample_path(path, machine, third_order=True)
-        with stages.stage("solve") as report:
-            samples = refine_for_jerk(samples, machine)
-            problem = feedrate_problem(samples, machine)
-            solution = self.solver.solve(problem, report)
+        if spline:
+            best = on_spline(
+                path,
+                machine,
+                lambda path, finer: self._on_path(path, machine, stages, finer=finer),
+                auto=self.corner == AUTO,
+                rounds=self.rounds,
+                stages=stages,
+            )
+        else:
+            best = self._on_path(path, machine, stages)
+        samples, problem, solution = best.samples, best.problem, best.solution
         trajectory = verdict = corners = grid = prices = None
         if solution.solved:
             with stages.stage("solve"):
@@ -89,7 +101,7 @@ class OptimalMethod:
                 prices = price_list(samples, problem, solution, machine) if solution.multipliers else None
         return Plan(
             method="optimal",
-            corner=shape.name,
+            corner=str(self.corner) if spline else shape.name,
             solver=solution.solver,
             program=program,
             machine=machine,
@@ -105,6 +117,19 @@ class OptimalMethod:
             grid_points=len(samples),
             timings=stages.timings,
         )
+
+    def _on_path(self, path: SmoothPath, machine: Machine, stages: Stages, finer: float = 1.0) -> OnPath:
+        """The time-optimal motion on a path; `finer` divides the grid's resolution."""
+        with stages.stage("geometry"):
+            samples = sample_path(
+                path, machine, None if finer == 1.0 else RESOLUTION * finer, third_order=True
+            )
+        with stages.stage("solve") as report:
+            samples = refine_for_jerk(samples, machine)
+            problem = feedrate_problem(samples, machine)
+            return OnPath(
+                path=path, samples=samples, problem=problem, solution=self.solver.solve(problem, report)
+            )
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine) -> Motion:

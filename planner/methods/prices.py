@@ -131,7 +131,7 @@ def price_list(
     by_share["feed"] = _by_feed(samples, problem, machine, now)  # these are dT/d(ln limit)
     saved_by_tolerance: dict[str, float] = {}
     tolerance = dear = None
-    if isinstance(samples.path, SmoothPath):
+    if isinstance(samples.path, SmoothPath) and not len(samples.path.spline):
         corners = _corners(samples.path, samples, problem, solution, machine, now)
         for axis in problem.axes:
             by_share[f"acceleration.{axis}"] += corners.by_acceleration(axis)

@@ -12,97 +12,92 @@ motion is linear in them. A round minimises it, with a pull towards the present 
 
 inside the tube (smoothing/), and solves the feedrate problem on the new path. The runs that got faster keep their new shape and are
 pulled less in the next round, the others keep the old one and are pulled more. Where nothing can be gained to first order any more,
-shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance. The multipliers jump from
+round to round, as limits take turns; their running mean over the rounds, `SHARE` of it the newest, serves better.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.arrays import Array, FloatArray
-from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
-from planner.feedrate.grid import refine_for_jerk
-from planner.feedrate.jerk import JerkLimited
 from planner.feedrate.solution import FeedrateSolution
-from planner.machine import Machine
-from planner.path import PathSamples, sample_path
-from planner.smoothing.basis import DEGREE
+from planner.methods.stages import Stages
+from planner.path import PathSamples
+from planner.smoothing.basis import DEGREE, ORDER
 from planner.smoothing.relax import reshape
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-SHARE = 0.5
-FIRST_FORCE = 1.0
+FIRST_FORCE = 0.5
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
+SHARE = 0.5
 GAP = 1e-4  # of a round, share of the cycle time [-]
-GAIN_MIN = 1e-4  # a run that gained less in a round is left alone after that [-]
 
 
-@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Planned:
-    """A shape with its time-optimal motion."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OnPath:
+    """A smooth path, its grid, and the time-optimal motion on it."""
 
-    shape: SplineShape
     path: SmoothPath
     samples: PathSamples
     problem: FeedrateProblem
     solution: FeedrateSolution
 
 
-def plan_shape(rounded: SmoothPath, shape: SplineShape, machine: Machine, solver: JerkLimited, resolution: float | None = None) -> Planned:
-    """The time-optimal motion on a shape."""
-    path = with_spline(rounded, shape)
-    samples = refine_for_jerk(sample_path(path, machine, resolution, third_order=True), machine)
-    problem = feedrate_problem(samples, machine)
-    return Planned(shape=shape, path=path, samples=samples, problem=problem, solution=solver.solve(problem))
+PlanOn = Callable[[SmoothPath], OnPath]
 
 
 def reshaped(
-    rounded: SmoothPath, planned: Planned, machine: Machine, solver: JerkLimited, rounds: int, told: Callable[[float], None] | None = None,
-    resolution: float | None = None,
-) -> Planned:  # fmt: skip
-    """The best of some rounds of reshaping; `rounded` is the path with the corners that the runs replace."""
-    force = np.where(planned.shape.laid.fits, FIRST_FORCE, np.inf)
-    best = planned
-    memory = np.zeros((len(planned.problem.axes), len(planned.shape.laid.control), 6))
+    rounded: SmoothPath, shape: SplineShape, plan_on: PlanOn, rounds: int, stages: Stages
+) -> tuple[SplineShape, OnPath]:
+    """The best of some rounds of reshaping, and the motion on it.
+
+    rounded : the path with the corners that the runs replace
+    plan_on : solves the feedrate problem on a path
+    """
+    best = plan_on(with_spline(rounded, shape))
+    if not best.solution.solved or not len(best.path.spline):
+        return shape, best
+    force = np.where(shape.laid.fits, FIRST_FORCE, np.inf)
+    memory = np.zeros((len(best.problem.axes), len(shape.laid.control), ORDER))
     for n in range(rounds):
-        tried = plan_shape(rounded, _reshape(best, machine, force, memory, 1.0 if n==0 else SHARE), machine, solver, resolution)
+        with stages.stage("geometry"):
+            new = _reshape(best, shape, force, memory, SHARE if n else 1.0)
+        tried = plan_on(with_spline(rounded, new))
         if not tried.solution.solved:
             break
-        before, after = run_times(best), run_times(tried)
-        better = after < before
-        if tried.solution.cycle_time < best.solution.cycle_time and (better | ~np.isfinite(force)).all():
-            best = tried
-        else:
-            mixed = plan_shape(rounded, _chosen(best.shape, tried.shape, better), machine, solver, resolution)
-            candidates = [p for p in (best, tried, mixed) if p.solution.solved]
-            best = min(candidates, key=lambda p: p.solution.cycle_time)
+        better = run_times(tried, new) < run_times(best, shape)
+        candidates = [(new, tried)]
+        if not (better | ~shape.laid.fits).all():
+            mixed = _chosen(shape, new, better)
+            candidates.append((mixed, plan_on(with_spline(rounded, mixed))))
+        for candidate, planned in candidates:
+            if planned.solution.solved and planned.solution.cycle_time < best.solution.cycle_time:
+                shape, best = candidate, planned
         force = np.where(better, LESS * force, MORE * force)
-        if told:
-            told((n + 1) / rounds)
-    return best
+    return shape, best
 
 
-def run_times(planned: Planned) -> FloatArray:
+def run_times(planned: OnPath, shape: SplineShape) -> FloatArray:
     """(Q,) time on each run of the shape [s]; 0 for runs that do not fit."""
     span = planned.samples.element - len(planned.samples.table.legs)
     on = np.flatnonzero(span >= 0)
-    kept = np.flatnonzero(planned.shape.laid.fits)
+    kept = np.flatnonzero(shape.laid.fits)
     run = kept[np.searchsorted(planned.path.spline.first, span[on], side="right") - 1]
-    return np.asarray(np.bincount(run, planned.solution.duration[on], len(planned.shape.laid.fits)), dtype=np.float64)
+    return np.asarray(np.bincount(run, planned.solution.duration[on], len(shape.laid.fits)), dtype=np.float64)
 
 
 def _chosen(old: SplineShape, new: SplineShape, better: Array) -> SplineShape:
     """The new shape in the runs that are better, else the old one."""
-    runs = len(better)
     of_control = np.repeat(better, np.diff(old.laid.span_first) + DEGREE)
     of_site = np.repeat(better, np.diff(old.laid.site_first))
     of_span = np.repeat(better, np.diff(old.laid.span_first))
-    assert runs == len(old.laid.fits)
     control = np.where(of_control[:, None], new.laid.control, old.laid.control)
     return dataclasses.replace(
         old,
@@ -112,11 +107,12 @@ def _chosen(old: SplineShape, new: SplineShape, better: Array) -> SplineShape:
     )
 
 
-def _reshape(planned: Planned, machine: Machine, force: FloatArray, memory, share) -> SplineShape:
-    """The shape after one round."""
-    shape, samples, problem, solution = planned.shape, planned.samples, planned.problem, planned.solution
+def _reshape(
+    planned: OnPath, shape: SplineShape, force: FloatArray, memory: FloatArray, share: float
+) -> SplineShape:
+    """The shape after one round; `memory` is the mean over the rounds, `share` how much of it is new."""
+    samples, problem, solution = planned.samples, planned.problem, planned.solution
     laid, runs, chain = shape.laid, shape.runs, shape.guide
-    axes = problem.axes
     span = samples.element - len(samples.table.legs)
     on = np.flatnonzero((span >= 0) & problem.interval)
     kept = np.flatnonzero(laid.fits)
@@ -128,9 +124,10 @@ def _reshape(planned: Planned, machine: Machine, force: FloatArray, memory, shar
     acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
     control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
     limits = np.stack([problem.acceleration, problem.jerk])
-    times = np.maximum(run_times(planned), 1e-12)
+    times = np.maximum(run_times(planned, shape), 1e-12)
     reshape(
-        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control, laid.site_first, laid.span, laid.weights, laid.place, laid.target,
+        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
+        laid.site_first, laid.span, laid.weights, laid.place, laid.target,
         laid.along, laid.slide, used, laid.fits, runs.fixed_first, runs.fixed_last, left, interval, within,
         np.stack([samples.w0[on], samples.w1[on]], axis=1), np.stack([v[on], v[on + 1]], axis=1), acc, jerk, duration,
         _prices(problem, solution, on), limits, force, GAP * times, memory, share,

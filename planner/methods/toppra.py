@@ -8,28 +8,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
 from planner.corners.fir import FirCorner
 from planner.corners.kinematic import KinematicCorner
-from planner.corners.smooth import CornerShape, round_corners
+from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.errors import InputError
 from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.solution import FeedrateSolution, FeedrateSolver
+from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.activity import history
 from planner.methods.closed_form import corner_table
+from planner.methods.geometry import AUTO, SPLINE, on_spline
 from planner.methods.plan import Plan
+from planner.methods.reshape import OnPath
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.nc.program import Program
-from planner.path import PathSamples, sample_path
+from planner.path import RESOLUTION, PathSamples, sample_path
 from planner.timing import Motion, law_of_solution
 
-CORNERS = ("bezier", "fir", "kinematic")
+CORNERS = (AUTO, SPLINE, "bezier", "fir", "kinematic")
 SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
 
 
@@ -37,11 +38,11 @@ SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": 
 class ToppraMethod:
     """Second-order time-optimal planning on rounded corners.
 
-    corner : name of the corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
+    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
     """
 
-    corner: str | CornerShape = "bezier"
+    corner: str | CornerShape = AUTO
     solver: str | FeedrateSolver = "reachability"
 
     def plan(
@@ -56,11 +57,21 @@ class ToppraMethod:
         solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
-            shape = corner_shape(self.corner, machine, toolpath)
+            spline = self.corner in (SPLINE, AUTO)
+            shape = corner_shape("bezier" if spline else self.corner, machine, toolpath)
             path = round_corners(toolpath, machine, shape)
-            samples = sample_path(path, machine)
-        with stages.stage("solve"):
-            samples, problem, solution = _solve(samples, machine, solver)
+
+        def on_path(path: SmoothPath, finer: float = 1.0) -> OnPath:
+            with stages.stage("geometry"):
+                samples = sample_path(path, machine, None if finer == 1.0 else RESOLUTION * finer)
+            with stages.stage("solve"):
+                return _solve(path, samples, machine, solver)
+
+        auto = self.corner == AUTO
+        best = (
+            on_spline(path, machine, on_path, auto=auto, rounds=0, stages=stages) if spline else on_path(path)
+        )
+        samples, problem, solution = best.samples, best.problem, best.solution
         trajectory = verdict = corners = grid = None
         if solution.solved:
             law = law_of_solution(samples, solution)
@@ -72,7 +83,7 @@ class ToppraMethod:
                 grid = history(problem, solution, law)
         return Plan(
             method="toppra",
-            corner=shape.name,
+            corner=str(self.corner) if spline else shape.name,
             solver=solution.solver,
             program=program,
             machine=machine,
@@ -102,14 +113,12 @@ def corner_shape(corner: str | CornerShape, machine: Machine, toolpath: Toolpath
     return corner
 
 
-def _solve(
-    samples: PathSamples, machine: Machine, solver: FeedrateSolver
-) -> tuple[PathSamples, FeedrateProblem, FeedrateSolution]:
+def _solve(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
     """Solve, add the points where the profile switches on straight stretches, and solve again."""
     problem = feedrate_problem(samples, machine)
     solution = solver.solve(problem)
-    if not solution.solved:
-        return samples, problem, solution
-    samples = add_switching_points(samples, problem, solution, machine)
-    problem = feedrate_problem(samples, machine)
-    return samples, problem, solver.solve(problem)
+    if solution.solved:
+        samples = add_switching_points(samples, problem, solution, machine)
+        problem = feedrate_problem(samples, machine)
+        solution = solver.solve(problem)
+    return OnPath(path=path, samples=samples, problem=problem, solution=solution)

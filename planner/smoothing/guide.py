@@ -76,7 +76,11 @@ def _guide(legs, starts, tol, joint_first, joint_last, x_first, x_last, free_fir
                         tol_here[n + c] = tol[leg]
                         if c == 0 and leg >= joint_first[q]:
                             tol_here[n] = min(tol[leg - 1], tol[leg])
-                        bend = abs(legs[leg].radius * legs[leg].rate * legs[leg].rate) if legs[leg].round else 0.0
+                        bend = (
+                            abs(legs[leg].radius * legs[leg].rate * legs[leg].rate)
+                            if legs[leg].round
+                            else 0.0
+                        )
                         sagitta = bend * ((end - begin) / chords) ** 2 / 8.0
                         tol_chord[n + c] = tol[leg] - sagitta
                 n += chords

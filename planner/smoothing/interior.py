@@ -102,8 +102,8 @@ def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
         steep = z[site] / -g[site]
         loose = 1.0 - slide[site] * slide[site]
         for k in range(axes):
-            for l in range(axes):
-                block[k, l] = steep * normal[k] * normal[l] - flat * loose * along[site, k] * along[site, l]
+            for m in range(axes):
+                block[k, m] = steep * normal[k] * normal[m] - flat * loose * along[site, k] * along[site, m]
             block[k, k] += flat
         for b in range(ORDER):
             i = first[site] + b
@@ -117,8 +117,8 @@ def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
                 for k in range(axes):
                     row = band[i * axes + k]
                     shift = full - 1 - (i * axes + k) + j * axes
-                    for l in range(axes if a < b else k + 1):
-                        row[shift + l] += weight * block[k, l]
+                    for m in range(axes if a < b else k + 1):
+                        row[shift + m] += weight * block[k, m]
 
 
 @njit(cache=True, error_model="numpy")
@@ -164,14 +164,30 @@ def _step_length(step, first, values, along, slide, radius, g, e, slope):
 
 
 @njit(cache=True, error_model="numpy")
-def minimise(H, linear, free, first, values, place, along, slide, radius, c, value, gap_first, gap_last, relative, iterations):
+def minimise(
+    H,
+    linear,
+    free,
+    first,
+    values,
+    place,
+    along,
+    slide,
+    radius,
+    c,
+    value,
+    gap_first,
+    gap_last,
+    relative,
+    iterations,
+):
     """Move the control points c (n, A), strictly inside the tube, to the optimum; returns the gap and the iterations.
 
     value     : of the objective at the start, in as far as it matters
     gap_first : guess of the gap there, for the first multipliers
     gap_last, relative : where to end, gap <= gap_last + relative * value
-    H (A, n, 6) lower bands (banded.py), linear (n, A); free (n,) False for control points that stay; first (m,) first of the six control points
-    of each site, values (m, 6) of their basis functions there.
+    H (A, n, 6) lower bands (banded.py), linear (n, A); free (n,) False for control points that stay; first (m,) first of the six
+    control points of each site, values (m, 6) of their basis functions there.
     """
     axes, n, _ = H.shape
     m = len(first)

@@ -27,7 +27,9 @@ DENSER_MAX = 16  # so many times at most
 SPANS_MIN = 8  # of a run
 SITE_SPACING = 0.5  # of sites on chords [spans]
 SITE_EDGE = 0.1  # no site on a chord so close to its ends [spans]
-SITES_DENSE = 0.125  # vertices nearer than this share of a span to the site before are left to the certificate [spans]
+SITES_DENSE = (
+    0.125  # vertices nearer than this share of a span to the site before are left to the certificate [spans]
+)
 DENSE_TURN = 0.1  # ... unless the path turns there by more [rad]
 SLIDE = 0.1  # a site on a chord may slide by its radius over this
 
@@ -158,10 +160,8 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
             basis = span_basis(_clamped(cut))
             c = np.empty((spans + DEGREE, axes))
             follow(here, points, cut, c)
-            room = (b - a) + spans * 4 + 8
-            for v in range(len(here) - 1):
-                room += 2
-            sites = np.empty((3, room * 2))
+            # at most every vertex, and on every piece of a chord within a span its places there
+            sites = np.empty((3, (b - a) + (spans + b - a) * int(np.ceil(1.0 / SITE_SPACING))))
             m = _sites(here, turn[a:b], tol[a:b], tol_chord[a:b], cut, sites)
             n = site_first[q] + m
             span, slide, radius = _grown1(span, n), _grown1(slide, n), _grown1(radius, n)
@@ -189,7 +189,11 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
                     direction[j, k] = along[a + chord, k]
                     target[j, k] = point[a + chord, k]
                     if vertex < 0:
-                        target[j, k] += (u - here[chord]) / (here[chord + 1] - here[chord]) * (points[chord + 1, k] - points[chord, k])
+                        target[j, k] += (
+                            (u - here[chord])
+                            / (here[chord + 1] - here[chord])
+                            * (points[chord + 1, k] - points[chord, k])
+                        )
                     value = -target[j, k]
                     for d in range(ORDER):
                         value += weights[j, d] * c[i + d, k]

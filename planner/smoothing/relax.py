@@ -95,7 +95,21 @@ def _piece_error(basis, control, i, a, b, chord_start, along, length, bezier):
 
 
 @njit(cache=True, error_model="numpy")
-def certify(place, point, along, tol, tol_chord, breaks, basis, control, span, weights_place, ratio_site, ratio_span, left):
+def certify(
+    place,
+    point,
+    along,
+    tol,
+    tol_chord,
+    breaks,
+    basis,
+    control,
+    span,
+    weights_place,
+    ratio_site,
+    ratio_span,
+    left,
+):
     """Bounds of the deviation over the tolerance: of each span into ratio_span (S,), and around each site into ratio_site (J,);
     into left (S,) what the bound leaves of the tolerance [mm]. weights_place (J,) is the place of each site."""
     bezier = np.empty((ORDER, control.shape[1]))
@@ -125,7 +139,9 @@ def certify(place, point, along, tol, tol_chord, breaks, basis, control, span, w
             length += (point[v + 1, k] - point[v, k]) * along[v, k]
         tau, step = (u - breaks[i]) / h, (following - u) / h
         error = _piece_error(basis, control, i, tau, tau + step, point[v], along[v], length, bezier)
-        if error > tol_chord[v]:  # the points of smaller pieces are nearer to the curve, by the square of their size
+        if (
+            error > tol_chord[v]
+        ):  # the points of smaller pieces are nearer to the curve, by the square of their size
             error = 0.0
             for part in range(PARTS):
                 a, b = tau + step * part / PARTS, tau + step * (part + 1) / PARTS
@@ -229,7 +245,9 @@ def relax_run(
                     for j in range(j0, j1):
                         if ratio_site[j] > 1.0:
                             used[j] *= TIGHTENED / ratio_site[j]
-                        used[j] = max(used[j], INSIDE * _distance(c, j, span, weights, target, direction, slide))
+                        used[j] = max(
+                            used[j], INSIDE * _distance(c, j, span, weights, target, direction, slide)
+                        )
                 part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
                 near, aim = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
                 for k in range(axes):
@@ -339,7 +357,8 @@ def _add_prices(basis, control, cut, i, tau, v, a, jerk, weight, limits, own, H,
 @njit(cache=True, error_model="numpy")
 def reshape(
     first, place, point, along, tol, tol_chord, span_first, breaks, control, site_first, span, weights, site_place, target, direction,
-    slide, used, fits, fixed_first, fixed_last, left, interval, of_span, tau, v, a, jerk, duration, price, limits, force, gap, memory, share,
+    slide, used, fits, fixed_first, fixed_last, left, interval, of_span, tau, v, a, jerk, duration, price, limits, force, gap,
+    memory, share,
 ):  # fmt: skip
     """One round of reshape.py for all runs that fit: moves `control`, or leaves a run as it is where the certificate fails.
 
@@ -348,6 +367,7 @@ def reshape(
     price       : (I, 2, A, 3) weights of squared velocity, acceleration and jerk
     limits      : (2, A) of acceleration and jerk
     force       : (Q,) how much the shape resists; gap (Q,) of each run [s]
+    memory      : (A, n, 6) mean of the prices' bands over the rounds, of which `share` is new
     """
     axes = point.shape[1]
     ones = np.ones(axes)

@@ -38,7 +38,9 @@ class Runs(NamedTuple):
 def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatArray:
     """(R,) the longest that a span may be on each leg [mm]; `tol` (R,)."""
     feed, a, j = _motion(path, machine)
-    return np.maximum(np.maximum(LONGEST_DELAY * feed * a / j, LONGEST_WAY * feed**2 / a), LONGEST_TOLERANCE * tol)
+    return np.maximum(
+        np.maximum(LONGEST_DELAY * feed * a / j, LONGEST_WAY * feed**2 / a), LONGEST_TOLERANCE * tol
+    )
 
 
 def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray, cut: Array) -> Runs:

@@ -1,4 +1,4 @@
-"""From a path with rounded corners to one with a spline: `smoothed`."""
+"""From a path with rounded corners to one with splines in their place."""
 
 from __future__ import annotations
 
@@ -20,23 +20,26 @@ from planner.smoothing.runs import Runs, find_runs, longest_span, stops
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class SplineShape:
-    """The spline of a path with what is needed to change its shape within the tolerance."""
+    """The splines of a path with what is needed to change their shape within the tolerance.
+
+    runs, guide, laid : what the splines replace and how they are made up
+    left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]
+    reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
+    used       : (J,) radius that each site may use [mm]
+    iterations : (Q,) of the interior-point method
+    """
 
     runs: Runs
     guide: Guide
     laid: Laid
-    left: FloatArray  # (S,) of the tolerance, per span [mm]
+    left: FloatArray
     reserve: float
-    used: FloatArray  # (J,) radius that each site may use [mm]
+    used: FloatArray
     iterations: Array
 
 
-def smoothed(path: SmoothPath, machine: Machine) -> SmoothPath:
-    """Replace all runs of corners by splines inside the tolerance; where none fits the corners stay."""
-    return with_spline(path, shape(path, machine))
-
-
-def shape(path: SmoothPath, machine: Machine) -> SplineShape:
+def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
+    """Splines inside the tolerance for all runs of a path with rounded corners. Raises InputError if the machine lacks an axis."""
     tolerance = path.toolpath.tolerance
     axes = path.toolpath.axes
     reach = np.full(len(tolerance), np.linalg.norm(machine.limits("acceleration", axes)))
@@ -58,7 +61,15 @@ def shape(path: SmoothPath, machine: Machine) -> SplineShape:
         laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
         runs.fixed_first, runs.fixed_last, (jerk.min() / jerk) ** 2, left, iterations,
     )  # fmt: skip
-    return SplineShape(runs=runs, guide=chain, laid=laid, left=left, reserve=float((tolerance - tol).min()), used=used, iterations=iterations)
+    return SplineShape(
+        runs=runs,
+        guide=chain,
+        laid=laid,
+        left=left,
+        reserve=float((tolerance - tol).min()),
+        used=used,
+        iterations=iterations,
+    )
 
 
 def _smallest(longest: FloatArray, runs: Runs) -> FloatArray:

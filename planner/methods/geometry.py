@@ -1,0 +1,96 @@
+"""Which geometry a time-optimal motion runs on: rounded corners, one spline, or the better of both from stop to stop.
+
+"spline" puts splines in the place of all runs of corners that they fit (smoothing/) and reshapes them (methods/reshape.py). "auto"
+plans the rounded corners too and keeps them between the full stops where they are faster.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.corners.smooth import SmoothPath
+from planner.machine import Machine
+from planner.methods.reshape import OnPath, PlanOn, reshaped
+from planner.methods.stages import Stages
+from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
+
+SPLINE, AUTO = "spline", "auto"
+
+# Rounds of reshaping, so that all of them together take about as long as so many grid points once, ...
+WORK = 150_000
+POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
+# ... and at most so many: what a round gains has fallen below 1e-4 of the cycle time by then.
+ROUNDS_MAX = 20
+# A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
+FINE_POINTS, FINER = 20_000, 0.25
+
+
+def on_spline(
+    rounded: SmoothPath,
+    machine: Machine,
+    plan_on: Callable[[SmoothPath, float], OnPath],
+    *,
+    auto: bool,
+    rounds: int | None,
+    stages: Stages,
+) -> OnPath:
+    """The time-optimal motion on splines.
+
+    rounded : the path with rounded corners
+    plan_on : solves the feedrate problem on a path, on a grid of the usual resolution times a factor
+    auto    : keep the corners where they are faster
+    rounds  : of reshaping; None for as many as the size of the job lets pay
+    """
+
+    def usual(path: SmoothPath) -> OnPath:
+        return plan_on(path, 1.0)
+
+    with stages.stage("geometry"):
+        shape = spline_shape(rounded, machine)
+    if not shape.laid.fits.any():
+        return usual(rounded)
+    if rounds is None:
+        rounds = _affordable(shape)
+    shape, best = reshaped(rounded, shape, usual, rounds, stages)
+    if auto:
+        shape, best = _with_corners(rounded, shape, best, usual)
+    if best.solution.solved and len(best.samples) <= FINE_POINTS:
+        fine = plan_on(best.path, FINER)
+        if fine.solution.solved and fine.solution.cycle_time < best.solution.cycle_time:
+            best = fine
+    return best
+
+
+def _affordable(shape: SplineShape) -> int:
+    points = POINTS_PER_SPAN * len(shape.left)
+    return int(np.clip(round(WORK / points), 1, ROUNDS_MAX))
+
+
+def _with_corners(
+    rounded: SmoothPath, shape: SplineShape, best: OnPath, plan_on: PlanOn
+) -> tuple[SplineShape, OnPath]:
+    """Corners instead of splines between the full stops where they are faster."""
+    corners = plan_on(rounded)
+    if not corners.solution.solved:
+        return shape, best
+    if not best.solution.solved:
+        return shape, corners
+    faster = _piece_times(corners) < _piece_times(best)
+    piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
+    fits = shape.laid.fits & ~faster[piece]
+    if fits.all() or (fits == shape.laid.fits).all():
+        return shape, best
+    mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
+    planned = plan_on(with_spline(rounded, mixed))
+    if planned.solution.solved and planned.solution.cycle_time < best.solution.cycle_time:
+        return mixed, planned
+    return shape, best
+
+
+def _piece_times(planned: OnPath) -> FloatArray:
+    """(G,) time between full stops [s]."""
+    return np.add.reduceat(planned.solution.duration, planned.samples.piece[:-1])

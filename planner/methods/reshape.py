@@ -31,7 +31,8 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.methods.stages import Stages
 from planner.path import PathSamples
 from planner.smoothing.basis import DEGREE, ORDER
-from planner.smoothing.relax import reshape
+from planner.smoothing.forms import motion_forms
+from planner.smoothing.relax import relax
 from planner.smoothing.spline_path import SplineShape, with_spline
 
 FIRST_FORCE = 0.5
@@ -64,11 +65,13 @@ def reshaped(
     best = plan_on(with_spline(rounded, shape))
     if not best.solution.solved or not len(best.path.spline):
         return shape, best
-    force = np.where(shape.laid.fits, FIRST_FORCE, np.inf)
-    memory = np.zeros((len(best.problem.axes), len(shape.laid.control), ORDER))
-    for n in range(rounds):
+    force = np.full(len(shape.laid.fits), FIRST_FORCE)
+    paid: FloatArray | None = None  # mean over the rounds
+    for _ in range(rounds):
         with stages.stage("geometry"):
-            new = _reshape(best, shape, force, memory, SHARE if n else 1.0)
+            H, Q = price_bands(best, shape)
+            paid = H if paid is None else paid + SHARE * (H - paid)
+            new = _reshape(best, shape, force, paid, Q)
         tried = plan_on(with_spline(rounded, new))
         if not tried.solution.solved:
             break
@@ -108,11 +111,25 @@ def _chosen(old: SplineShape, new: SplineShape, better: Array) -> SplineShape:
 
 
 def _reshape(
-    planned: OnPath, shape: SplineShape, force: FloatArray, memory: FloatArray, share: float
+    planned: OnPath, shape: SplineShape, force: FloatArray, H: FloatArray, Q: FloatArray
 ) -> SplineShape:
-    """The shape after one round; `memory` is the mean over the rounds, `share` how much of it is new."""
-    samples, problem, solution = planned.samples, planned.problem, planned.solution
+    """The shape after one round with the bands H of what is paid and Q of the pull."""
     laid, runs, chain = shape.laid, shape.runs, shape.guide
+    control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
+    relax(
+        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
+        laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
+        runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned, shape), 0.0,
+        np.zeros(len(force), np.bool_),
+    )  # fmt: skip
+    return dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
+
+
+def price_bands(planned: OnPath, shape: SplineShape) -> tuple[FloatArray, FloatArray]:
+    """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives at the present shape
+    (module text) [s/mm2], and Q, of the integral of the squared jerks over their limits."""
+    samples, problem, solution = planned.samples, planned.problem, planned.solution
+    laid = shape.laid
     span = samples.element - len(samples.table.legs)
     on = np.flatnonzero((span >= 0) & problem.interval)
     kept = np.flatnonzero(laid.fits)
@@ -122,17 +139,13 @@ def _reshape(
     v = np.sqrt(solution.feed_sq)
     duration, jerk = solution.duration[on], solution.jerk_s[on]
     acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
-    control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
-    limits = np.stack([problem.acceleration, problem.jerk])
-    times = np.maximum(run_times(planned, shape), 1e-12)
-    reshape(
-        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
-        laid.site_first, laid.span, laid.weights, laid.place, laid.target,
-        laid.along, laid.slide, used, laid.fits, runs.fixed_first, runs.fixed_last, left, interval, within,
+    H, Q = np.zeros((2, len(problem.axes), len(laid.control), ORDER))
+    motion_forms(
+        laid.span_first, laid.breaks, laid.control, laid.fits, interval, within,
         np.stack([samples.w0[on], samples.w1[on]], axis=1), np.stack([v[on], v[on + 1]], axis=1), acc, jerk, duration,
-        _prices(problem, solution, on), limits, force, GAP * times, memory, share,
+        _prices(problem, solution, on), np.stack([problem.acceleration, problem.jerk]), H, Q,
     )  # fmt: skip
-    return dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
+    return H, Q
 
 
 def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> FloatArray:

@@ -19,9 +19,13 @@ DEGREE = 5
 ORDER = DEGREE + 1
 
 
-def clamped(breaks: FloatArray) -> FloatArray:
+@njit(cache=True, error_model="numpy")
+def clamped(breaks):
     """Knots (n + 6,) of splines that begin and end at their first and last control point, from the spans' ends (S + 1,)."""
-    return np.concatenate([np.full(DEGREE, breaks[0]), breaks, np.full(DEGREE, breaks[-1])])
+    knots = np.empty(len(breaks) + 2 * DEGREE)
+    for i in range(len(knots)):
+        knots[i] = breaks[min(max(i - DEGREE, 0), len(breaks) - 1)]
+    return knots
 
 
 def greville(knots: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray
-from planner.smoothing.basis import DEGREE, ORDER, span_basis
+from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.guide import Guide
 from planner.smoothing.knots import graded, spacing, spread
 from planner.smoothing.runs import Runs
@@ -65,17 +65,9 @@ def lay(guide: Guide, runs: Runs, longest: FloatArray) -> Laid:
 
 
 @njit(cache=True, error_model="numpy")
-def _clamped(breaks):
-    knots = np.empty(len(breaks) + 2 * DEGREE)
-    for i in range(len(knots)):
-        knots[i] = breaks[min(max(i - DEGREE, 0), len(breaks) - 1)]
-    return knots
-
-
-@njit(cache=True, error_model="numpy")
 def follow(place, point, breaks, control):
     """Control points (n, A) on the guide at the Greville abscissae."""
-    knots = _clamped(breaks)
+    knots = clamped(breaks)
     v = 0
     for i in range(len(control)):
         u = 0.0
@@ -157,7 +149,7 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
         for attempt in range(DENSER_MAX + 1):
             cut = spread(inner, h, here[0], here[-1], longest[q], SPANS_MIN)
             spans = len(cut) - 1
-            basis = span_basis(_clamped(cut))
+            basis = span_basis(clamped(cut))
             c = np.empty((spans + DEGREE, axes))
             follow(here, points, cut, c)
             # at most every vertex, and on every piece of a chord within a span its places there

@@ -15,13 +15,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from planner.smoothing.basis import DEGREE, ORDER, derivatives, span_basis
+from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
+from planner.smoothing.forms import third_derivative_energy
 from planner.smoothing.interior import minimise
-from planner.smoothing.lay import _clamped, follow
+from planner.smoothing.lay import follow
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-NODES, NODE_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0  # exact for squares of third derivatives
-RELATIVE_GAP = 1e-2  # the integral need not be smaller than this [-]
 ITERATIONS = 60
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
 TUBE = 0.998  # of the tolerance that sites may use at first [-]
@@ -31,27 +29,6 @@ AGAIN = 0.9  # a tightened window starts from so far between the first spline an
 INSIDE = 1.002  # ... with tubes at least so much wider than it needs [-]
 WINDOW, OVERLAP = 240, 30  # control points relaxed at a time, and of them with the next window again
 PARTS = 8  # into which a piece is cut if its bound is too large
-
-
-@njit(cache=True, error_model="numpy")
-def third_derivatives(breaks, basis, weights, H):
-    """Add the integral of weights_k |p_k'''|^2 to the bands H (A, n, 6)."""
-    rows = np.empty((4, ORDER))
-    for i in range(len(breaks) - 1):
-        h = breaks[i + 1] - breaks[i]
-        for q in range(len(NODES)):
-            derivatives(basis[i], NODES[q], h, rows)
-            for k in range(len(weights)):
-                add_square(H[k], i, rows[3], weights[k] * NODE_WEIGHTS[q] * h)
-
-
-@njit(cache=True, error_model="numpy")
-def add_square(band, i, row, weight):
-    """Add weight (row . c_i..i+5)^2 to a band (n, 6), so that it counts 1/2 c'Hc."""
-    for b in range(ORDER):
-        value = 2.0 * weight * row[b]
-        for a in range(b + 1):
-            band[i + b, ORDER - 1 - b + a] += value * row[a]
 
 
 @njit(cache=True, error_model="numpy")
@@ -195,35 +172,17 @@ def _first_site(span, value):
 
 
 @njit(cache=True, error_model="numpy")
-def _energy(cut, basis, weights, c, first, last):
-    """Integral of the squared third derivatives times weights (A,) over the spans first .. last - 1."""
-    total = 0.0
-    rows = np.empty((4, ORDER))
-    for i in range(first, last):
-        h = cut[i + 1] - cut[i]
-        for q in range(len(NODES)):
-            derivatives(basis[i], NODES[q], h, rows)
-            for k in range(c.shape[1]):
-                value = 0.0
-                for d in range(ORDER):
-                    value += rows[3, d] * (c[i + d, k] - c[i, k])
-                total += weights[k] * NODE_WEIGHTS[q] * h * value * value
-    return total
-
-
-@njit(cache=True, error_model="numpy")
 def relax_run(
     place, point, along, tol, tol_chord, cut, basis, c, c0, H, linear, fixed_first, fixed_last, span, weights, site_place, target,
     direction, slide, used, axis_weights, gap_last, relative, left,
 ):  # fmt: skip
-    """Relax one run, `c` (n, A) inside the tube of radii `used` (J,), window by window; returns whether the result has a certificate,
-    and the iterations. `c0` is a path well inside the tube."""
+    """Relax one run, `c` (n, A) inside the tube of radii `used` (J,), window by window; returns whether the result has a certificate.
+    `c0` is a path well inside the tube."""
     n, axes = c.shape
     sites, spans = len(span), len(cut) - 1
     ratio_site, ratio_span = np.zeros(sites), np.empty(spans)
     end = n - fixed_last
     origin = np.empty(axes)
-    count = 0
     for attempt in range(ROUNDS):
         lo = fixed_first
         while lo < end:
@@ -265,15 +224,14 @@ def relax_run(
                         aim[j - j0, k] = target[j, k] - origin[k]
                 energy = 0.0
                 if relative > 0.0:
-                    energy = _energy(cut, basis, axis_weights, c, a, min(hi, spans))
-                _, steps = minimise(
+                    energy = third_derivative_energy(cut, basis, axis_weights, c, a, min(hi, spans))
+                minimise(
                     part, linear[a:b], free, here, weights[j0:j1], aim, direction[j0:j1], slide[j0:j1], used[j0:j1], near, energy,
                     energy + FIRST_GAP * gap_last, gap_last, relative, ITERATIONS,
                 )  # fmt: skip
                 for i in range(lo, hi):
                     for k in range(axes):
                         c[i, k] = near[i - a, k] + origin[k]
-                count += steps
             if hi == end:
                 break
             lo = hi - OVERLAP
@@ -281,141 +239,59 @@ def relax_run(
             place, point, along, tol, tol_chord, cut, basis, c, span, site_place, ratio_site, ratio_span, left
         )  # fmt: skip
         if ratio_span.max() <= 1.0:
-            return True, count
-    return False, count
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
 def relax(
     first, place, point, along, tol, tol_chord, span_first, breaks, control, site_first, span, weights, site_place, target, direction,
-    slide, used, fits, fixed_first, fixed_last, axis_weights, left, iterations,
+    slide, used, fits, fixed_first, fixed_last, left, H_all, Q_all, force, axis_weights, gap, relative, good,
 ):  # fmt: skip
-    """Relax all runs: moves `control`, sets what is `used` of the radii, clears `fits` where the certificate fails; `left` (S,) is
-    what it leaves of the tolerance, `iterations` (Q,)."""
+    """Move the `control` of all runs that fit to the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now) inside the tube; a run without
+    a certificate stays as it is, and is not `good` (Q,).
+
+    used         : (J,) radius that each site may use, smaller afterwards where the certificate asked for it
+    left         : (S,) what the certificate leaves of the tolerance
+    H_all, Q_all : (A, n, 6) bands of all runs
+    force        : (Q,) of each run
+    gap, relative : where to end: gap (Q,) in the units of H, or that share of the integral of squared third derivatives with the
+                   weights axis_weights (A,), if H is its form
+    """
     axes = point.shape[1]
     for q in range(len(fits)):
-        iterations[q] = 0
         if not fits[q]:
             continue
         s0, s1 = span_first[q], span_first[q + 1]
         j0, j1 = site_first[q], site_first[q + 1]
-        a, b = first[q], first[q + 1]
-        cut = breaks[s0 + q : s1 + q + 1]
-        basis = span_basis(_clamped(cut))
-        c = control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
-        H = np.zeros((axes, len(c), ORDER))
-        third_derivatives(cut, basis, axis_weights, H)
-        fits[q], iterations[q] = relax_run(
-            place[a:b], point[a:b], along[a:b], tol[a:b], tol_chord[a:b], cut, basis, c, c.copy(), H, np.zeros_like(c), fixed_first[q],
-            fixed_last[q], span[j0:j1], weights[j0:j1], site_place[j0:j1], target[j0:j1], direction[j0:j1], slide[j0:j1],
-            used[j0:j1], axis_weights, 0.0, RELATIVE_GAP, left[s0:s1],
-        )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
-def _add_prices(basis, control, cut, i, tau, v, a, jerk, weight, limits, own, H, Q):
-    """Add what one end of a grid interval pays to H, and its own weight to Q (module text of reshape.py).
-
-    v, a, jerk : along the path; weight (A, 3) of squared velocity, acceleration and jerk over their `limits` (2, A); own: of Q [s]
-    """
-    axes = control.shape[1]
-    rows = np.empty((4, ORDER))
-    derivatives(basis[i], tau, cut[i + 1] - cut[i], rows)
-    jet = np.zeros((3, axes))
-    for k in range(axes):
-        for m in range(3):
-            for d in range(ORDER):
-                jet[m, k] += rows[m + 1, d] * control[i + d, k]
-    speed_sq, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
-    for k in range(axes):
-        speed_sq += jet[0, k] * jet[0, k]
-        along2 += jet[0, k] * jet[1, k]
-        along3 += jet[0, k] * jet[2, k]
-        bend += jet[1, k] * jet[1, k]
-    speed = np.sqrt(speed_sq)
-    grows = along2 / speed  # d|p'|/du, and then its derivative
-    grows2 = along3 / speed + (bend - grows * grows) / speed
-    du = v / speed
-    ddu = (a - grows * du * du) / speed
-    dddu = (jerk - grows2 * du * du * du - 3.0 * grows * du * ddu) / speed
-    row_v, row_a, row_j = np.empty(ORDER), np.empty(ORDER), np.empty(ORDER)
-    for d in range(ORDER):
-        row_v[d] = rows[1, d] * du
-        row_a[d] = rows[2, d] * du * du + rows[1, d] * ddu
-        row_j[d] = rows[3, d] * du * du * du + 3.0 * rows[2, d] * du * ddu + rows[1, d] * dddu
-    for k in range(axes):
-        if weight[k, 0] > 0.0:
-            add_square(H[k], i, row_v, weight[k, 0])
-        if weight[k, 1] > 0.0:
-            add_square(H[k], i, row_a, weight[k, 1] / limits[0, k] ** 2)
-        share = 1.0 / limits[1, k] ** 2
-        if weight[k, 2] > 0.0:
-            add_square(H[k], i, row_j, weight[k, 2] * share)
-        add_square(Q[k], i, row_j, own * share)
-
-
-@njit(cache=True, error_model="numpy")
-def reshape(
-    first, place, point, along, tol, tol_chord, span_first, breaks, control, site_first, span, weights, site_place, target, direction,
-    slide, used, fits, fixed_first, fixed_last, left, interval, of_span, tau, v, a, jerk, duration, price, limits, force, gap,
-    memory, share,
-):  # fmt: skip
-    """One round of reshape.py for all runs that fit: moves `control`, or leaves a run as it is where the certificate fails.
-
-    interval    : (Q+1,) the grid intervals of each run; of_span (I,) their span, counted within the run; tau (I, 2) its part
-    v, a        : (I, 2) feed and acceleration along the path at both ends; jerk, duration (I,)
-    price       : (I, 2, A, 3) weights of squared velocity, acceleration and jerk
-    limits      : (2, A) of acceleration and jerk
-    force       : (Q,) how much the shape resists; gap (Q,) of each run [s]
-    memory      : (A, n, 6) mean of the prices' bands over the rounds, of which `share` is new
-    """
-    axes = point.shape[1]
-    ones = np.ones(axes)
-    moved = np.zeros(len(fits), np.bool_)
-    for q in range(len(fits)):
-        s0, s1 = span_first[q], span_first[q + 1]
-        if not fits[q] or not force[q] < np.inf or interval[q + 1] == interval[q]:
-            continue
-        j0, j1 = site_first[q], site_first[q + 1]
         b0, b1 = first[q], first[q + 1]
         cut = breaks[s0 + q : s1 + q + 1]
-        basis = span_basis(_clamped(cut))
+        basis = span_basis(clamped(cut))
         old = control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
         n = len(old)
-        H, Q = np.zeros((axes, n, ORDER)), np.zeros((axes, n, ORDER))
-        for i in range(interval[q], interval[q + 1]):
-            for e in range(2):
-                _add_prices(
-                    basis, old, cut, of_span[i], tau[i, e], v[i, e], a[i, e], jerk[i], price[i, e], limits, 0.5 * duration[i], H, Q,
-                )  # fmt: skip
+        H, linear = np.empty((axes, n, ORDER)), np.zeros((n, axes))
         for k in range(axes):
             for i in range(n):
                 for d in range(ORDER):
-                    m = memory[k, s0 + DEGREE * q + i, d]
-                    H[k, i, d] = m + share * (H[k, i, d] - m)
-                    memory[k, s0 + DEGREE * q + i, d] = H[k, i, d]
-        # prices from here, and a pull towards here:  H + force Q, linear part - force Q c
-        linear = np.zeros((n, axes))
-        for k in range(axes):
-            for i in range(n):
-                for d in range(min(i, DEGREE) + 1):
-                    pull = force[q] * Q[k, i, DEGREE - d]
-                    H[k, i, DEGREE - d] += pull
-                    linear[i, k] -= pull * (old[i - d, k] - old[0, k])
-                    if d > 0:
-                        linear[i - d, k] -= pull * (old[i, k] - old[0, k])
+                    at = s0 + DEGREE * q + i
+                    pull = force[q] * Q_all[k, at, DEGREE - d]
+                    H[k, i, DEGREE - d] = H_all[k, at, DEGREE - d] + pull
+                    if d <= i:
+                        linear[i, k] -= pull * (old[i - d, k] - old[0, k])
+                        if d > 0:
+                            linear[i - d, k] -= pull * (old[i, k] - old[0, k])
         start, c = np.empty((n, axes)), np.empty((n, axes))
         follow(place[b0:b1], point[b0:b1], cut, start)
         for i in range(n):
             for k in range(axes):
                 c[i, k] = old[i, k] + (1.0 - AGAIN) * (start[i, k] - old[i, k])
         tube, kept = used[j0:j1].copy(), left[s0:s1].copy()
-        moved[q], _ = relax_run(
+        good[q] = relax_run(
             place[b0:b1], point[b0:b1], along[b0:b1], tol[b0:b1], tol_chord[b0:b1], cut, basis, c, start, H, linear, fixed_first[q],
-            fixed_last[q], span[j0:j1], weights[j0:j1], site_place[j0:j1], target[j0:j1], direction[j0:j1], slide[j0:j1], tube, ones,
-            gap[q], 0.0, kept,
+            fixed_last[q], span[j0:j1], weights[j0:j1], site_place[j0:j1], target[j0:j1], direction[j0:j1], slide[j0:j1], tube,
+            axis_weights, gap[q], relative, kept,
         )  # fmt: skip
-        if moved[q]:
+        if good[q]:
             for i in range(n):
                 for k in range(axes):
                     old[i, k] = c[i, k]
@@ -423,4 +299,3 @@ def reshape(
                 used[j0 + j] = tube[j]
             for i in range(s1 - s0):
                 left[s0 + i] = kept[i]
-    return moved

@@ -6,16 +6,19 @@ import dataclasses
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.arrays import FloatArray
 from planner.corners.allocation import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.machine import Machine
-from planner.smoothing.basis import DEGREE, clamped, span_basis
+from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
+from planner.smoothing.forms import third_derivative_forms
 from planner.smoothing.guide import Guide, guide
 from planner.smoothing.lay import Laid, lay
 from planner.smoothing.relax import TUBE, relax
 from planner.smoothing.runs import Runs, find_runs, longest_span, stops
+
+RELATIVE_GAP = 1e-2  # the integral of the squared third derivatives need not be smaller than this [-]
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,7 +29,6 @@ class SplineShape:
     left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]
     reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
     used       : (J,) radius that each site may use [mm]
-    iterations : (Q,) of the interior-point method
     """
 
     runs: Runs
@@ -35,7 +37,6 @@ class SplineShape:
     left: FloatArray
     reserve: float
     used: FloatArray
-    iterations: Array
 
 
 def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
@@ -53,22 +54,26 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     # the longest span of a run: of its slowest leg
     of_run = _smallest(longest, runs)
     laid = lay(chain, runs, of_run)
-    left, iterations = np.empty(laid.span_first[-1]), np.empty(len(of_run), np.int64)
-    used = TUBE * laid.radius
+    left, used, good = np.empty(laid.span_first[-1]), TUBE * laid.radius, np.zeros(len(of_run), np.bool_)
     jerk = machine.limits("jerk", axes)
+    weights = (jerk.min() / jerk) ** 2
+    H = np.zeros((len(axes), len(laid.control), ORDER))
+    third_derivative_forms(laid.span_first, laid.breaks, weights, H)
+    nothing = np.zeros(len(of_run))
     relax(
         chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, laid.control,
         laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
-        runs.fixed_first, runs.fixed_last, (jerk.min() / jerk) ** 2, left, iterations,
+        runs.fixed_first, runs.fixed_last, left, H, np.zeros_like(H), nothing, weights, nothing, RELATIVE_GAP, good,
     )  # fmt: skip
+    laid = laid._replace(fits=good)
+    reserve = float((tolerance - tol).min())
     return SplineShape(
         runs=runs,
         guide=chain,
         laid=laid,
         left=left,
-        reserve=float((tolerance - tol).min()),
+        reserve=reserve,
         used=used,
-        iterations=iterations,
     )
 
 

@@ -48,7 +48,16 @@ def evaluate(samples: PathSamples, i: int, share: float) -> tuple[FloatArray, fl
     out, work = np.empty((4, 3)), np.empty((2, 4, 3))
     w = samples.w0[i] + share * (samples.w1[i] - samples.w0[i])
     middle = 0.5 * (samples.w0[i] + samples.w1[i])
-    element_point(samples.table.legs, samples.table.corners, samples.table.spans, samples.element[i], w, middle, work, out)
+    element_point(
+        samples.table.legs,
+        samples.table.corners,
+        samples.table.spans,
+        samples.element[i],
+        w,
+        middle,
+        work,
+        out,
+    )
     return out, to_arc_length(out)
 
 
@@ -195,7 +204,12 @@ def test_axis_accelerations_hold_anywhere_in_an_interval(job):
     rng = np.random.default_rng(1)
     solved = solve(EVERY[job], MACHINE)
     samples, x, u = solved.samples, solved.solution.feed_sq, solved.solution.acc_s
-    legs, corners, spans, scratch = samples.table.legs, samples.table.corners, samples.table.spans, np.empty((4, 3))
+    legs, corners, spans, scratch = (
+        samples.table.legs,
+        samples.table.corners,
+        samples.table.spans,
+        np.empty((4, 3)),
+    )
     for i in samples.intervals[:: max(1, len(samples) // 1000)]:
         middle = 0.5 * (samples.w0[i] + samples.w1[i])
         for share in (1e-6, *rng.uniform(0, 1, 3), 1 - 1e-6):

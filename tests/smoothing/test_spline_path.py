@@ -1,0 +1,232 @@
+"""Splines inside the tolerance: certified against brute force, smooth, and with the laws of a geometry that users can rely on."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks import problems
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.spline import DEGREE, span_point
+from planner.geometry.toolpath import Joint
+from planner.methods.optimal import OptimalMethod
+from planner.nc.reader import parse_program
+from planner.smoothing.spline_path import spline_shape, with_spline
+
+MACHINE = problems.machine()
+seeds = st.integers(0, 10**6)
+AS_IT_IS = OptimalMethod(corner="spline", rounds=0)
+
+
+def splined(program, machine=MACHINE, tolerance=None):
+    toolpath = toolpath_from_program(program, machine, tolerance)
+    path = round_corners(toolpath, machine, BezierCorner(), blend_tangents=True)
+    shape = spline_shape(path, machine)
+    return with_spline(path, shape), shape
+
+
+def random_polyline(rng, corners, axes=3, shortest=-2.0, sharpest=170.0):
+    """Steps of 10^shortest to 10 mm, turning by up to `sharpest` degrees."""
+    steps = np.empty((corners + 1, axes))
+    direction = rng.normal(size=axes)
+    for k in range(corners + 1):
+        direction /= np.linalg.norm(direction)
+        steps[k] = direction * 10.0 ** rng.uniform(shortest, 1.0)
+        side = rng.normal(size=axes)
+        side -= side @ direction * direction
+        angle = np.deg2rad(sharpest) * rng.uniform() ** 2
+        direction = np.cos(angle) * direction + np.sin(angle) * side / np.linalg.norm(side)
+    return np.vstack([np.zeros(axes), np.cumsum(steps, axis=0)])
+
+
+def frechet(curve, vertices):
+    """Discrete Frechet distance between two finely sampled curves."""
+    distance = np.linalg.norm(curve[:, None] - vertices[None], axis=2)
+    reach = np.full(distance.shape[1], np.inf)
+    for i, row in enumerate(distance):
+        before = reach.copy()
+        for j in range(len(row)):
+            best = before[j] if i else np.inf
+            if j:
+                best = min(best, reach[j - 1], before[j - 1] if i else np.inf)
+            elif i == 0:
+                best = 0.0
+            reach[j] = max(row[j], best)
+    return reach[-1]
+
+
+@given(seeds)
+@settings(max_examples=15)
+def test_certificate_holds_against_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    points = random_polyline(rng, 4, axes=2, shortest=-1.0)
+    path, shape = splined(problems.polyline(points))
+    assert shape.laid.fits.all()
+    out = np.empty((4, 2))
+    for q in range(len(path.spline)):
+        curve, chain = [], []
+        for i in range(path.spline.first[q], path.spline.first[q + 1]):
+            for tau in np.linspace(0.0, 1.0, 12, endpoint=False):
+                span_point(path.spline.spans, i, tau, out)
+                curve.append(out[0].copy())
+        a, b = shape.guide.first[q], shape.guide.first[q + 1]
+        chain = shape.guide.point[a:b]
+        fine = np.vstack([np.linspace(p, r, 60, endpoint=False) for p, r in itertools.pairwise(chain)])
+        fine = np.vstack([fine, chain[-1:]])
+        step = max(np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in (np.array(curve), fine))
+        assert frechet(np.array(curve), fine) <= MACHINE.tolerance - path.spline.budget.min() + step
+
+
+@given(seeds)
+@settings(max_examples=15)
+def test_pieces_of_a_run_join_with_four_derivatives(seed):
+    path, _shape = splined(problems.polyline(random_polyline(np.random.default_rng(seed), 6)))
+    spans = path.spline.spans
+    factorial = np.array([1.0, 1.0, 2.0, 6.0, 24.0, 120.0])
+    for q in range(len(path.spline)):
+        for i in range(path.spline.first[q], path.spline.first[q + 1] - 1):
+            left, right = spans[i], spans[i + 1]
+            for order in range(DEGREE):
+                m = np.arange(order, DEGREE + 1)
+                at_end = (factorial[m] / factorial[m - order]) @ left["coef"][m] / left["width"] ** order
+                at_start = factorial[order] * right["coef"][order] / right["width"] ** order
+                size = (
+                    (factorial[m] / factorial[m - order]) @ np.abs(left["coef"][m]) / left["width"] ** order
+                )
+                np.testing.assert_allclose(at_end, at_start, atol=1e-7 * size.max() + 1e-9)
+
+
+def test_long_straight_legs_stay_straight_and_join_smoothly():
+    program = parse_program("G21 G90 F6000\nG1 X100\nY100\nX200\nM2\n")
+    path, _shape = splined(program)
+    assert len(path.spline) == 2
+    free = path.legs.length - path.d_out[:-1] - path.d_in[1:]
+    assert (free > 50.0).all()
+    for q in range(2):
+        begin, end = path.spline.spans[path.spline.first[q]], path.spline.spans[path.spline.first[q + 1] - 1]
+        np.testing.assert_allclose(
+            begin["coef"][2:5], 0.0, atol=1e-9
+        )  # straight, at constant parameter speed
+        at_end = np.array([[0, 0, 2, 6, 12, 20], [0, 0, 0, 6, 24, 60], [0, 0, 0, 0, 24, 120]]) @ end["coef"]
+        np.testing.assert_allclose(at_end, 0.0, atol=1e-8)
+        np.testing.assert_allclose(np.linalg.norm(begin["coef"][1]), begin["width"], rtol=1e-9)
+
+
+def test_full_stops_are_kept():
+    program = parse_program("G21 G90 F6000\nG64\nG1 X1\nX2 Y1\nG4 P0.1\nX3 Y0\nX4 Y1\nX3 Y0\nM2\n")
+    path, _shape = splined(program)
+    stops = np.flatnonzero(path.joint == Joint.STOP)
+    assert len(stops) == 4  # both ends, the dwell, the reversal
+    for first, last in zip(path.spline.joint_first, path.spline.joint_last, strict=True):
+        assert not ((stops >= first) & (stops <= last)).any()
+    plan = AS_IT_IS.plan(program, MACHINE)
+    assert plan.verdict.passed, plan.verdict.faults
+
+
+def circle_of_chords(chords, radius=10.0):
+    angle = np.linspace(0.0, 2.0 * np.pi, chords + 1)
+    return problems.polyline(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+def test_a_circle_of_chords_gives_back_the_circle():
+    """Away from the ends the curvature is that of a circle inside the tolerance."""
+    path, _ = splined(circle_of_chords(360))
+    out = np.empty((4, 2))
+    middle = range(len(path.spline.spans) // 4, 3 * len(path.spline.spans) // 4)
+    for i in middle:
+        span_point(path.spline.spans, i, 0.5, out)
+        curvature = abs(out[1, 0] * out[2, 1] - out[1, 1] * out[2, 0]) / np.linalg.norm(out[1]) ** 3
+        assert 1.0 / curvature == pytest.approx(10.0, rel=0.02)
+        assert np.linalg.norm(out[0]) == pytest.approx(10.0, abs=0.05)
+
+
+def time_of(program, machine=MACHINE, tolerance=None, method=AS_IT_IS):
+    plan = method.plan(program, machine, tolerance)
+    assert plan.verdict.passed, plan.verdict.faults
+    return plan.trajectory.cycle_time
+
+
+def test_refining_collinear_points_changes_nothing():
+    points = random_polyline(np.random.default_rng(3), 6)
+    finer = np.vstack([np.linspace(p, r, 4, endpoint=False) for p, r in itertools.pairwise(points)])
+    assert time_of(problems.polyline(np.vstack([finer, points[-1:]]))) == pytest.approx(
+        time_of(problems.polyline(points)), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_turned_and_mirrored_jobs_take_the_same_time(seed):
+    points = random_polyline(np.random.default_rng(seed), 8)
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    expected = time_of(problems.polyline(points))
+    for matrix in (quarter, np.diag([1.0, 1.0, -1.0])):
+        assert time_of(problems.polyline(points @ matrix.T)) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_scaled_jobs_take_the_same_time(seed):
+    """Inches or metres: lengths and limits by k keep the time."""
+    points, k = random_polyline(np.random.default_rng(seed), 8), 25.4
+    expected = time_of(problems.polyline(points))
+    axes = {
+        name: axis.model_copy(update={q: getattr(axis, q) * k for q in ("velocity", "acceleration", "jerk")})
+        for name, axis in MACHINE.axes.items()
+    }
+    larger = MACHINE.model_copy(update={"axes": axes, "tolerance": MACHINE.tolerance * k})
+    program = problems.polyline(points)
+    program = dataclasses.replace(
+        program, start=program.start * k, end=program.end * k, feed=program.feed * k
+    )
+    assert time_of(program, larger) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_more_tolerance_does_not_cost_time(seed):
+    """Not without rounds of reshaping: what is smoothest in itself is not what is fastest."""
+    program = problems.polyline(random_polyline(np.random.default_rng(seed), 10))
+    method = OptimalMethod(corner="spline", rounds=4)
+    times = [time_of(program, tolerance=tol, method=method) for tol in (0.01, 0.02, 0.05, 0.1)]
+    assert (np.diff(times) <= 1e-3 * times[0]).all()
+
+
+@pytest.mark.parametrize(("tolerance", "shortest"), [(1e-3, 0.5), (1.0, -1.0), (0.05, -3.0)])
+def test_extreme_tolerances_are_kept(tolerance, shortest):
+    """1 um; 1 mm on segments of 0.1 mm; segments of 1 um."""
+    rng = np.random.default_rng(5)
+    points = random_polyline(rng, 40, shortest=shortest, sharpest=60.0)
+    time_of(problems.polyline(points), tolerance=tolerance)
+
+
+@given(seeds)
+@settings(max_examples=12)
+def test_random_polylines_are_verified(seed):
+    rng = np.random.default_rng(seed)
+    time_of(problems.polyline(random_polyline(rng, 12, axes=int(rng.integers(2, 4)), sharpest=179.0)))
+
+
+def test_arcs_become_part_of_the_curve():
+    program = parse_program(
+        "G21 G90 G17 F6000\nG1 X5\nG2 X10 Y-5 R5\nG1 Y-8\nG3 X12 Y-10 I2 J0\nG1 X20\nM2\n"
+    )
+    corners = OptimalMethod(corner="bezier").plan(program, MACHINE)
+    spline = AS_IT_IS.plan(program, MACHINE)
+    assert spline.verdict.passed
+    assert spline.trajectory.cycle_time < corners.trajectory.cycle_time
+
+
+def test_feed_changes_keep_their_place():
+    lines = "".join(
+        f"G1 X{0.2 * k:.1f} Y{0.02 * (k % 2):.2f} F{6000 if k < 50 else 600}\n" for k in range(1, 101)
+    )
+    plan = AS_IT_IS.plan(parse_program("G21 G90\n" + lines + "M2\n"), MACHINE)
+    assert plan.verdict.passed, plan.verdict.faults
+    slow = plan.trajectory.position[:, 0] > 9.8 + 0.1
+    assert plan.trajectory.feed[slow].max() <= 10.0 * (1 + 1e-6)
+    assert plan.trajectory.feed.max() > 50.0

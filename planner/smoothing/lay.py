@@ -31,7 +31,7 @@ SITES_DENSE = (
     0.125  # vertices nearer than this share of a span to the site before are left to the certificate [spans]
 )
 DENSE_TURN = 0.1  # ... unless the path turns there by more [rad]
-SLIDE = 0.1  # a site on a chord may slide by its radius over this
+SLIDE = 0.1  # a site on a chord may slide along it by its radius over this, less near the chord's ends
 
 
 class Laid(NamedTuple):
@@ -175,7 +175,10 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
                         value = value * tau + basis[i, d, p]
                     weights[j, d] = value
                 chord = vertex if vertex >= 0 else ~vertex
-                slide[j] = 1.0 if vertex >= 0 else SLIDE
+                slide[j] = 1.0
+                if vertex < 0:  # an ellipse inside what is within the radius of the chord
+                    near = min(u - here[chord], here[chord + 1] - u)
+                    slide[j] = max(radius[j] / (near + radius[j]), SLIDE)
                 dot, square = 0.0, 0.0
                 for k in range(axes):
                     direction[j, k] = along[a + chord, k]

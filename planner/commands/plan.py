@@ -37,6 +37,12 @@ def plan(
     solver: Annotated[
         Solver, typer.Option(help="of method toppra: our kernel, or the package toppra for comparison")
     ] = Solver.reachability,
+    rounds: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="of reshaping splines for optimal [default: as many as the size of the job lets pay]"
+        ),
+    ] = None,
     tolerance: ToleranceOption = None,
     output: Annotated[
         Path | None,
@@ -63,6 +69,7 @@ def plan(
             machine or DEFAULT_MACHINE,
             method=method.value,
             corner=corner.value,
+            rounds=rounds,
             solver=solver.value,
             tolerance=tolerance,
             progress=progress,

@@ -1,7 +1,8 @@
 """Which geometry a time-optimal motion runs on: rounded corners, one spline, or the better of both from stop to stop.
 
 "spline" puts splines in the place of all runs of corners that they fit (smoothing/) and reshapes them (methods/reshape.py). "auto"
-plans the rounded corners too and keeps them between the full stops where they are faster.
+plans the rounded corners too and keeps them between the full stops where they are faster; beyond `COMPARED_POINTS`, where it would
+take as long again, it is "spline": corners were not faster between any two stops of the programs at hand.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ WORK = 150_000
 POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
 # ... and at most so many: what a round gains has fallen below 1e-4 of the cycle time by then.
 ROUNDS_MAX = 20
+COMPARED_POINTS = 300_000
 # A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
 FINE_POINTS, FINER = 20_000, 0.25
 
@@ -56,18 +58,19 @@ def on_spline(
     if rounds is None:
         rounds = _affordable(shape)
     shape, best = reshaped(rounded, shape, usual, rounds, stages)
-    if auto:
+    if auto and POINTS_PER_SPAN * len(shape.left) <= COMPARED_POINTS:
         shape, best = _with_corners(rounded, shape, best, usual)
     if best.solution.solved and len(best.samples) <= FINE_POINTS:
         fine = plan_on(best.path, FINER)
         if fine.solution.solved and fine.solution.cycle_time < best.solution.cycle_time:
             best = fine
-    return best
+    return dataclasses.replace(best, shape=shape)
 
 
 def _affordable(shape: SplineShape) -> int:
+    """Rounds for the size of a job."""
     points = POINTS_PER_SPAN * len(shape.left)
-    return int(np.clip(round(WORK / points), 1, ROUNDS_MAX))
+    return min(int(WORK // points), ROUNDS_MAX)
 
 
 def _with_corners(

@@ -57,6 +57,7 @@ def plan(
     method: str | Method = "optimal",
     corner: str = "auto",
     solver: str = "reachability",
+    rounds: int | None = None,
     tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
@@ -67,13 +68,14 @@ def plan(
     method    : a name of `METHODS`, or a method with settings of your own
     corner    : "auto", "spline", "bezier", "fir" or "kinematic"; for "toppra" and "optimal"
     solver    : "reachability" or "toppra"; for "toppra"
+    rounds    : in which "optimal" reshapes splines by what their motion pays for; None for as many as the size of the job lets pay
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
     Raises InputError naming file, line and column. A problem that could not be solved is the plan's status; `Plan.require`
     turns it into an exception.
     """
-    chosen = _method(method, corner, solver) if isinstance(method, str) else method
+    chosen = _method(method, corner, solver, rounds) if isinstance(method, str) else method
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if isinstance(program, Program):
@@ -85,11 +87,13 @@ def plan(
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 
-def _method(name: str, corner: str, solver: str) -> Method:
+def _method(name: str, corner: str, solver: str, rounds: int | None) -> Method:
     if solver not in SOLVERS:
         raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
+    if rounds is not None and rounds < 0:
+        raise InputError(f"{rounds} rounds; it must be 0 or more")
     if name == "optimal":
-        return OptimalMethod(corner=corner)
+        return OptimalMethod(corner=corner, rounds=rounds)
     if name == "toppra":
         return ToppraMethod(corner=corner, solver=solver)
     if name == "bezier":

@@ -29,12 +29,13 @@ from planner.methods.closed_form import corner_table
 from planner.methods.geometry import AUTO, SPLINE, on_spline
 from planner.methods.plan import Plan
 from planner.methods.prices import price_list
-from planner.methods.reshape import OnPath
+from planner.methods.reshape import OnPath, tube_prices
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.methods.toppra import corner_shape
 from planner.nc.program import Program
 from planner.path import RESOLUTION, sample_path
 from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
+from planner.verify import Verdict
 
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
 # (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
@@ -44,6 +45,8 @@ SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
+# A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
+SEEN_EXCESS_MAX = 5e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,10 +98,20 @@ class OptimalMethod:
                 motion = Motion(samples=samples, law=law_of_solution(samples, solution))
                 motion = slowed(motion, toolpath, machine)
             trajectory, verdict = deliver(motion, toolpath, machine, stages)
+            factor = seen_excess(verdict)
+            if factor > 1.0:
+                motion = _slower(motion, np.full(len(samples.piece) - 1, factor * (1.0 + SLOWING_MORE)))
+                trajectory, verdict = deliver(motion, toolpath, machine, stages)
             with stages.stage("report"):
                 corners = corner_table(samples, problem, solution)
                 grid = history(problem, solution, motion.law)
-                prices = price_list(samples, problem, solution, machine) if solution.multipliers else None
+                if solution.multipliers:
+                    by_site = (
+                        (best.shape.laid.place, tube_prices(best, best.shape))
+                        if best.shape and len(best.path.spline)
+                        else None
+                    )
+                    prices = price_list(samples, problem, solution, machine, by_site)
         return Plan(
             method="optimal",
             corner=str(self.corner) if spline else shape.name,
@@ -142,6 +155,17 @@ def slowed(motion: Motion, toolpath: Toolpath, machine: Machine) -> Motion:
             break
         motion = _slower(motion, np.where(slow, factor * (1.0 + SLOWING_MORE), 1.0))
     return motion
+
+
+def seen_excess(verdict: Verdict) -> float:
+    """By what factor a motion has to be slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing:
+    the verifier looks between the places that `slowed` looks at, and at differences of positions. Else 1."""
+    order = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, "jerk": 3}
+    limited = [check for check in verdict.limits.values() if check.limited]
+    if max((check.ratio for check in limited), default=0.0) > 1.0 + SEEN_EXCESS_MAX:
+        return 1.0
+    over = (check for check in limited if check.broken)
+    return max((check.ratio ** (1.0 / order[check.name.partition(".")[0]]) for check in over), default=1.0)
 
 
 def _slower(motion: Motion, factor: FloatArray) -> Motion:

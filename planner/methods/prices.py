@@ -16,8 +16,12 @@ together and both must give (equal axes at 45 degrees) the time has a kink and t
 one. The programmed feed's price is that of more feed.
 
 Growing to scale is what Bezier corners do. Corner shapes that limits and filters design ("fir", "kinematic") bend while they grow:
-there acceleration and jerk are priced with the shape as it is, and the tolerance to within 10 % (kinematic) or a third (fir). Paths
-that are not rounded corner by corner do not tell what the tolerance costs, and accelerations are priced with the path as it is.
+there acceleration and jerk are priced with the shape as it is, and the tolerance to within 10 % (kinematic) or a third (fir).
+
+Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of reshaping (methods/reshape.py)
+from the present shape gives dT/d(tolerance) at every site as a multiplier, added up at the nearest joint of the program. They are those
+of an optimum that the plan has not quite reached: 10 to 25 % above what plans made again gained by 1 to 10 um more (pentagon, zig-zag,
+spiral, relief). Accelerations are priced with the path as it is.
 
 **Finite changes.** 10 um are a fifth to a whole of usual tolerances, too much for a derivative alone. What accelerations let through
 a corner goes with the root of its size, so savings by tolerance are extrapolated as roots,
@@ -97,7 +101,7 @@ class PriceList:
 
     limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]
     feed      : dT/d(ln feed override) [s]
-    tolerance : dT/d(tolerance of all corners) [s/mm]; None where it is not known: the path is not one of rounded corners
+    tolerance : dT/d(tolerance) [s/mm]; None where it is not known: on splines that nothing priced
     saved     : by `MORE_LIMIT` more of each axis limit and of the "feed", by `MORE_TOLERANCE` more "tolerance" if known [s]
     corners   : the dearest ones; None where they are not known
     """
@@ -115,9 +119,16 @@ class PriceList:
 
 
 def price_list(
-    samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution, machine: Machine
+    samples: PathSamples,
+    problem: FeedrateProblem,
+    solution: FeedrateSolution,
+    machine: Machine,
+    by_site: tuple[FloatArray, FloatArray] | None = None,
 ) -> PriceList:
-    """The prices of a solution. Raises ValueError if its solver gives no multipliers."""
+    """The prices of a solution. Raises ValueError if its solver gives no multipliers.
+
+    by_site : for splines, places along the legs (J,) [mm] and dT/d(tolerance) there (J,) (`reshape.tube_prices`)
+    """
     now = lagrangian(problem, solution)
     prices = solution.prices
     assert prices is not None  # solvers that give multipliers give prices
@@ -131,7 +142,12 @@ def price_list(
     by_share["feed"] = _by_feed(samples, problem, machine, now)  # these are dT/d(ln limit)
     saved_by_tolerance: dict[str, float] = {}
     tolerance = dear = None
-    if isinstance(samples.path, SmoothPath) and not len(samples.path.spline):
+    if by_site is not None:
+        together = _by_joint(samples.path, *by_site)
+        tolerance = float(together.sum())
+        saved_by_tolerance["tolerance"] = float(_saved(tolerance, float(samples.path.tol.mean())))
+        dear = _dearest(samples.path, together)
+    elif isinstance(samples.path, SmoothPath) and not len(samples.path.spline):
         corners = _corners(samples.path, samples, problem, solution, machine, now)
         for axis in problem.axes:
             by_share[f"acceleration.{axis}"] += corners.by_acceleration(axis)
@@ -147,6 +163,29 @@ def price_list(
         tolerance=tolerance,
         saved={name: -more * price for name, price in by_share.items()} | saved_by_tolerance,
         corners=dear,
+    )
+
+
+def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatArray:
+    """(R+1,) prices of places along the legs, added up at the nearest joint."""
+    joints = np.concatenate([[0.0], np.cumsum(path.legs.length)])
+    middles = (joints[1:] + joints[:-1]) / 2.0
+    return _sums(np.searchsorted(middles, place), price, len(joints))
+
+
+def _dearest(path: SmoothPath, price: FloatArray) -> DearCorners:
+    """The dearest joints of a spline, of prices (R+1,)."""
+    saved = np.asarray(_saved(price, path.tol))
+    best = np.argsort(-saved, kind="stable")[:DEAREST]
+    best = best[saved[best] >= SAVED_MIN]
+    at = path.legs.first[best]
+    toolpath = path.toolpath
+    return DearCorners(
+        line=toolpath.line[np.maximum(at - 1, 0)],
+        position=np.where((at > 0)[:, None], toolpath.end[at - 1], toolpath.start[0]),
+        theta=path.theta[best],
+        price=price[best],
+        saved=saved[best],
     )
 
 

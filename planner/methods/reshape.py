@@ -43,12 +43,13 @@ GAP = 1e-4  # of a round, share of the cycle time [-]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OnPath:
-    """A smooth path, its grid, and the time-optimal motion on it."""
+    """A smooth path, its grid, and the time-optimal motion on it; the shape of its splines, if it has some."""
 
     path: SmoothPath
     samples: PathSamples
     problem: FeedrateProblem
     solution: FeedrateSolution
+    shape: SplineShape | None = None
 
 
 PlanOn = Callable[[SmoothPath], OnPath]
@@ -71,7 +72,7 @@ def reshaped(
         with stages.stage("geometry"):
             H, Q = price_bands(best, shape)
             paid = H if paid is None else paid + SHARE * (H - paid)
-            new = _reshape(best, shape, force, paid, Q)
+            new, _ = _reshape(best, shape, force, paid, Q)
         tried = plan_on(with_spline(rounded, new))
         if not tried.solution.solved:
             break
@@ -112,17 +113,28 @@ def _chosen(old: SplineShape, new: SplineShape, better: Array) -> SplineShape:
 
 def _reshape(
     planned: OnPath, shape: SplineShape, force: FloatArray, H: FloatArray, Q: FloatArray
-) -> SplineShape:
-    """The shape after one round with the bands H of what is paid and Q of the pull."""
+) -> tuple[SplineShape, FloatArray]:
+    """The shape after one round with the bands H of what is paid and Q of the pull; also what the sites' tubes cost (J,)
+    [s per mm of radius]."""
     laid, runs, chain = shape.laid, shape.runs, shape.guide
     control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
+    multiplier = np.zeros(len(used))
     relax(
         chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
         laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
         runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned, shape), 0.0,
-        np.zeros(len(force), np.bool_),
+        np.zeros(len(force), np.bool_), multiplier,
     )  # fmt: skip
-    return dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
+    return dataclasses.replace(
+        shape, laid=laid._replace(control=control), used=used, left=left
+    ), -multiplier / used
+
+
+def tube_prices(planned: OnPath, shape: SplineShape) -> FloatArray:
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube in a round from the present shape."""
+    H, Q = price_bands(planned, shape)
+    _, prices = _reshape(planned, shape, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
+    return prices
 
 
 def price_bands(planned: OnPath, shape: SplineShape) -> tuple[FloatArray, FloatArray]:

@@ -175,6 +175,7 @@ def minimise(
     slide,
     radius,
     c,
+    z,
     value,
     gap_first,
     gap_last,
@@ -183,6 +184,7 @@ def minimise(
 ):
     """Move the control points c (n, A), strictly inside the tube, to the optimum; returns the gap and the iterations.
 
+    z         : (m,) becomes the multipliers of g
     value     : of the objective at the start, in as far as it matters
     gap_first : guess of the gap there, for the first multipliers
     gap_last, relative : where to end, gap <= gap_last + relative * value
@@ -197,7 +199,6 @@ def minimise(
     slope, slope_1, factor = np.empty(m), np.empty(m), np.empty(m)
     step, step_1 = np.empty((n, axes)), np.empty((n, axes))
     _constraint(c, first, values, place, along, slide, radius, g, e)
-    z = np.empty(m)
     for site in range(m):
         z[site] = gap_first / m / -g[site]
     start = _objective(H, linear, c, gradient)

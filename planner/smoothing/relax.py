@@ -174,7 +174,7 @@ def _first_site(span, value):
 @njit(cache=True, error_model="numpy")
 def relax_run(
     place, point, along, tol, tol_chord, cut, basis, c, c0, H, linear, fixed_first, fixed_last, span, weights, site_place, target,
-    direction, slide, used, axis_weights, gap_last, relative, left,
+    direction, slide, used, axis_weights, gap_last, relative, left, multiplier,
 ):  # fmt: skip
     """Relax one run, `c` (n, A) inside the tube of radii `used` (J,), window by window; returns whether the result has a certificate.
     `c0` is a path well inside the tube."""
@@ -226,7 +226,8 @@ def relax_run(
                 if relative > 0.0:
                     energy = third_derivative_energy(cut, basis, axis_weights, c, a, min(hi, spans))
                 minimise(
-                    part, linear[a:b], free, here, weights[j0:j1], aim, direction[j0:j1], slide[j0:j1], used[j0:j1], near, energy,
+                    part, linear[a:b], free, here, weights[j0:j1], aim, direction[j0:j1], slide[j0:j1], used[j0:j1], near,
+                    multiplier[j0:j1], energy,
                     energy + FIRST_GAP * gap_last, gap_last, relative, ITERATIONS,
                 )  # fmt: skip
                 for i in range(lo, hi):
@@ -247,12 +248,14 @@ def relax_run(
 def relax(
     first, place, point, along, tol, tol_chord, span_first, breaks, control, site_first, span, weights, site_place, target, direction,
     slide, used, fits, fixed_first, fixed_last, left, H_all, Q_all, force, axis_weights, gap, relative, good,
+    multiplier,
 ):  # fmt: skip
     """Move the `control` of all runs that fit to the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now) inside the tube; a run without
     a certificate stays as it is, and is not `good` (Q,).
 
     used         : (J,) radius that each site may use, smaller afterwards where the certificate asked for it
     left         : (S,) what the certificate leaves of the tolerance
+    multiplier   : (J,) of the sites' constraints (interior.py)
     H_all, Q_all : (A, n, 6) bands of all runs
     force        : (Q,) of each run
     gap, relative : where to end: gap (Q,) in the units of H, or that share of the integral of squared third derivatives with the
@@ -289,7 +292,7 @@ def relax(
         good[q] = relax_run(
             place[b0:b1], point[b0:b1], along[b0:b1], tol[b0:b1], tol_chord[b0:b1], cut, basis, c, start, H, linear, fixed_first[q],
             fixed_last[q], span[j0:j1], weights[j0:j1], site_place[j0:j1], target[j0:j1], direction[j0:j1], slide[j0:j1], tube,
-            axis_weights, gap[q], relative, kept,
+            axis_weights, gap[q], relative, kept, multiplier[j0:j1],
         )  # fmt: skip
         if good[q]:
             for i in range(n):

@@ -64,6 +64,7 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
         chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, laid.control,
         laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
         runs.fixed_first, runs.fixed_last, left, H, np.zeros_like(H), nothing, weights, nothing, RELATIVE_GAP, good,
+        np.empty(len(used)),
     )  # fmt: skip
     laid = laid._replace(fits=good)
     reserve = float((tolerance - tol).min())

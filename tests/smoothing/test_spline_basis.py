@@ -48,7 +48,7 @@ def test_control_points_at_greville_s_places_give_a_straight_line(seed, spans):
     np.testing.assert_allclose(BSpline(knots, greville(knots), DEGREE)(u), u, rtol=1e-12)
 
 
-@given(seeds, st.integers(1, 40), st.integers(1, 9))
+@given(seeds, st.integers(9, 40), st.integers(1, 9))
 @settings(max_examples=40)
 def test_banded_solution_is_that_of_scipy(seed, n, width):
     rng = np.random.default_rng(seed)

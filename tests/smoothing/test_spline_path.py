@@ -66,12 +66,12 @@ def frechet(curve, vertices):
 @settings(max_examples=15)
 def test_certificate_holds_against_brute_force(seed):
     rng = np.random.default_rng(seed)
-    points = random_polyline(rng, 4, axes=2, shortest=-1.0)
+    points = random_polyline(rng, 4, shortest=-1.0)
     path, shape = splined(problems.polyline(points))
     assert shape.laid.fits.all()
-    out = np.empty((4, 2))
+    out = np.empty((4, len(path.toolpath.axes)))
     for q in range(len(path.spline)):
-        curve, chain = [], []
+        curve = []
         for i in range(path.spline.first[q], path.spline.first[q + 1]):
             for tau in np.linspace(0.0, 1.0, 12, endpoint=False):
                 span_point(path.spline.spans, i, tau, out)
@@ -100,7 +100,8 @@ def test_pieces_of_a_run_join_with_four_derivatives(seed):
                 size = (
                     (factorial[m] / factorial[m - order]) @ np.abs(left["coef"][m]) / left["width"] ** order
                 )
-                np.testing.assert_allclose(at_end, at_start, atol=1e-7 * size.max() + 1e-9)
+                rounding = 1e-11 / min(left["width"], right["width"]) ** order  # of positions of some 10 mm
+                np.testing.assert_allclose(at_end, at_start, atol=1e-9 * size.max() + rounding)
 
 
 def test_long_straight_legs_stay_straight_and_join_smoothly():
@@ -138,7 +139,7 @@ def circle_of_chords(chords, radius=10.0):
 def test_a_circle_of_chords_gives_back_the_circle():
     """Away from the ends the curvature is that of a circle inside the tolerance."""
     path, _ = splined(circle_of_chords(360))
-    out = np.empty((4, 2))
+    out = np.empty((4, len(path.toolpath.axes)))
     middle = range(len(path.spline.spans) // 4, 3 * len(path.spline.spans) // 4)
     for i in middle:
         span_point(path.spline.spans, i, 0.5, out)
@@ -189,7 +190,6 @@ def test_scaled_jobs_take_the_same_time(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_more_tolerance_does_not_cost_time(seed):
-    """Not without rounds of reshaping: what is smoothest in itself is not what is fastest."""
     program = problems.polyline(random_polyline(np.random.default_rng(seed), 10))
     method = OptimalMethod(corner="spline", rounds=4)
     times = [time_of(program, tolerance=tol, method=method) for tol in (0.01, 0.02, 0.05, 0.1)]

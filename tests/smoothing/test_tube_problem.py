@@ -82,8 +82,9 @@ def test_same_optimum_as_ipopt(seed, linear_part):
     expected = by_ipopt(H, first, weights, place, along, slide, radius, control, linear)
     start = objective(H, linear, control)
     c = control.copy()
+    z = np.empty(len(first))
     gap, iterations = minimise(
-        H, linear, free, first, weights, place, along, slide, radius, c, 0.0, abs(start), 1e-7 * abs(start), 0.0, 100
+        H, linear, free, first, weights, place, along, slide, radius, c, z, 0.0, abs(start), 1e-7 * abs(start), 0.0, 100
     )  # fmt: skip
     assert iterations < 40
     assert gap <= 1e-7 * abs(start)
@@ -96,8 +97,9 @@ def test_every_iterate_is_inside_the_tube(iterations):
     H, first, weights, place, along, slide, radius, control = random_tube(7, 20, 3, 40)
     c = control.copy()
     start = objective(H, np.zeros_like(c), c)
+    z = np.empty(len(first))
     minimise(
-        H, np.zeros_like(c), np.ones(len(c), bool), first, weights, place, along, slide, radius, c, start, start, 0.0, 1e-6,
+        H, np.zeros_like(c), np.ones(len(c), bool), first, weights, place, along, slide, radius, c, z, start, start, 0.0, 1e-6,
         iterations,
     )  # fmt: skip
     d = np.einsum("jb,jbk->jk", weights, c[first[:, None] + np.arange(ORDER)]) - place

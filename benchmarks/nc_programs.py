@@ -1,6 +1,6 @@
 """Plan and verify every program of a folder: does each end with a verdict or a reason, and what does it take?
 
-    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--name RESULT]
+    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME] [--name RESULT]
 
 Every file is planned in a process of its own, so that peak memory is the file's and nothing can take the others down.
 """
@@ -26,6 +26,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("-m", "--machine", required=True)
     parser.add_argument("--method", default="optimal")
+    parser.add_argument("--corner", default="auto")
     parser.add_argument("--name", default="jerk-nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
     options = parser.parse_args()
@@ -36,7 +37,7 @@ def main() -> None:
     for file in files:
         began = time.perf_counter()
         receive, send = context.Pipe(duplex=False)
-        process = context.Process(target=_run, args=(send, str(file), options.machine, options.method))
+        process = context.Process(target=_run, args=(send, str(file), options.machine, options.method, options.corner))
         process.start()
         send.close()
         try:
@@ -48,16 +49,16 @@ def main() -> None:
         rows.append(row)
         print(file.name, json.dumps(row)[:200], flush=True)
         write_results(
-            options.name, {"method": options.method, "programs": rows}, _table(rows)
+            options.name, {"method": options.method, "corner": options.corner, "programs": rows}, _table(rows)
         )  # a kill loses nothing
 
 
-def _run(pipe: Any, file: str, machine: str, method: str) -> None:
+def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
     """Plan one file; everything that can go wrong is an outcome."""
     import planner
 
     try:
-        plan = planner.plan(file, machine, method=method)
+        plan = planner.plan(file, machine, method=method, corner=corner)
     except planner.InputError as fault:
         pipe.send({"outcome": "refused", "message": str(fault).replace(file, Path(file).name)})
         return

@@ -154,6 +154,8 @@ def slowed(motion: Motion, toolpath: Toolpath, machine: Machine) -> Motion:
         if not slow.any():
             break
         motion = _slower(motion, np.where(slow, factor * (1.0 + SLOWING_MORE), 1.0))
+        if factor.max() <= 1.0 + SEEN_EXCESS_MAX:
+            break  # what the samples of the slower motion may find more, the verifier will see
     return motion
 
 

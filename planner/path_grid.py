@@ -23,6 +23,8 @@ HALVINGS_MAX = 20
 REST_GROWTH = 0.5
 # Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by this share of the distance.
 STEEPEST, SLOPE = 4.0, 1.0
+# ... but not down to neighbours that are shorter than this share of them [-]: those are rounding.
+FINEST = 1e-4
 
 
 @njit(cache=True, error_model="numpy")
@@ -195,7 +197,8 @@ def grade(legs, rows):
         elif r == 0 or rows[r - 1].last:
             size[r] = here
         else:
-            size[r] = min(here, rows[r - 1].end - rows[r - 1].begin)
+            before = rows[r - 1].end - rows[r - 1].begin
+            size[r] = max(min(here, before), FINEST * max(here, before))
     size[len(rows)] = np.inf
     for r in range(1, len(rows)):
         if not rows[r - 1].last:

@@ -64,7 +64,7 @@ def reshaped(
     plan_on : solves the feedrate problem on a path
     """
     best = plan_on(with_spline(rounded, shape))
-    if not best.solution.solved or not len(best.path.spline):
+    if not best.solution.solved or best.solution.multipliers is None or not len(best.path.spline):
         return shape, best
     force = np.full(len(shape.laid.fits), FIRST_FORCE)
     paid: FloatArray | None = None  # mean over the rounds

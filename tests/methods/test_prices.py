@@ -250,7 +250,7 @@ def test_paths_without_corners(program):
 def test_a_plotter_file_has_prices(tmp_path):
     file = tmp_path / "square.plt"
     file.write_text("IN;SP1;PU0,0;PD1000,0;PD1000,1000;PD0,1000;PU;SP0;")
-    plan = planner.plan(file, "plotter", method="optimal")
+    plan = planner.plan(file, "plotter", method="optimal", corner="bezier")
     assert plan.prices.saved["tolerance"] > 0.0
     assert len(plan.prices.corners) == 2
 
@@ -295,3 +295,19 @@ def test_a_solver_without_multipliers_has_no_prices():
     plan = OptimalMethod(solver=Silent()).plan(job.program, MACHINE)
     assert plan.solved
     assert plan.prices is None
+
+
+@pytest.mark.parametrize("name", ["pentagon", "zigzag"])
+def test_splines_price_their_tolerance(name):
+    """Within a third of plans made again with 1 to 10 um more: the plan is not quite the optimum that the multipliers belong to."""
+    program = problems.all_jobs()[name]
+    method = OptimalMethod(corner="spline", rounds=8)
+    plan = method.plan(program, MACHINE)
+    more = 0.005
+    wider = method.plan(program, MACHINE, MACHINE.tolerance + more)
+    slope = (wider.trajectory.cycle_time - plan.trajectory.cycle_time) / more
+    assert plan.prices.tolerance == pytest.approx(slope, rel=0.34)
+    dear = plan.prices.corners
+    assert 0 < len(dear) <= 10
+    assert (np.diff(dear.saved) <= 0.0).all()
+    assert dear.price.sum() >= plan.prices.tolerance * (1 + 1e-9)  # part of the whole, all negative

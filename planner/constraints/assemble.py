@@ -90,7 +90,8 @@ def _remaining_budget(samples: PathSamples, machine: Machine) -> FloatArray:
     whole = np.minimum(tolerance[samples.segment], tolerance[samples.segment + 1])
     budget = np.where(corner, path.tol[joint] - path.tol_ap[joint], whole)
     span = element - len(samples.table.legs)
-    budget[span >= 0] = path.spline.budget[span[span >= 0]]
+    if (span >= 0).any():
+        budget[span >= 0] = path.spline.budget[span[span >= 0]]
     return budget
 
 

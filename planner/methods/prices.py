@@ -50,6 +50,7 @@ from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
 from planner.feedrate.solution import FeedrateSolution
+from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.path import PathSamples, moved_grid
 from planner.path_rows import FREE_PART_MIN
@@ -167,10 +168,11 @@ def price_list(
 
 
 def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatArray:
-    """(R+1,) prices of places along the legs, added up at the nearest joint."""
+    """(R+1,) prices of places along the legs, added up at the nearest joint that is no full stop."""
     joints = np.concatenate([[0.0], np.cumsum(path.legs.length)])
-    middles = (joints[1:] + joints[:-1]) / 2.0
-    return _sums(np.searchsorted(middles, place), price, len(joints))
+    inner = np.flatnonzero(path.joint != Joint.STOP)
+    middles = (joints[inner[1:]] + joints[inner[:-1]]) / 2.0
+    return _sums(inner[np.searchsorted(middles, place)], price, len(joints))
 
 
 def _dearest(path: SmoothPath, price: FloatArray) -> DearCorners:
@@ -181,8 +183,8 @@ def _dearest(path: SmoothPath, price: FloatArray) -> DearCorners:
     at = path.legs.first[best]
     toolpath = path.toolpath
     return DearCorners(
-        line=toolpath.line[np.maximum(at - 1, 0)],
-        position=np.where((at > 0)[:, None], toolpath.end[at - 1], toolpath.start[0]),
+        line=toolpath.line[at - 1],
+        position=toolpath.end[at - 1],
         theta=path.theta[best],
         price=price[best],
         saved=saved[best],

@@ -155,4 +155,4 @@ def test_the_feeds_of_dense_blocks_add_up_to_the_cycle_time() -> None:
 
 def test_the_feeds_of_the_peers_programs_add_up(shared_dir: Path) -> None:
     for path in sorted((shared_dir / "peers" / "programs").glob("*.ngc")):
-        assert_total(plan(path, MACHINE, method="toppra"), path.read_bytes())
+        assert_total(plan(path, MACHINE, method="toppra", corner="bezier"), path.read_bytes())

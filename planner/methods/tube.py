@@ -50,7 +50,7 @@ class TubeMethod:
     solver : settings of the search
     """
 
-    start: OptimalMethod = field(default_factory=OptimalMethod)
+    start: OptimalMethod = field(default_factory=lambda: OptimalMethod(corner="bezier"))
     solver: TubeNLP = field(default_factory=TubeNLP)
 
     def plan(

@@ -155,9 +155,7 @@ def _edges(toolpath: Toolpath, budget: FloatArray) -> Array:
     """Joints between legs: those of geometry/legs.py, and where feed or budget change on a line."""
     edge = np.zeros(len(toolpath) + 1, dtype=bool)
     edge[legs_of(toolpath).first] = True
-    edge[1:-1] |= (toolpath.feed[1:] != toolpath.feed[:-1]) & (toolpath.feed[1:] != toolpath.feed[:-1]) | (
-        np.diff(budget) != 0
-    )
+    edge[1:-1] |= (toolpath.feed[1:] != toolpath.feed[:-1]) | (np.diff(budget) != 0)
     return np.flatnonzero(edge)
 
 

@@ -62,7 +62,7 @@ def test_jobs_are_verified_and_faster_than_on_rounded_corners(name):
     made = tube(name).require()
     assert made.verdict.passed, made.verdict.faults
     assert made.status in (Status.OPTIMAL, Status.ACCEPTABLE)
-    rounded = OptimalMethod().plan(JOBS[name], MACHINE).trajectory.cycle_time
+    rounded = OptimalMethod(corner="bezier").plan(JOBS[name], MACHINE).trajectory.cycle_time
     assert made.trajectory.cycle_time < rounded
     said = float(re.search(r"its start, took ([0-9.]+) s", made.sentence)[1])  # sampled more often
     assert said == pytest.approx(rounded, rel=1e-3)

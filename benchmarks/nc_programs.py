@@ -37,7 +37,9 @@ def main() -> None:
     for file in files:
         began = time.perf_counter()
         receive, send = context.Pipe(duplex=False)
-        process = context.Process(target=_run, args=(send, str(file), options.machine, options.method, options.corner))
+        process = context.Process(
+            target=_run, args=(send, str(file), options.machine, options.method, options.corner)
+        )
         process.start()
         send.close()
         try:

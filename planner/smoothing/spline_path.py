@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import Array, FloatArray
 from planner.corners.allocation import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
@@ -18,6 +18,10 @@ from planner.smoothing.lay import Laid, lay
 from planner.smoothing.relax import TUBE, relax
 from planner.smoothing.runs import Runs, find_runs, longest_span, stops
 
+CUSP, CUSP_PLACES = (
+    1e-2,
+    17,
+)  # slowest advance of a curve per mm of the programmed path [-], looked for at so many places per span
 RELATIVE_GAP = 1e-2  # the integral of the squared third derivatives need not be smaller than this [-]
 
 
@@ -66,7 +70,7 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
         runs.fixed_first, runs.fixed_last, left, H, np.zeros_like(H), nothing, weights, nothing, RELATIVE_GAP, good,
         np.empty(len(used)),
     )  # fmt: skip
-    laid = laid._replace(fits=good)
+    laid = laid._replace(fits=good & ~cusps(laid))
     reserve = float((tolerance - tol).min())
     return SplineShape(
         runs=runs,
@@ -76,6 +80,22 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
         reserve=reserve,
         used=used,
     )
+
+
+def cusps(laid: Laid) -> Array:
+    """(Q,) True for runs on which the curve all but stands still somewhere (`CUSP`): no motion along it has a direction there."""
+    found = np.zeros(len(laid.fits), dtype=bool)
+    powers = np.arange(1, DEGREE + 1)
+    slopes = powers * np.linspace(0.0, 1.0, CUSP_PLACES)[:, None] ** (powers - 1)
+    for q in range(len(laid.fits)):
+        s0, s1 = laid.span_first[q], laid.span_first[q + 1]
+        cut = laid.breaks[s0 + q : s1 + q + 1]
+        control = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
+        index = np.arange(s1 - s0)[:, None] + np.arange(DEGREE + 1)
+        coef = np.einsum("sbm,sbk->smk", span_basis(clamped(cut))[:, :, 1:], control[index])
+        speed = np.linalg.norm(np.einsum("tm,smk->stk", slopes, coef), axis=2) / np.diff(cut)[:, None]
+        found[q] = speed.min() < CUSP
+    return found
 
 
 def _smallest(longest: FloatArray, runs: Runs) -> FloatArray:

@@ -33,7 +33,7 @@ from planner.path import PathSamples
 from planner.smoothing.basis import DEGREE, ORDER
 from planner.smoothing.forms import motion_forms
 from planner.smoothing.relax import relax
-from planner.smoothing.spline_path import SplineShape, with_spline
+from planner.smoothing.spline_path import SplineShape, cusps, with_spline
 
 FIRST_FORCE = 0.5
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
@@ -125,9 +125,8 @@ def _reshape(
         runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned, shape), 0.0,
         np.zeros(len(force), np.bool_), multiplier,
     )  # fmt: skip
-    return dataclasses.replace(
-        shape, laid=laid._replace(control=control), used=used, left=left
-    ), -multiplier / used
+    new = dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
+    return _chosen(shape, new, ~cusps(new.laid)), -multiplier / used
 
 
 def tube_prices(planned: OnPath, shape: SplineShape) -> FloatArray:

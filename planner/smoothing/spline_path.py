@@ -83,7 +83,8 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
 
 
 def cusps(laid: Laid) -> Array:
-    """(Q,) True for runs on which the curve all but stands still somewhere (`CUSP`): no motion along it has a direction there."""
+    """(Q,) True for runs on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are looked at:
+    no motion along it has a direction there."""
     found = np.zeros(len(laid.fits), dtype=bool)
     powers = np.arange(1, DEGREE + 1)
     slopes = powers * np.linspace(0.0, 1.0, CUSP_PLACES)[:, None] ** (powers - 1)
@@ -93,8 +94,9 @@ def cusps(laid: Laid) -> Array:
         control = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
         index = np.arange(s1 - s0)[:, None] + np.arange(DEGREE + 1)
         coef = np.einsum("sbm,sbk->smk", span_basis(clamped(cut))[:, :, 1:], control[index])
-        speed = np.linalg.norm(np.einsum("tm,smk->stk", slopes, coef), axis=2) / np.diff(cut)[:, None]
-        found[q] = speed.min() < CUSP
+        tangent = np.einsum("tm,smk->stk", slopes, coef) / np.diff(cut)[:, None, None]
+        forward = np.einsum("stk,stk->st", tangent[:, 1:], tangent[:, :-1])
+        found[q] = np.linalg.norm(tangent, axis=2).min() < CUSP or forward.min() <= 0.0
     return found
 
 

@@ -21,11 +21,7 @@ from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
 
 SPLINE, AUTO = "spline", "auto"
 
-# Rounds of reshaping, so that all of them together take about as long as so many grid points once, ...
-WORK = 150_000
 POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
-# ... and at most so many: what a round gains has fallen below 1e-4 of the cycle time by then.
-ROUNDS_MAX = 20
 COMPARED_POINTS = 300_000
 # A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
 FINE_POINTS, FINER = 20_000, 0.25
@@ -55,8 +51,6 @@ def on_spline(
         shape = spline_shape(rounded, machine)
     if not shape.laid.fits.any():
         return usual(rounded)
-    if rounds is None:
-        rounds = _affordable(shape)
     shape, best = reshaped(rounded, shape, usual, rounds, stages)
     if auto and POINTS_PER_SPAN * len(shape.left) <= COMPARED_POINTS:
         shape, best = _with_corners(rounded, shape, best, usual)
@@ -65,12 +59,6 @@ def on_spline(
         if fine.solution.solved and fine.solution.cycle_time < best.solution.cycle_time:
             best = fine
     return dataclasses.replace(best, shape=shape)
-
-
-def _affordable(shape: SplineShape) -> int:
-    """Rounds for the size of a job."""
-    points = POINTS_PER_SPAN * len(shape.left)
-    return min(int(WORK // points), ROUNDS_MAX)
 
 
 def _with_corners(

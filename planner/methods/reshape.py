@@ -35,6 +35,10 @@ from planner.smoothing.forms import motion_forms
 from planner.smoothing.relax import relax
 from planner.smoothing.spline_path import SplineShape, cusps, with_spline
 
+# Rounds of reshaping, so that all of them together take about as long as so many grid points once, ...
+WORK = 150_000
+# ... and at most so many: what a round gains has fallen below 1e-4 of the cycle time by then.
+ROUNDS_MAX = 20
 FIRST_FORCE = 0.5
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
 SHARE = 0.5
@@ -56,16 +60,19 @@ PlanOn = Callable[[SmoothPath], OnPath]
 
 
 def reshaped(
-    rounded: SmoothPath, shape: SplineShape, plan_on: PlanOn, rounds: int, stages: Stages
+    rounded: SmoothPath, shape: SplineShape, plan_on: PlanOn, rounds: int | None, stages: Stages
 ) -> tuple[SplineShape, OnPath]:
     """The best of some rounds of reshaping, and the motion on it.
 
     rounded : the path with the corners that the runs replace
     plan_on : solves the feedrate problem on a path
+    rounds  : None for as many as the size of the job lets pay
     """
     best = plan_on(with_spline(rounded, shape))
     if not best.solution.solved or best.solution.multipliers is None or not len(best.path.spline):
         return shape, best
+    if rounds is None:
+        rounds = min(WORK // len(best.samples), ROUNDS_MAX)
     force = np.full(len(shape.laid.fits), FIRST_FORCE)
     paid: FloatArray | None = None  # mean over the rounds
     for _ in range(rounds):

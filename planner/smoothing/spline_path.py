@@ -83,8 +83,8 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
 
 
 def cusps(laid: Laid) -> Array:
-    """(Q,) True for runs on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are looked at:
-    no motion along it has a direction there."""
+    """(Q,) True for runs on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are looked
+    at: no motion along it has a direction there."""
     found = np.zeros(len(laid.fits), dtype=bool)
     powers = np.arange(1, DEGREE + 1)
     slopes = powers * np.linspace(0.0, 1.0, CUSP_PLACES)[:, None] ** (powers - 1)

@@ -37,7 +37,8 @@ def guide(path: SmoothPath, runs: Runs, tol: Array) -> Guide:
     at = path.legs.first
     of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
     place = np.concatenate([[0.0], np.cumsum(path.legs.length)])
-    return Guide(*_guide(path.legs.table, place, of_leg, *runs))
+    ends = runs.joint_first, runs.joint_last, runs.x_first, runs.x_last
+    return Guide(*_guide(path.legs.table, place, of_leg, *ends))
 
 
 @njit(cache=True, error_model="numpy")
@@ -50,7 +51,7 @@ def _chords(leg, tol, begin, end):
 
 
 @njit(cache=True, error_model="numpy")
-def _guide(legs, starts, tol, joint_first, joint_last, x_first, x_last, free_first, free_last):
+def _guide(legs, starts, tol, joint_first, joint_last, x_first, x_last):
     runs, axes = len(joint_first), legs[0].start.shape[0]
     first = np.zeros(runs + 1, np.int64)
     for sweep in range(2):

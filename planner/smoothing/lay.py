@@ -18,6 +18,7 @@ from numba import njit
 from planner.arrays import Array, FloatArray
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.guide import Guide
+from planner.smoothing.interior import site_distance
 from planner.smoothing.knots import graded, spacing, spread
 from planner.smoothing.runs import Runs
 
@@ -27,9 +28,8 @@ DENSER_MAX = 16  # so many times at most
 SPANS_MIN = 8  # of a run
 SITE_SPACING = 0.5  # of sites on chords [spans]
 SITE_EDGE = 0.1  # no site on a chord so close to its ends [spans]
-SITES_DENSE = (
-    0.125  # vertices nearer than this share of a span to the site before are left to the certificate [spans]
-)
+# Vertices nearer than this to the site before are left to the certificate [spans] ...
+SITES_DENSE = 0.125
 DENSE_TURN = 0.1  # ... unless the path turns there by more [rad]
 SLIDE = 0.1  # a site on a chord may slide along it by its radius over this, less near the chord's ends
 
@@ -137,7 +137,7 @@ def _grown2(array, needed):
 def _lay(first, place, point, turn, along, tol, tol_chord, longest):
     runs, axes = len(longest), point.shape[1]
     span_first, site_first = np.zeros(runs + 1, np.int64), np.zeros(runs + 1, np.int64)
-    fits = np.ones(runs, np.bool_)
+    fits, e = np.ones(runs, np.bool_), np.empty(axes)
     size = 4 * len(place) + 64 * runs
     breaks, control = np.empty(size), np.empty((size, axes))
     span, where, slide, radius = np.empty(size, np.int64), np.empty(size), np.empty(size), np.empty(size)
@@ -179,7 +179,6 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
                 if vertex < 0:  # an ellipse inside what is within the radius of the chord
                     near = min(u - here[chord], here[chord + 1] - u)
                     slide[j] = max(radius[j] / (near + radius[j]), SLIDE)
-                dot, square = 0.0, 0.0
                 for k in range(axes):
                     direction[j, k] = along[a + chord, k]
                     target[j, k] = point[a + chord, k]
@@ -189,13 +188,7 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
                             / (here[chord + 1] - here[chord])
                             * (points[chord + 1, k] - points[chord, k])
                         )
-                    value = -target[j, k]
-                    for d in range(ORDER):
-                        value += weights[j, d] * c[i + d, k]
-                    dot += value * direction[j, k]
-                    square += value * value
-                square -= (1.0 - slide[j] * slide[j]) * dot * dot
-                if square > (ROOM * radius[j]) ** 2:
+                if site_distance(j, c, span, weights, target, direction, slide, e) > ROOM * radius[j]:
                     bad += 1
                     # knots nearer to each other at the vertices around
                     lo, hi = 0, len(inner)

@@ -17,10 +17,10 @@ from numba import njit
 
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.forms import third_derivative_energy
-from planner.smoothing.interior import minimise
+from planner.smoothing.interior import minimise, site_distance
 from planner.smoothing.lay import follow
 
-ITERATIONS = 60
+ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
 TUBE = 0.998  # of the tolerance that sites may use at first [-]
 TIGHTENED = 0.995  # a tightened site aims at this share of the tolerance [-]
@@ -146,19 +146,6 @@ def certify(
 
 
 @njit(cache=True, error_model="numpy")
-def _distance(c, j, span, weights, target, direction, slide):
-    """|e_j| of a site (interior.py) [mm]."""
-    dot, square = 0.0, 0.0
-    for k in range(c.shape[1]):
-        value = -target[j, k]
-        for d in range(ORDER):
-            value += weights[j, d] * c[span[j] + d, k]
-        dot += value * direction[j, k]
-        square += value * value
-    return np.sqrt(max(square - (1.0 - slide[j] * slide[j]) * dot * dot, 0.0))
-
-
-@njit(cache=True, error_model="numpy")
 def _first_site(span, value):
     """Index of the first site whose span is not before `value`."""
     lo, hi = 0, len(span)
@@ -182,7 +169,7 @@ def relax_run(
     sites, spans = len(span), len(cut) - 1
     ratio_site, ratio_span = np.zeros(sites), np.empty(spans)
     end = n - fixed_last
-    origin = np.empty(axes)
+    origin, e = np.empty(axes), np.empty(axes)
     for attempt in range(ROUNDS):
         lo = fixed_first
         while lo < end:
@@ -204,9 +191,8 @@ def relax_run(
                     for j in range(j0, j1):
                         if ratio_site[j] > 1.0:
                             used[j] *= TIGHTENED / ratio_site[j]
-                        used[j] = max(
-                            used[j], INSIDE * _distance(c, j, span, weights, target, direction, slide)
-                        )
+                        here_now = site_distance(j, c, span, weights, target, direction, slide, e)
+                        used[j] = max(used[j], INSIDE * here_now)
                 part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
                 near, aim = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
                 for k in range(axes):

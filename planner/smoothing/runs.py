@@ -24,8 +24,8 @@ LONGEST_TOLERANCE = 4.0  # ... or so many tolerances [-]
 
 
 class Runs(NamedTuple):
-    """Q runs in the order of the path (geometry/spline.py); free_first, free_last: control points that are fixed at either end, 1 at a
-    full stop, 5 on a straight leg."""
+    """Q runs in the order of the path, as in geometry/spline.py; fixed_first, fixed_last: control points that stay at either
+    end, 1 at a full stop, 5 on a straight leg."""
 
     joint_first: Array
     joint_last: Array
@@ -43,9 +43,9 @@ def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatAr
     )
 
 
-def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray, cut: Array) -> Runs:
-    """The runs of a path; `cut` (R+1,) True at joints that no run may contain."""
-    legs = path.legs
+def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray) -> Runs:
+    """The runs of a path; `longest` (R,) span on each leg [mm]."""
+    legs, cut = path.legs, path.joint == Joint.STOP
     feed, a, j = _motion(path, machine)
     reach = BRAKING_WAYS * (feed**2 / (2.0 * a) + feed * a / (2.0 * j)) + ROOM * longest
     inside = ~cut
@@ -63,11 +63,6 @@ def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray, cut: Arra
         fixed_first=np.where(split[first - 1], DEGREE, 1),
         fixed_last=np.where(split[last], DEGREE, 1),
     )
-
-
-def stops(path: SmoothPath) -> Array:
-    """(R+1,) True at full stops."""
-    return path.joint == Joint.STOP
 
 
 def _motion(path: SmoothPath, machine: Machine) -> tuple[FloatArray, float, float]:

@@ -16,7 +16,7 @@ from planner.smoothing.forms import third_derivative_forms
 from planner.smoothing.guide import Guide, guide
 from planner.smoothing.lay import Laid, lay
 from planner.smoothing.relax import TUBE, relax
-from planner.smoothing.runs import Runs, find_runs, longest_span, stops
+from planner.smoothing.runs import Runs, find_runs, longest_span
 
 CUSP, CUSP_PLACES = (
     1e-2,
@@ -52,8 +52,7 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     at = path.legs.first
     of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
     longest = longest_span(path, machine, of_leg)
-    cut = stops(path)
-    runs = find_runs(path, machine, longest, cut)
+    runs = find_runs(path, machine, longest)
     chain = guide(path, runs, tol)
     # the longest span of a run: of its slowest leg
     of_run = _smallest(longest, runs)
@@ -72,14 +71,7 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     )  # fmt: skip
     laid = laid._replace(fits=good & ~cusps(laid))
     reserve = float((tolerance - tol).min())
-    return SplineShape(
-        runs=runs,
-        guide=chain,
-        laid=laid,
-        left=left,
-        reserve=reserve,
-        used=used,
-    )
+    return SplineShape(runs=runs, guide=chain, laid=laid, left=left, reserve=reserve, used=used)
 
 
 def cusps(laid: Laid) -> Array:
@@ -89,15 +81,20 @@ def cusps(laid: Laid) -> Array:
     powers = np.arange(1, DEGREE + 1)
     slopes = powers * np.linspace(0.0, 1.0, CUSP_PLACES)[:, None] ** (powers - 1)
     for q in range(len(laid.fits)):
-        s0, s1 = laid.span_first[q], laid.span_first[q + 1]
-        cut = laid.breaks[s0 + q : s1 + q + 1]
-        control = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
-        index = np.arange(s1 - s0)[:, None] + np.arange(DEGREE + 1)
-        coef = np.einsum("sbm,sbk->smk", span_basis(clamped(cut))[:, :, 1:], control[index])
-        tangent = np.einsum("tm,smk->stk", slopes, coef) / np.diff(cut)[:, None, None]
+        cut, coef = _polynomials(laid, q)
+        tangent = np.einsum("tm,smk->stk", slopes, coef[:, 1:]) / np.diff(cut)[:, None, None]
         forward = np.einsum("stk,stk->st", tangent[:, 1:], tangent[:, :-1])
         found[q] = np.linalg.norm(tangent, axis=2).min() < CUSP or forward.min() <= 0.0
     return found
+
+
+def _polynomials(laid: Laid, q: int) -> tuple[FloatArray, FloatArray]:
+    """Breaks (S+1,) of run q, and its spans as polynomials (S, 6, A) (geometry/spline.py)."""
+    s0, s1 = laid.span_first[q], laid.span_first[q + 1]
+    cut = laid.breaks[s0 + q : s1 + q + 1]
+    control = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
+    of_span = control[np.arange(s1 - s0)[:, None] + np.arange(ORDER)]
+    return cut, np.einsum("sbm,sbk->smk", span_basis(clamped(cut)), of_span)
 
 
 def _smallest(longest: FloatArray, runs: Runs) -> FloatArray:
@@ -115,14 +112,9 @@ def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
     kept = np.flatnonzero(laid.fits)
     tables = []
     for q in kept:
-        s0, s1 = laid.span_first[q], laid.span_first[q + 1]
-        cut = laid.breaks[s0 + q : s1 + q + 1]
-        c = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
-        basis = span_basis(clamped(cut))
-        table = np.zeros(s1 - s0, span_dtype(axes))
-        table["begin"], table["width"] = cut[:-1], np.diff(cut)
-        index = np.arange(s1 - s0)[:, None] + np.arange(DEGREE + 1)
-        table["coef"] = np.einsum("sbm,sbk->smk", basis, c[index])
+        cut, coef = _polynomials(laid, int(q))
+        table = np.zeros(len(coef), span_dtype(axes))
+        table["begin"], table["width"], table["coef"] = cut[:-1], np.diff(cut), coef
         tables.append(table)
     count = laid.span_first[kept + 1] - laid.span_first[kept]
     of_span = np.repeat(laid.fits, np.diff(laid.span_first))

@@ -26,8 +26,8 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.methods.closed_form import CornerTable
-from planner.methods.optimal import slowed
 from planner.methods.plan import Plan
+from planner.methods.slowing import slowed
 from planner.methods.stages import Progress, Stages, deliver, stop_time
 from planner.nc.program import Program
 from planner.path import PathSamples, sample_path

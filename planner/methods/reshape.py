@@ -37,8 +37,9 @@ from planner.smoothing.spline_path import SplineShape, cusps, with_spline
 
 # Rounds of reshaping, so that all of them together take about as long as so many grid points once, ...
 WORK = 150_000
-# ... and at most so many: what a round gains has fallen below 1e-4 of the cycle time by then.
-ROUNDS_MAX = 20
+# ... at most so many, and no more once so many of them together gained less than this [-].
+ROUNDS_MAX = 40
+ROUNDS_SEEN, GAIN_MIN = 5, 1e-4
 FIRST_FORCE = 0.5  # of the pull; 0.3 and 1 gain the same within 1e-3 in eight rounds
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
 SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 1e-4 to 1e-3 slower (pentagon, zig-zag, spiral)
@@ -75,7 +76,10 @@ def reshaped(
         rounds = min(WORK // len(best.samples), ROUNDS_MAX)
     force = np.full(len(shape.laid.fits), FIRST_FORCE)
     paid: FloatArray | None = None  # mean over the rounds
+    reached = [best.solution.cycle_time]
     for _ in range(rounds):
+        if len(reached) > ROUNDS_SEEN and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - ROUNDS_SEEN]:
+            break
         with stages.stage("geometry"):
             H, Q = price_bands(best, shape)
             paid = H if paid is None else paid + SHARE * (H - paid)
@@ -92,6 +96,7 @@ def reshaped(
             if planned.solution.solved and planned.solution.cycle_time < best.solution.cycle_time:
                 shape, best = candidate, planned
         force = np.where(better, LESS * force, MORE * force)
+        reached.append(best.solution.cycle_time)
     return shape, best
 
 

@@ -26,7 +26,6 @@ TO_BOUNDARY = 0.95  # of the way to the nearest bound that a step may go [-]
 # A short step is followed by one towards the middle, with up to so much of the gap [-]: 340 iterations in all for the relief of
 # 2000 moves without windows, 378 with 1, 718 with 0.
 CENTRING = 3.0
-RESIDUAL = 1e-3  # of stationarity, share of the largest gradient [-]; it falls together with the gap and is below it at the end
 STALLED = 1e-6  # a step shorter than this ends the search [-]
 
 
@@ -205,6 +204,7 @@ def minimise(
     _constraint(c, first, values, place, along, slide, radius, g, e)
     for site in range(m):
         z[site] = gap_first / m / -g[site]
+    reach = np.max(radius) if m else 0.0  # what a control point may be from its optimum, about
     start = _objective(H, linear, c, gradient)
     gap = np.inf
     went = 1.0
@@ -213,7 +213,7 @@ def minimise(
         complementarity = 0.0
         for site in range(m):
             complementarity += z[site] * -g[site]
-        residual, size = 0.0, 0.0
+        residual = 0.0
         for i in range(n):
             for k in range(axes):
                 step_1[i, k] = gradient[i, k]
@@ -221,10 +221,9 @@ def minimise(
         for i in range(n):
             if free[i]:
                 for k in range(axes):
-                    residual = max(residual, abs(step_1[i, k]))
-                    size = max(size, abs(gradient[i, k]))
-        gap = complementarity
-        if gap <= small and residual <= RESIDUAL * size:
+                    residual += abs(step_1[i, k])
+        gap = complementarity + residual * reach
+        if gap <= small:
             return gap, iteration
         _assemble(H, free, first, values, along, slide, radius, z, g, e, band)
         if not factorise(band):

@@ -1,0 +1,156 @@
+"""What a motion exceeds a limit by between grid points, and two ways to make up for it.
+
+A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
+divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
+
+`tightened` asks for it where it is needed: with r', r'' and r''' of the grid points around an excess times lam, lam^2 and lam^3 the
+feedrate problem has the limits that a motion slower by lam keeps, and its solution is slower in these places only. What is left, whole
+runs between full stops are slowed down by; that always ends.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from itertools import chain
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.solution import FeedrateSolution
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.path import PathSamples
+from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
+from planner.verify import Verdict
+
+# Tightening pays while a run is slowed down by more than this [-] ...
+TIGHTENED_EXCESS = 1e-5
+# ... at most so often, and once for jobs of more grid points, where the time it takes counts: it leaves less than half of the excess.
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 300_000
+# Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
+SLOWING_ROUNDS = 6
+# What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
+SLOWING_MORE = 1e-5
+EXCESS_ROUNDING = 1e-9
+# A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
+SEEN_EXCESS_MAX = 5e-3
+ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, "jerk": 3}
+
+
+def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
+    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, on the samples and densely
+    between them; <= 1 where it keeps them."""
+    axes = toolpath.axes
+    limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
+    programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
+    programmed[toolpath.block] = toolpath.feed
+    factor = np.zeros(len(motion.law.t))
+    for chunk in chain([sample_motion(motion, machine.dt)], dense_motion(motion, machine.dt)):
+        worst = chunk.feed / programmed[chunk.block]
+        motions = (chunk.velocity, chunk.acceleration, chunk.jerk)
+        for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
+            worst = np.maximum(worst, (np.abs(values) / limit).max(axis=1) ** (1.0 / order))
+        at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
+        np.maximum.at(factor, np.maximum(at, 0), worst)
+    return factor
+
+
+def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
+    """The problem whose limits leave room for motions that exceed them by `factor` (P,) on the interval to the right of each point."""
+    lam = np.maximum(factor, 1.0)
+    lam[1:] = np.maximum(lam[1:], lam[:-1])  # at both ends of an interval
+    by = lam[:, None]
+    return dataclasses.replace(
+        problem,
+        d1=problem.d1 * by,
+        d2_left=problem.d2_left * by**2,
+        d2_right=problem.d2_right * by**2,
+        d3_left=problem.d3_left * by**3,
+        d3_right=problem.d3_right * by**3,
+        feed_sq_max=problem.feed_sq_max / lam**2,
+    )
+
+
+def within_limits(
+    samples: PathSamples,
+    problem: FeedrateProblem,
+    solution: FeedrateSolution,
+    solve: Callable[[FeedrateProblem], FeedrateSolution],
+    toolpath: Toolpath,
+    machine: Machine,
+) -> tuple[Motion, FeedrateProblem, FeedrateSolution]:
+    """The fastest motion found that keeps all limits between grid points too, from a solution of a problem on its samples; and the
+    problem and solution that it comes from."""
+    motion = Motion(samples=samples, law=law_of_solution(samples, solution))
+    factor = excess(motion, toolpath, machine)
+    best = slowed(motion, toolpath, machine, factor), problem, solution
+    room = np.ones(len(problem))
+    for _ in range(TIGHTENING_ROUNDS if len(problem) <= TIGHTENED_POINTS else 1):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS:
+            break
+        room *= np.maximum(factor, 1.0)
+        tighter = tightened(problem, room)
+        solution = solve(tighter)
+        if not solution.solved:
+            break
+        motion = Motion(samples=samples, law=law_of_solution(samples, solution))
+        factor = excess(motion, toolpath, machine)
+        kept = slowed(motion, toolpath, machine, factor)
+        if kept.end < best[0].end:
+            best = kept, tighter, solution
+    return best
+
+
+def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
+    """The same motion with every run slowed down until it has no `excess` (L,); `factor` is that of the motion, if it is known."""
+    if factor is None:
+        factor = excess(motion, toolpath, machine)
+    for _ in range(SLOWING_ROUNDS):
+        of_run = _of_runs(motion, factor)
+        slow = of_run > 1.0 + EXCESS_ROUNDING
+        if not slow.any():
+            break
+        motion = slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0))
+        if factor.max() <= 1.0 + SEEN_EXCESS_MAX:
+            break  # what the samples of the slower motion may find more, the verifier will see
+        factor = excess(motion, toolpath, machine)
+    return motion
+
+
+def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
+    """(G,) the largest factor of each run."""
+    return np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(motion.law.run[-1] + 1)))
+
+
+def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion | None:
+    """The motion slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing: the verifier looks
+    between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done; `again` counts
+    the times before."""
+    limited = [check for check in verdict.limits.values() if check.limited]
+    over = [check for check in limited if check.broken]
+    if not over or max(check.ratio for check in limited) > 1.0 + SEEN_EXCESS_MAX:
+        return None
+    factor = max(check.ratio ** (1.0 / ORDER[check.name.partition(".")[0]]) for check in over)
+    more = SLOWING_MORE * 10.0**again
+    return slower(motion, np.full(len(motion.samples.piece) - 1, factor * (1.0 + more)))
+
+
+def slower(motion: Motion, factor: FloatArray) -> Motion:
+    """Every run (G,) slowed down by its factor."""
+    law = motion.law
+    by = factor[law.run]
+    lasting = np.diff(np.append(law.t, law.end))
+    closing = np.append(law.run[1:] != law.run[:-1], True)  # the last piece of a run is its standstill
+    t = law.t[0] + np.concatenate([[0.0], np.cumsum(np.where(closing, lasting, lasting * by))])
+    new = TimeLaw(
+        t=t[:-1],
+        s=law.s,
+        feed=law.feed / by,
+        acc_s=law.acc_s / by**2,
+        jerk_s=law.jerk_s / by**3,
+        run=law.run,
+        end=float(t[-1]),
+    )
+    return dataclasses.replace(motion, law=new)

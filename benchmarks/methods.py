@@ -29,8 +29,8 @@ from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.names import METHODS
+from planner.methods.on_path import CORNERS
 from planner.methods.plan import Plan
-from planner.methods.toppra import CORNERS
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.report.comparison import Row, best_of, refused, row_of_plan

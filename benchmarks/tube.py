@@ -20,7 +20,7 @@ import planner
 from benchmarks import problems
 from benchmarks.record import markdown, write_results
 from planner.errors import PlannerError
-from planner.methods.toppra import CORNERS
+from planner.methods.on_path import CORNERS
 from planner.nc.program import Program
 
 ANGLES = (15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 160, 170)  # [deg]

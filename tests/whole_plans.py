@@ -19,7 +19,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.methods.toppra import corner_shape
+from planner.methods.on_path import corner_shape
 from planner.nc.program import Program
 from planner.path import RESOLUTION, PathSamples, sample_path
 from planner.timing import Motion, TimeLaw, law_of_solution

@@ -22,14 +22,12 @@ from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.constant_speed import CornerSpeeds, constant_speeds, stretches_of
 from planner.feedrate.solution import Status
 from planner.feedrate.stretches import better_stopped, largest_speeds, phases
-from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
-from planner.methods.closed_form import CornerTable
+from planner.methods.closed_form import CornerTable, corner_apexes, corners_at
+from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
 from planner.methods.slowing import slowed
-from planner.methods.stages import Progress, Stages, deliver, stop_time
-from planner.nc.program import Program
 from planner.path import PathSamples, sample_path
 from planner.timing import Motion, law_of_moves
 
@@ -41,7 +39,7 @@ NO_PERIOD = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class BezierMethod:
+class BezierMethod(Method):
     """Bezier pairs with error allocation.
 
     corner   : shape numbers of the pair
@@ -52,49 +50,33 @@ class BezierMethod:
     corner: BezierCorner = field(default_factory=BezierCorner)
     allocate: bool = True
 
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program. Raises InputError for what cannot be planned."""
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            toolpath = toolpath_from_program(program, machine, tolerance)
+    def plan_job(self, job: Job) -> Plan:
+        machine = job.machine
+        with job.stage("geometry"):
             shares = machine if self.allocate else machine.model_copy(update={"dt": NO_PERIOD, "fir": None})
-            path = round_corners(toolpath, shares, self.corner, blend_tangents=True, free=FREE_SHARE)
+            path = round_corners(job.toolpath, shares, self.corner, blend_tangents=True, free=FREE_SHARE)
             samples = sample_path(path, shares)
-        with stages.stage("solve"):
+        with job.stage("solve"):
             limits = constant_speeds(samples, shares)
             chain, _ = stretches_of(samples, machine, limits.speed)
             stops = better_stopped(chain)
-        with stages.stage("geometry"):
+        with job.stage("geometry"):
             path = _stopped(path, chain.joint[stops])
             samples = sample_path(path, shares) if stops.any() else samples
-        with stages.stage("solve"):
-            motion = _motion(samples, machine, limits.speed)
-            motion = slowed(motion, toolpath, machine)
-        trajectory, verdict = deliver(motion, toolpath, machine, stages)
-        with stages.stage("report"):
+        with job.stage("solve"):
+            motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
+        made = job.deliver(motion)
+        with job.stage("report"):
             corners = _corner_table(motion, limits)
-        return Plan(
+        return job.plan(
+            made,
             method="bezier",
             corner=self.corner.name,
             solver="look-ahead",
-            program=program,
-            machine=machine,
-            toolpath=toolpath,
             status=Status.OPTIMAL,
             sentence=f"{len(corners)} corners are run through, {int(stops.sum())} are faster as full stops",
-            trajectory=trajectory,
-            verdict=verdict,
-            corners=corners,
-            grid=None,
-            stop_time=stop_time(toolpath, machine),
             grid_points=len(samples),
-            timings=stages.timings,
+            corners=corners,
         )
 
 
@@ -119,20 +101,8 @@ def _motion(samples: PathSamples, machine: Machine, speed: FloatArray) -> Motion
 def _corner_table(motion: Motion, limits: CornerSpeeds) -> CornerTable:
     """The corners that are run through, beside their closed form."""
     samples, law = motion.samples, motion.law
-    path = samples.path
-    apex = np.flatnonzero((samples.element < 0) & (samples.w0 == 0.5))
+    apex = corner_apexes(samples)
     joint = ~samples.element[apex]
-    kappa = np.linalg.norm(samples.d2_right[apex], axis=1)
     speed = law.feed[np.searchsorted(law.s, samples.s[apex], side="right") - 1]
     free = speed < limits.speed[joint] * (1.0 - 1e-9)
-    return CornerTable(
-        line=path.toolpath.line[path.legs.first[joint] - 1],
-        theta=path.theta[joint],
-        d_in=path.d_in[joint],
-        d_out=path.d_out[joint],
-        tol_ap=path.tol_ap[joint],
-        kappa_max=kappa,
-        feed_closed_form=np.sqrt(path.normal_max[joint] / kappa),
-        feed_planned=speed,
-        limited_by=np.where(free, "look_ahead", limits.limited_by[joint]),
-    )
+    return corners_at(samples, apex, speed, np.where(free, "look_ahead", limits.limited_by[joint]))

@@ -59,13 +59,24 @@ class CornerTable:
 
 def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> CornerTable:
     """Put the planned speeds at all corners next to the closed form. Raises NotSolvedError without a solution."""
-    path = samples.path
-    apex = np.flatnonzero((samples.element < 0) & (samples.w0 == 0.5) & problem.interval)
-    joint = ~samples.element[apex]
-    kappa = np.linalg.norm(samples.d2_right[apex], axis=1)
+    apex = corner_apexes(samples)
     ratio, which = constraint_ratios(problem, solution)
     before = ratio[apex - 1] > ratio[apex]  # the interval that ends at the apex may be the one that limits it
     limited_by = np.array(active_names(problem))[np.where(before, which[apex - 1], which[apex])]
+    return corners_at(samples, apex, np.sqrt(solution.feed_sq[apex]), limited_by)
+
+
+def corner_apexes(samples: PathSamples) -> Array:
+    """(C,) grid points in the middle of the corners."""
+    middle = (samples.element < 0) & (samples.w0 == 0.5)
+    middle[samples.piece[1:] - 1] = False  # they repeat what is said of the interval before
+    return np.flatnonzero(middle)
+
+
+def corners_at(samples: PathSamples, apex: Array, feed: FloatArray, limited_by: Array) -> CornerTable:
+    """The table of the corners whose middles are the grid points `apex` (C,), passed at `feed` [mm/s]."""
+    path, joint = samples.path, ~samples.element[apex]
+    kappa = np.linalg.norm(samples.d2_right[apex], axis=1)
     return CornerTable(
         line=path.toolpath.line[path.legs.first[joint] - 1],
         theta=path.theta[joint],
@@ -74,6 +85,6 @@ def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: Feedr
         tol_ap=path.tol_ap[joint],
         kappa_max=kappa,
         feed_closed_form=np.sqrt(path.normal_max[joint] / kappa),
-        feed_planned=np.sqrt(solution.feed_sq[apex]),
+        feed_planned=feed,
         limited_by=limited_by,
     )

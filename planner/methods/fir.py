@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.axis_motion import AxisMotion
-from planner.errors import InputError
 from planner.feedrate.solution import Status
 from planner.fir.course import Course, course_of
 from planner.fir.design import plain_plan
@@ -26,15 +25,13 @@ from planner.fir.schedule import Schedule
 from planner.fir.search import fastest
 from planner.fir.settle import make
 from planner.fir.superpose import Pieces
-from planner.geometry.build import toolpath_from_program
-from planner.machine import Machine
+from planner.methods.filtered import axes_of, check_filters, reached
+from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
-from planner.methods.stages import Progress, Stages, deliver, stop_time
-from planner.nc.program import Program
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirMethod:
+class FirMethod(Method):
     """Overlapped pulses through two FIR filters.
 
     plain : the paper's rules as they are, whatever they exceed
@@ -42,80 +39,34 @@ class FirMethod:
 
     plain: bool = False
 
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program. Raises InputError for what cannot be planned."""
-        if machine.fir is not None and len(machine.fir.time_constants) != 2:
-            raise InputError(
-                f"machine '{machine.name}' has {len(machine.fir.time_constants)} filters in fir.time_constants; "
-                "method fir plans for two (or give none, and it chooses them)"
-            )
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            toolpath = toolpath_from_program(program, machine, tolerance)
-            course = course_of(toolpath, machine)
-        with stages.stage("solve"):
+    def plan_job(self, job: Job) -> Plan:
+        check_filters(job.machine, "fir")
+        with job.stage("geometry"):
+            course = course_of(job.toolpath, job.machine)
+        with job.stage("solve"):
             if self.plain:
-                schedule = plain_plan(course, machine)
+                schedule = plain_plan(course, job.machine)
             else:
-                course, schedule = fastest(course, machine)
-            pieces = make(course, machine, schedule).pieces
-        trajectory, verdict = deliver(motion_of(course, pieces), toolpath, machine, stages)
-        return Plan(
+                course, schedule = fastest(course, job.machine)
+            pieces = make(course, job.machine, schedule).pieces
+        return job.plan(
+            job.deliver(motion_of(course, pieces)),
             method="fir-plain" if self.plain else "fir",
             corner="fir",
             solver="pulses",
-            program=program,
-            machine=machine,
-            toolpath=toolpath,
             status=Status.ACCEPTABLE,
             sentence=_sentence(course, schedule),
-            trajectory=trajectory,
-            verdict=verdict,
-            corners=None,
-            grid=None,
-            stop_time=stop_time(toolpath, machine),
             grid_points=len(pieces),
-            timings=stages.timings,
         )
 
 
 def motion_of(course: Course, pieces: Pieces) -> AxisMotion:
     """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the course."""
-    lines, axes = course.lines, course.point.shape[1]
-    middle = (pieces.t + np.append(pieces.t[1:], pieces.end[-1])) / 2 - pieces.t
-    place, speed, push, jerk = (
-        getattr(pieces, name)[:, axes] for name in ("position", "velocity", "acceleration", "jerk")
-    )
-    along = place + middle * (speed + middle * (push / 2 + middle * jerk / 6))
     ends = course.joint_at[course.first]
     stretch = np.repeat(np.arange(course.stretches), np.diff(pieces.first))
-    segment = np.clip(
-        np.searchsorted(np.cumsum(lines.length), along, side="right"), ends[stretch], ends[stretch + 1] - 1
-    )
-    columns = {
-        name: getattr(pieces, name)[:, :axes] for name in ("position", "velocity", "acceleration", "jerk")
-    }
-    t = pieces.t
-    if t[0] > 0:  # a standstill before the first move
-        t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, 0)
-        columns = {
-            name: np.vstack([course.point[:1] if name == "position" else np.zeros((1, axes)), column])
-            for name, column in columns.items()
-        }
-    return AxisMotion(
-        axes=lines.axes,
-        t=t,
-        block=lines.block[segment],
-        line=lines.line[segment],
-        end=float(pieces.end[-1]),
-        **columns,
-    )
+    segment = np.searchsorted(np.cumsum(course.lines.length), reached(pieces), side="right")
+    segment = np.clip(segment, ends[stretch], ends[stretch + 1] - 1)
+    return axes_of(pieces, segment, 0, course.lines, course.point[0])
 
 
 def _sentence(course: Course, plan: Schedule) -> str:

@@ -21,7 +21,6 @@ import numpy as np
 from planner.axis_motion import AxisMotion
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.errors import InputError
 from planner.feedrate.solution import Status
 from planner.fir.guide import Guide, guide_of_curve, guide_of_path
 from planner.fir.hold import Held, command_of, fastest, promised
@@ -31,9 +30,10 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
+from planner.methods.filtered import axes_of, check_filters, reached
+from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
-from planner.methods.stages import Progress, Stages, deliver, stop_time
-from planner.nc.program import Program
+from planner.methods.stages import Progress, Stages
 from planner.path import sample_path
 from planner.units import RAD_PER_DEG
 
@@ -51,7 +51,7 @@ PHASE_LAG = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirSplineMethod:
+class FirSplineMethod(Method):
     """Closed-form feed limits and two FIR filters along a smooth path.
 
     plain : the paper's speeds and filters as they are, whatever they exceed
@@ -59,21 +59,12 @@ class FirSplineMethod:
 
     plain: bool = False
 
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program. Raises InputError for what cannot be planned."""
-        _check(machine)
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            toolpath = toolpath_from_program(program, machine, tolerance)
-            choose = _plain_stops if self.plain else _stops
-            guide = _guide_of(choose(toolpath, machine), machine)
-        return self._finish(program, machine, toolpath, guide, "bezier", stages)
+    def plan_job(self, job: Job) -> Plan:
+        check_filters(job.machine, "fir-spline")
+        with job.stage("geometry"):
+            stopping = job.toolpath if self.plain else _with_stops(job.toolpath, job.machine)
+            guide = _guide_of(stopping, job.machine)
+        return self._finish(job, guide, "bezier")
 
     def plan_curve(
         self,
@@ -87,7 +78,7 @@ class FirSplineMethod:
 
         Raises InputError for what cannot be planned.
         """
-        _check(machine)
+        check_filters(machine, "fir-spline")
         stages = Stages(progress)
         with stages.stage("geometry"):
             whole = machine.tolerance if tolerance is None else tolerance
@@ -97,47 +88,23 @@ class FirSplineMethod:
             ends = curve.stations(chords)
             back = ends[1:][toolpath.block[np.flatnonzero(toolpath.joint[1:-1] == Joint.STOP)]]
             guide = guide_of_curve(curve, machine, feed, whole - chords, ends, back)
-        return self._finish(program, machine, toolpath, guide, None, stages)
+        job = Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
+        return self._finish(job, guide, None)
 
-    def _finish(
-        self,
-        program: Program,
-        machine: Machine,
-        toolpath: Toolpath,
-        guide: Guide,
-        corner: str | None,
-        stages: Stages,
-    ) -> Plan:
-        with stages.stage("solve"):
+    def _finish(self, job: Job, guide: Guide, corner: str | None) -> Plan:
+        with job.stage("solve"):
             alone = guide.pick(np.ones(guide.runs, bool))
-            held = _plain(alone, machine) if self.plain else fastest(alone, machine)
-            motion = _motion(guide, held, toolpath)
-        trajectory, verdict = deliver(motion, toolpath, machine, stages)
+            held = _plain(alone, job.machine) if self.plain else fastest(alone, job.machine)
+            motion = _motion(guide, held, job.toolpath)
         delay = 1e3 * (held.T1 + held.T2)
-        return Plan(
+        return job.plan(
+            job.deliver(motion),
             method="fir-spline-plain" if self.plain else "fir-spline",
             corner=corner,
             solver="filters",
-            program=program,
-            machine=machine,
-            toolpath=toolpath,
             status=Status.ACCEPTABLE,
             sentence=f"filters of {delay.min():.3g} to {delay.max():.3g} ms in all",
-            trajectory=trajectory,
-            verdict=verdict,
-            corners=None,
-            grid=None,
-            stop_time=stop_time(toolpath, machine),
             grid_points=len(guide),
-            timings=stages.timings,
-        )
-
-
-def _check(machine: Machine) -> None:
-    if machine.fir is not None and len(machine.fir.time_constants) != 2:
-        raise InputError(
-            f"machine '{machine.name}' has {len(machine.fir.time_constants)} filters in fir.time_constants; "
-            "method fir-spline plans for two (or give none, and it chooses them)"
         )
 
 
@@ -151,11 +118,7 @@ def _guide_of(toolpath: Toolpath, machine: Machine) -> Guide:
     return guide_of_path(sample_path(path, machine, RESOLUTION), machine)
 
 
-def _plain_stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    return toolpath
-
-
-def _stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
+def _with_stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
     """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by itself: at a full stop
     the filters may change."""
     ends = np.flatnonzero(toolpath.joint == Joint.STOP)
@@ -190,27 +153,8 @@ def _plain(guide: Guide, machine: Machine) -> Held:
 
 def _motion(guide: Guide, held: Held, toolpath: Toolpath) -> AxisMotion:
     """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the guide."""
-    command = command_of(guide, held)
-    pieces = superpose(command)
-    middle = (pieces.t + np.append(pieces.t[1:], pieces.end[-1])) / 2 - pieces.t
-    s, v, a, j = (getattr(pieces, name)[:, -1] for name in ("position", "velocity", "acceleration", "jerk"))
-    reached = s + middle * (v + middle * (a / 2 + middle * j / 6))
-    chord = np.searchsorted(guide.s, reached, side="right") - 1
+    pieces = superpose(command_of(guide, held))
+    chord = np.searchsorted(guide.s, reached(pieces), side="right") - 1
     run = np.repeat(np.arange(guide.runs), np.diff(pieces.first))
     segment = guide.segment[np.clip(chord, guide.first[run], guide.first[run + 1] - 1)]
-    columns = {
-        name: getattr(pieces, name)[:, :-1] for name in ("position", "velocity", "acceleration", "jerk")
-    }
-    t = pieces.t
-    if t[0] > 0:  # a standstill before the first move
-        t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, segment[0])
-        still = {name: np.zeros((1, len(guide.axes))) for name in columns} | {"position": guide.point[:1]}
-        columns = {name: np.vstack([still[name], column]) for name, column in columns.items()}
-    return AxisMotion(
-        axes=guide.axes,
-        t=t,
-        block=toolpath.block[segment],
-        line=toolpath.line[segment],
-        end=float(pieces.end[-1]),
-        **columns,
-    )
+    return axes_of(pieces, segment, segment[0], toolpath, guide.point[0])

@@ -32,16 +32,16 @@ from planner.feedrate.look_ahead import Legs, Passage, look_ahead
 from planner.feedrate.ramps import Kind
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
-from planner.geometry.build import COLLINEAR_ANGLE, toolpath_from_program
+from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded
 from planner.geometry.legs import Legs as PathLegs
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.methods.closed_form import CornerTable
+from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
-from planner.methods.stages import Progress, Stages, deliver, stop_time
-from planner.nc.program import PathControl, Program
+from planner.nc.program import PathControl
 
 # Share of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill their
 # chords: those leave the vertex by 2/3 to 1 of the sagitta.
@@ -49,7 +49,7 @@ CHORD_SHARE = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class KinematicMethod:
+class KinematicMethod(Method):
     """Kinematic corners with look-ahead.
 
     start_stop    : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at
@@ -67,40 +67,23 @@ class KinematicMethod:
         if not 0 < self.short_segment <= 1:
             raise InputError(f"short_segment = {self.short_segment}; allowed are 0 < k <= 1")
 
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program. Raises InputError for what cannot be planned."""
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            toolpath = toolpath_from_program(program, machine, tolerance)
-            exact = program.path_control[toolpath.block] != PathControl.BLEND
-        with stages.stage("solve"):
-            course = self._course(toolpath, machine, exact)
-            motion = _motion(course, toolpath.axes)
-        trajectory, verdict = deliver(motion, toolpath, machine, stages)
-        with stages.stage("report"):
-            corners = _corner_table(course, machine)
-        return Plan(
+    def plan_job(self, job: Job) -> Plan:
+        exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
+        with job.stage("solve"):
+            course = self._course(job.toolpath, job.machine, exact)
+            motion = _motion(course, job.toolpath.axes)
+        made = job.deliver(motion)
+        with job.stage("report"):
+            corners = _corner_table(course, job.machine)
+        return job.plan(
+            made,
             method="kinematic",
             corner="kinematic",
             solver="look-ahead",
-            program=program,
-            machine=machine,
-            toolpath=toolpath,
             status=Status.OPTIMAL,
             sentence=_sentence(course),
-            trajectory=trajectory,
-            verdict=verdict,
-            corners=corners,
-            grid=None,
-            stop_time=stop_time(toolpath, machine),
             grid_points=len(course.path) + 1,
-            timings=stages.timings,
+            corners=corners,
         )
 
     def _course(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Course:

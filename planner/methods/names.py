@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Protocol
 
 from planner.errors import InputError
 from planner.machine import Machine, load_machine
 from planner.methods.bezier import BezierMethod
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
+from planner.methods.job import Method
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
@@ -34,20 +34,6 @@ METHODS = (
     "tube",
     "stop",
 )
-
-
-class Method(Protocol):
-    """A way to plan a job; its repr is its row label in every table."""
-
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program within a tolerance [mm] (None: the program's or the machine's)."""
-        ...
 
 
 def plan(

@@ -16,18 +16,15 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
-from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine
-from planner.methods.activity import history
-from planner.methods.closed_form import corner_table
-from planner.methods.geometry import AUTO, SPLINE, on_spline
+from planner.methods.geometry import AUTO
+from planner.methods.job import Job, Method
+from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.prices import price_list
 from planner.methods.reshape import OnPath, tube_prices
 from planner.methods.slowing import within_limits, without_seen_excess
-from planner.methods.stages import Progress, Stages, deliver, stop_time
-from planner.methods.toppra import corner_shape
-from planner.nc.program import Program
+from planner.methods.stages import Stages
 from planner.path import RESOLUTION, sample_path
 
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
@@ -37,7 +34,7 @@ SEEN_ROUNDS = 3  # at most, each with ten times the margin of the one before
 
 
 @dataclass(frozen=True, kw_only=True)
-class OptimalMethod:
+class OptimalMethod(Method):
     """Time-optimal planning with jerk limits on rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
@@ -49,77 +46,38 @@ class OptimalMethod:
     solver: JerkLimited = field(default_factory=JerkLimited)
     rounds: int | None = None
 
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program. Raises InputError for what cannot be planned; an unsolved problem is the plan's status."""
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            toolpath = toolpath_from_program(program, machine, tolerance)
-            spline = self.corner in (SPLINE, AUTO)
-            shape = (
-                BezierCorner(sigma2=SIGMA2)
-                if spline or self.corner == "bezier"
-                else corner_shape(self.corner, machine, toolpath)
-            )
-            path = round_corners(toolpath, machine, shape, blend_tangents=True)
-        if spline:
-            best = on_spline(
-                path,
-                machine,
-                lambda path, finer: self._on_path(path, machine, stages, finer=finer),
-                auto=self.corner == AUTO,
-                rounds=self.rounds,
-                stages=stages,
-            )
-        else:
-            best = self._on_path(path, machine, stages)
-        samples, problem, solution = best.samples, best.problem, best.solution
-        trajectory = verdict = corners = grid = prices = None
-        if solution.solved:
-            with stages.stage("solve"):
-                motion, problem, solution = within_limits(
-                    samples, problem, solution, self.solver.solve, toolpath, machine
-                )
-            trajectory, verdict = deliver(motion, toolpath, machine, stages)
+    def plan_job(self, job: Job) -> Plan:
+        machine = job.machine
+        with job.stage("geometry"):
+            shape = corner_shape(self.corner, machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
+            path = round_corners(job.toolpath, machine, shape, blend_tangents=True)
+        best = best_on_path(
+            job,
+            path,
+            self.corner,
+            lambda path, finer: self._on_path(path, machine, job.stages, finer=finer),
+            rounds=self.rounds,
+        )
+        motion = made = prices = None
+        if best.solution.solved:
+            with job.stage("solve"):
+                best, motion = within_limits(best, self.solver.solve, job.toolpath, machine)
+            made = job.deliver(motion)
             for again in range(SEEN_ROUNDS):
-                gentler = without_seen_excess(motion, verdict, again)
+                gentler = without_seen_excess(motion, made[1], again)
                 if gentler is None:
                     break
                 motion = gentler
-                trajectory, verdict = deliver(motion, toolpath, machine, stages)
-            with stages.stage("report"):
-                corners = corner_table(samples, problem, solution)
-                grid = history(problem, solution, motion.law)
-                if solution.multipliers:
+                made = job.deliver(motion)
+            if best.solution.multipliers:
+                with job.stage("report"):
                     by_site = (
                         (best.shape.laid.place, tube_prices(best, best.shape))
                         if best.shape and len(best.path.spline)
                         else None
                     )
-                    prices = price_list(samples, problem, solution, machine, by_site)
-        return Plan(
-            method="optimal",
-            corner=str(self.corner) if spline else shape.name,
-            solver=solution.solver,
-            program=program,
-            machine=machine,
-            toolpath=toolpath,
-            status=solution.status,
-            sentence=solution.sentence,
-            trajectory=trajectory,
-            verdict=verdict,
-            corners=corners,
-            grid=grid,
-            prices=prices,
-            stop_time=stop_time(toolpath, machine),
-            grid_points=len(samples),
-            timings=stages.timings,
-        )
+                    prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
+        return plan_of_solution(job, best, motion, made, method="optimal", corner=self.corner, prices=prices)
 
     def _on_path(self, path: SmoothPath, machine: Machine, stages: Stages, finer: float = 1.0) -> OnPath:
         """The time-optimal motion on a path; `finer` divides the grid's resolution."""

@@ -21,7 +21,7 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.path import PathSamples
+from planner.methods.reshape import OnPath
 from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
 from planner.verify import Verdict
 
@@ -74,33 +74,35 @@ def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
 
 
 def within_limits(
-    samples: PathSamples,
-    problem: FeedrateProblem,
-    solution: FeedrateSolution,
+    planned: OnPath,
     solve: Callable[[FeedrateProblem], FeedrateSolution],
     toolpath: Toolpath,
     machine: Machine,
-) -> tuple[Motion, FeedrateProblem, FeedrateSolution]:
-    """The fastest motion found that keeps all limits between grid points too, from a solution of a problem on its samples; and the
-    problem and solution that it comes from."""
-    motion = Motion(samples=samples, law=law_of_solution(samples, solution))
+) -> tuple[OnPath, Motion]:
+    """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
+    `planned` has a solution."""
+    motion = _motion(planned)
     factor = excess(motion, toolpath, machine)
-    best = slowed(motion, toolpath, machine, factor), problem, solution
-    room = np.ones(len(problem))
-    for _ in range(TIGHTENING_ROUNDS if len(problem) <= TIGHTENED_POINTS else 1):
+    best = planned, slowed(motion, toolpath, machine, factor)
+    room = np.ones(len(planned.problem))
+    for _ in range(TIGHTENING_ROUNDS if len(room) <= TIGHTENED_POINTS else 1):
         if factor.max() <= 1.0 + TIGHTENED_EXCESS:
             break
         room *= np.maximum(factor, 1.0)
-        tighter = tightened(problem, room)
-        solution = solve(tighter)
-        if not solution.solved:
+        problem = tightened(planned.problem, room)
+        tighter = dataclasses.replace(planned, problem=problem, solution=solve(problem))
+        if not tighter.solution.solved:
             break
-        motion = Motion(samples=samples, law=law_of_solution(samples, solution))
+        motion = _motion(tighter)
         factor = excess(motion, toolpath, machine)
         kept = slowed(motion, toolpath, machine, factor)
-        if kept.end < best[0].end:
-            best = kept, tighter, solution
+        if kept.end < best[1].end:
+            best = tighter, kept
     return best
+
+
+def _motion(planned: OnPath) -> Motion:
+    return Motion(samples=planned.samples, law=law_of_solution(planned.samples, planned.solution))
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:

@@ -20,12 +20,11 @@ from planner.arrays import Array, FloatArray
 from planner.axis_motion import AxisMotion
 from planner.errors import InputError
 from planner.feedrate.solution import Status
-from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
-from planner.machine import Machine
+from planner.methods.job import Job, Method
 from planner.methods.optimal import OptimalMethod
 from planner.methods.plan import Plan
-from planner.methods.stages import Progress, Stages, deliver, stop_time
+from planner.methods.stages import Stages
 from planner.nc.program import Program
 from planner.trajectory import Trajectory
 from planner.tube.course import Course, courses_of
@@ -43,7 +42,7 @@ STANDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class TubeMethod:
+class TubeMethod(Method):
     """The free optimum inside the tolerance.
 
     start  : the method whose motion the search starts from
@@ -53,26 +52,17 @@ class TubeMethod:
     start: OptimalMethod = field(default_factory=lambda: OptimalMethod(corner="bezier"))
     solver: TubeNLP = field(default_factory=TubeNLP)
 
-    def plan(
-        self,
-        program: Program,
-        machine: Machine,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan a program. Raises InputError for what cannot be planned; an unsolved problem is the plan's status."""
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            toolpath = toolpath_from_program(program, machine, tolerance)
-            courses = list(courses_of(toolpath, machine))
-            _check_size(courses, program)
-            stopping = stop_time(toolpath, machine)
-        with stages.stage("start"):
-            start = self.start.plan(program, _often_sampled(machine, toolpath, stopping), tolerance)
+    def plan_job(self, job: Job) -> Plan:
+        toolpath = job.toolpath
+        with job.stage("geometry"):
+            courses = list(courses_of(toolpath, job.machine))
+            _check_size(courses, job.program)
+        with job.stage("start"):
+            start = self.start.plan_job(_often_sampled(job))
         status, sentence = start.status, start.sentence
         steps: list[Steps] = []
         places: list[FloatArray] = []
-        with stages.stage("solve") as report:
+        with job.stage("solve") as report:
             for done, course in enumerate(courses):
                 if start.trajectory is None:
                     break
@@ -88,28 +78,18 @@ class TubeMethod:
                 steps.append(steps_of(course, guess, solution))
                 places.append((solution.place[:-1] + solution.place[1:]) / 2)
                 report((done + 1) / len(courses))
-        trajectory = verdict = None
+        made = None
         if start.trajectory is not None and len(steps) == len(courses):
-            trajectory, verdict = deliver(
-                _motion(courses, steps, places, toolpath), toolpath, machine, stages
-            )
+            made = job.deliver(_motion(courses, steps, places, toolpath))
             sentence += f"; {start.method} with corner {start.corner}, its start, took {start.trajectory.cycle_time:.6g} s"
-        return Plan(
+        return job.plan(
+            made,
             method="tube",
             corner=None,
             solver=repr(self.solver),
-            program=program,
-            machine=machine,
-            toolpath=toolpath,
             status=status,
             sentence=sentence,
-            trajectory=trajectory,
-            verdict=verdict,
-            corners=None,
-            grid=None,
-            stop_time=stopping,
             grid_points=sum(len(part.h) + 1 for part in steps),
-            timings=stages.timings,
         )
 
 
@@ -123,11 +103,12 @@ def _check_size(courses: list[Course], program: Program) -> None:
         )
 
 
-def _often_sampled(machine: Machine, toolpath: Toolpath, stopping: float) -> Machine:
-    """The machine with a period short enough to see every phase of the start."""
-    ramp = machine.limits("acceleration", toolpath.axes) / machine.limits("jerk", toolpath.axes)
-    period = max(START_PERIOD * float(ramp.min()), stopping / START_SAMPLES)
-    return machine.model_copy(update={"dt": min(machine.dt, period)})
+def _often_sampled(job: Job) -> Job:
+    """The job with a period short enough to see every phase of the start, and a clock of its own."""
+    acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
+    period = max(START_PERIOD * float((acceleration / jerk).min()), job.stop_time / START_SAMPLES)
+    machine = job.machine.model_copy(update={"dt": min(job.machine.dt, period)})
+    return dataclasses.replace(job, machine=machine, stages=Stages())
 
 
 def _passed(course: Course, start: Trajectory, toolpath: Toolpath) -> tuple[Trajectory, FloatArray]:

@@ -18,9 +18,9 @@ from planner.feedrate.jerk import JerkLimited
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Fir
 from planner.methods import prices
+from planner.methods.on_path import corner_shape
 from planner.methods.optimal import SIGMA2, OptimalMethod
 from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE, SAVED_MIN, price_list
-from planner.methods.toppra import corner_shape
 from planner.nc.reader import parse_program
 from planner.path import sample_path
 

@@ -212,7 +212,7 @@ def test_the_closing_jerks_are_what_the_motion_runs_too_far():
 
 
 class NeverAsked(OptimalMethod):
-    def plan(self, *given, **named):
+    def plan_job(self, *given, **named):
         raise AssertionError("work was done before the refusal")
 
 

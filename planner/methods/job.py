@@ -1,0 +1,127 @@
+"""What every method shares: its way into a job, the last stages of all, sampling and verification, and the record at the end."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
+from planner.feedrate.solution import Status
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.methods.closed_form import CornerTable
+from planner.methods.plan import GridHistory, Plan
+from planner.methods.prices import PriceList
+from planner.methods.stages import Progress, Stages
+from planner.nc.program import Program
+from planner.timing import MotionInTime, dense_motion, sample_motion
+from planner.trajectory import Trajectory
+from planner.verify import Verdict, verify
+
+Delivered = tuple[Trajectory, Verdict]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job:
+    """A program on its way to a plan.
+
+    toolpath : the program's exact path, with its tolerances
+    stages   : the clock
+    """
+
+    program: Program
+    machine: Machine
+    toolpath: Toolpath
+    stages: Stages
+
+    def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
+        """Run a stage; yields a function that takes the fraction done."""
+        return self.stages.stage(name)
+
+    @cached_property
+    def stop_time(self) -> float:
+        """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""
+        times = rest_to_rest_times(self.toolpath.length, *block_limits(self.toolpath, self.machine))
+        return float(times.sum() + np.sum(self.toolpath.dwell))
+
+    def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
+        """Sample a motion at the interpolation period and have it judged, between the samples too."""
+        with self.stage("sample"):
+            trajectory = sample_motion(motion, self.machine.dt)
+        with self.stage("verify") as progress:
+            verdict = verify(
+                trajectory,
+                self.toolpath,
+                self.machine,
+                dense=dense_motion(motion, self.machine.dt),
+                not_limited=not_limited,
+                progress=progress,
+            )
+        return trajectory, verdict
+
+    def plan(
+        self,
+        made: Delivered | None,
+        *,
+        method: str,
+        corner: str | None,
+        solver: str,
+        status: Status,
+        sentence: str,
+        grid_points: int,
+        corners: CornerTable | None = None,
+        grid: GridHistory | None = None,
+        prices: PriceList | None = None,
+    ) -> Plan:
+        """The record of the job with what was delivered, None if it could not be solved; for the rest see `Plan`."""
+        trajectory, verdict = made or (None, None)
+        return Plan(
+            method=method,
+            corner=corner,
+            solver=solver,
+            program=self.program,
+            machine=self.machine,
+            toolpath=self.toolpath,
+            status=status,
+            sentence=sentence,
+            trajectory=trajectory,
+            verdict=verdict,
+            corners=corners,
+            grid=grid,
+            stop_time=self.stop_time,
+            grid_points=grid_points,
+            prices=prices,
+            timings=self.stages.timings,
+        )
+
+
+class Method(ABC):
+    """A way to plan a job; its repr is its row label in every table."""
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan a program within a tolerance [mm] (None: the program's or the machine's).
+
+        progress : called with the stage's name and the fraction done
+
+        Raises InputError for what cannot be planned; an unsolved problem is the plan's status.
+        """
+        stages = Stages(progress)
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+        return self.plan_job(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+
+    @abstractmethod
+    def plan_job(self, job: Job) -> Plan:
+        """Plan a program whose path is laid out."""

@@ -1,0 +1,82 @@
+"""What methods `toppra` and `optimal` share: which path the feedrate problem is solved on, and the plan of its solution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from planner.corners.bezier import BezierCorner
+from planner.corners.fir import FirCorner
+from planner.corners.kinematic import KinematicCorner
+from planner.corners.smooth import CornerShape, SmoothPath
+from planner.errors import InputError
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.methods.activity import history
+from planner.methods.closed_form import corner_table
+from planner.methods.geometry import AUTO, SPLINE, on_spline
+from planner.methods.job import Delivered, Job
+from planner.methods.plan import Plan
+from planner.methods.prices import PriceList
+from planner.methods.reshape import OnPath
+from planner.timing import Motion
+
+CORNERS = (AUTO, SPLINE, "bezier", "fir", "kinematic")
+
+
+def corner_shape(
+    corner: str | CornerShape, machine: Machine, toolpath: Toolpath, bezier: CornerShape | None = None
+) -> CornerShape:
+    """The corner shape of that name with the machine's settings; `bezier`: the one of "bezier" and beside splines, None for the
+    usual one. Raises InputError for an unknown name."""
+    if corner in (AUTO, SPLINE, "bezier"):
+        return bezier or BezierCorner()
+    if corner == "fir":
+        return FirCorner.from_machine(machine, toolpath.axes)
+    if corner == "kinematic":
+        return KinematicCorner.from_machine(machine, toolpath.axes)
+    if isinstance(corner, str):
+        raise InputError(f"no corner shape '{corner}'; there are {', '.join(CORNERS)}")
+    return corner
+
+
+def best_on_path(
+    job: Job,
+    rounded: SmoothPath,
+    corner: str | CornerShape,
+    plan_on: Callable[[SmoothPath, float], OnPath],
+    rounds: int | None,
+) -> OnPath:
+    """The time-optimal motion on rounded corners, or on splines if `corner` says so; the arguments are those of `on_spline`."""
+    if corner not in (AUTO, SPLINE):
+        return plan_on(rounded, 1.0)
+    return on_spline(rounded, job.machine, plan_on, auto=corner == AUTO, rounds=rounds, stages=job.stages)
+
+
+def plan_of_solution(
+    job: Job,
+    best: OnPath,
+    motion: Motion | None,
+    made: Delivered | None,
+    *,
+    method: str,
+    corner: str | CornerShape,
+    prices: PriceList | None = None,
+) -> Plan:
+    """The plan of a solution and the motion made of it, None for both unless solved."""
+    corners = grid = None
+    if motion is not None:
+        with job.stage("report"):
+            corners = corner_table(best.samples, best.problem, best.solution)
+            grid = history(best.problem, best.solution, motion.law)
+    return job.plan(
+        made,
+        method=method,
+        corner=corner if isinstance(corner, str) else corner.name,
+        solver=best.solution.solver,
+        status=best.solution.status,
+        sentence=best.solution.sentence,
+        grid_points=len(best.samples),
+        corners=corners,
+        grid=grid,
+        prices=prices,
+    )

@@ -9,7 +9,7 @@ import pytest
 from hand_made import make_plan
 from matplotlib.figure import Figure
 
-from planner.report import plots
+from planner.report import plots, profiles_figure, toolpath_figure
 
 PROGRAMS = {
     "flat": "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n",
@@ -29,7 +29,7 @@ def test_figures(tmp_path: Path, name: str) -> None:
 
 def test_profiles_show_limits_and_what_limits() -> None:
     plan = make_plan()
-    figure = plots.profiles_figure(plan)
+    figure = profiles_figure.profiles_figure(plan)
     labels = [axes.get_ylabel().split("\n")[0] for axes in figure.axes]
     assert len(labels) == 2 + 2 * 2  # feed, band, and two moving axes
     said = [label.get_text() for label in figure.legends[0].get_texts()]
@@ -43,33 +43,33 @@ def test_profiles_show_limits_and_what_limits() -> None:
 def test_a_plan_without_a_grid_has_no_band() -> None:
     plan = make_plan()
     plan.grid = None
-    assert len(plots.profiles_figure(plan).axes) == 1 + 2 * 2
+    assert len(profiles_figure.profiles_figure(plan).axes) == 1 + 2 * 2
 
 
 def test_the_envelope_keeps_every_peak() -> None:
     values = np.zeros(1_000_000)
     values[[123_456, 654_321]] = 7.0, -5.0
     axes = Figure().add_subplot()
-    plots._profile(axes, np.linspace(0.0, 1.0, len(values)), values, "black")
+    profiles_figure._profile(axes, np.linspace(0.0, 1.0, len(values)), values, "black")
     drawn = axes.collections[0].get_paths()[0].vertices
     assert drawn[:, 1].max() == 7.0
     assert drawn[:, 1].min() == -5.0
-    assert len(drawn) < 3 * plots.COLUMNS
+    assert len(drawn) < 3 * profiles_figure.COLUMNS
 
 
 def test_thinning_keeps_the_ends_and_stays_within_a_pixel() -> None:
     angle = np.linspace(0.0, 2 * np.pi, 500_000)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    keep = plots._one_per_pixel(circle)
+    keep = toolpath_figure._one_per_pixel(circle)
     assert keep[0] == 0
     assert keep[-1] == len(circle) - 1
-    assert len(keep) < 8 * plots.PIXELS
-    assert np.linalg.norm(np.diff(circle[keep], axis=0), axis=1).max() < 2.0 * 1.5 / plots.PIXELS
+    assert len(keep) < 8 * toolpath_figure.PIXELS
+    assert np.linalg.norm(np.diff(circle[keep], axis=0), axis=1).max() < 2.0 * 1.5 / toolpath_figure.PIXELS
 
 
 def test_the_constraint_that_fills_a_column_wins() -> None:
     t = np.array([0.0, 0.5, 0.5 + 1e-9, 1.0])
-    kinds = plots._majority(t, np.array([0, 1, 2]), 3, 1.0)
-    half = plots.COLUMNS // 2
+    kinds = profiles_figure._majority(t, np.array([0, 1, 2]), 3, 1.0)
+    half = profiles_figure.COLUMNS // 2
     assert (kinds[:half] == 0).all()
     assert (kinds[half:] == 2).all()

@@ -1,0 +1,202 @@
+"""Feed, acceleration and jerk over time against their limits, and which constraint limits when.
+
+Colours are those of Okabe and Ito ("Color universal design", 2008). A job of an hour has millions of samples and a picture some 1500
+columns: a profile keeps the least and the largest value of each column, so that no peak is lost.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from planner.arrays import Array, FloatArray
+from planner.machine import LINEAR_AXES, RAD_PER_DEG
+
+if TYPE_CHECKING:
+    from planner.methods.plan import Plan
+
+COLUMNS = 1500  # about the width of a profile in pixels
+FAR = 4.0  # peaks beyond this multiple of the limit are drawn on a scale that is logarithmic beyond the limit
+BLUE, VERMILION = "#0072B2", "#D55E00"
+# Okabe and Ito without black (limits) and grey (others)
+BANDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442")
+OTHERS = "#d0d0d0"
+SHARE_MIN = 0.005  # constraints that limit a smaller share of the time are shown together
+
+
+def profiles_figure(plan: Plan) -> Figure:
+    """Feed over the limiting constraint, then acceleration and jerk of each moving axis with their limits."""
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    moving = [k for k in range(len(trajectory.axes)) if np.ptp(trajectory.position[:, k]) > 0]
+    band = plan.grid is not None and len(plan.grid.t) > 1
+    heights = [2.4, *([0.28] if band else []), *([1.0] * 2 * len(moving))]
+    figure = Figure(figsize=(6.8, 0.55 + 0.85 * sum(heights)), layout="constrained")
+    layout: Any = figure.get_layout_engine()
+    layout.set(h_pad=0.03, hspace=0.02)
+    rows = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
+    scale, unit = _time_unit(trajectory.cycle_time)
+    t = trajectory.t * scale
+
+    _feed_row(rows[0], plan, t)
+    if band:
+        handles = _band_row(rows[1], plan, scale)
+        figure.legend(
+            handles=handles,
+            loc="outside upper center",
+            ncols=min(len(handles), 4),
+            title="limited by (share of the time)",
+            title_fontsize=8,
+            handlelength=1.2,
+            columnspacing=1.4,
+        )
+    free = _free_quantities(plan)
+    row = iter(rows[2 if band else 1 :])
+    quantities: tuple[tuple[Literal["acceleration", "jerk"], str, str], ...]
+    quantities = (("acceleration", "a", "²"), ("jerk", "j", "³"))
+    for quantity, symbol, power in quantities:
+        values = getattr(trajectory, quantity)
+        limits = plan.machine.limits(quantity, trajectory.axes)
+        for k in moving:
+            axis = trajectory.axes[k]
+            rotary = axis not in LINEAR_AXES
+            per = 1.0 / RAD_PER_DEG if rotary else 1e-3
+            panel = next(row)
+            _profile(panel, t, values[:, k] * per, BLUE)
+            length = "°" if rotary else "m"
+            panel.set_ylabel(f"{symbol}$_{{\\rm {axis.upper()}}}$\n[{length}/s{power}]")
+            _limit_lines(panel, values[:, k] * per, limits[k] * per)
+            if k == moving[0] and quantity in free:
+                said = f"{quantity} is not limited by this method"
+                panel.set_title(said, loc="right", fontsize=7.5, color=VERMILION, pad=2)
+    rows[-1].set_xlabel(f"time [{unit}]")
+    rows[-1].set_xlim(t[0], t[-1])
+    figure.align_ylabels(rows)
+    return figure
+
+
+def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    programmed = plan.program.feed[np.clip(trajectory.block, 0, None)]
+    finite = np.isfinite(programmed)
+    if finite.any():
+        edges = np.flatnonzero(programmed[1:] != programmed[:-1])
+        if len(edges) < COLUMNS:  # a feed for each block says nothing at this size
+            panel.plot(
+                t,
+                np.where(finite, programmed, np.nan),
+                color="black",
+                linestyle=(0, (4, 3)),
+                linewidth=0.7,
+                zorder=1,
+            )
+    _profile(panel, t, trajectory.feed, BLUE)
+    panel.set_ylim(0.0, 1.08 * max(float(trajectory.feed.max()), 1e-9))
+    top = panel.get_ylim()[1]
+    if finite.any() and programmed[finite].min() > top:
+        said = f"programmed feed {programmed[finite].min():.4g} mm/s is never reached"
+        panel.text(0.995, 0.96, said, transform=panel.transAxes, ha="right", va="top", fontsize=7.5)
+    panel.set_ylabel("feed\n[mm/s]")
+
+
+def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
+    """A strip whose colour names the limiting constraint; returns the legend, the most frequent first."""
+    grid = plan.grid
+    assert grid is not None
+    assert plan.trajectory is not None
+    t = np.asarray(grid.t, dtype=float)
+    duration = np.maximum(np.diff(t), 0.0)
+    active = np.asarray(grid.active)[:-1]
+    share = np.bincount(active, weights=duration, minlength=len(grid.active_names))
+    ranked = [int(k) for k in np.argsort(-share, kind="stable") if share[k] > 0]
+    shown = [k for k in ranked if share[k] >= SHARE_MIN * share.sum()][: len(BANDS)]
+    colour_of = np.full(len(share), len(shown))
+    colour_of[shown] = np.arange(len(shown))
+    winner = _majority(t, colour_of[active], len(shown) + 1, plan.trajectory.cycle_time)
+    colours = [matplotlib.colors.to_rgb(c) for c in (*BANDS[: len(shown)], OTHERS)]
+    panel.imshow(
+        np.array(colours)[winner][None],
+        aspect="auto",
+        interpolation="nearest",
+        extent=(0.0, plan.trajectory.cycle_time * scale, 0.0, 1.0),
+    )
+    panel.set_yticks([])
+    panel.spines[:].set_visible(False)
+    panel.tick_params(bottom=False)
+    total = max(float(share.sum()), 1e-12)
+    entries = [(grid.active_names[k], share[k], BANDS[i]) for i, k in enumerate(shown)]
+    if len(shown) < len(ranked):
+        entries.append(("others", float(sum(share[k] for k in ranked[len(shown) :])), OTHERS))
+    return [
+        Patch(color=colour, label=f"{_words(name)} ({_percent(time / total)})")
+        for name, time, colour in entries
+    ]
+
+
+def _majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
+    """For each of COLUMNS columns over [0, end], the kind (of intervals from t[i]) that fills most of it."""
+    cuts = np.union1d(t, np.linspace(0.0, end, COLUMNS + 1))
+    middle = 0.5 * (cuts[1:] + cuts[:-1])
+    of = kind[np.clip(np.searchsorted(t, middle, side="right") - 1, 0, len(kind) - 1)]
+    column = np.clip((middle / end * COLUMNS).astype(int), 0, COLUMNS - 1)
+    filled = np.bincount(column * kinds + of, weights=np.diff(cuts), minlength=COLUMNS * kinds)
+    return filled.reshape(COLUMNS, kinds).argmax(axis=1)
+
+
+def _profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> None:
+    """A curve; with many samples the band between the least and the largest value of each column."""
+    if len(t) <= 4 * COLUMNS:
+        panel.plot(t, values, color=colour)
+        return
+    starts = np.linspace(0, len(t), COLUMNS + 1).astype(int)[:-1]
+    low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+    # each column reaches its neighbour, so that the band has no gaps where the curve is steep
+    before = values[starts[1:] - 1]
+    low[1:], high[1:] = np.minimum(low[1:], before), np.maximum(high[1:], before)
+    panel.fill_between(t[starts], low, high, color=colour, linewidth=0.5)
+
+
+def _limit_lines(panel: Axes, values: FloatArray, limit: float) -> None:
+    peak = float(np.abs(values).max())
+    far = peak > FAR * limit  # a linear scale would show the peak only
+    if far:
+        panel.set_yscale("symlog", linthresh=limit, linscale=0.4 + 0.6 * np.log10(peak / limit))
+        decade = 10.0 ** np.floor(np.log10(peak))
+        named = [0.0, decade] if decade < 10.0 * limit else [0.0, limit, decade]
+        panel.set_yticks([-value for value in named[:0:-1]] + named)
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.minorticks_off()
+    reach = max(peak, limit) * (1.6 if far else 1.18)
+    panel.set_ylim(-reach, reach)
+    panel.axhline(0.0, color="#cccccc", linewidth=0.5, zorder=0)
+    for side in (limit, -limit):
+        panel.axhline(side, color=VERMILION, linewidth=0.8, linestyle=(0, (4, 2)))
+
+
+def _free_quantities(plan: Plan) -> set[str]:
+    if plan.verdict is None:
+        return set()
+    return {name.partition(".")[0] for name, check in plan.verdict.limits.items() if not check.limited}
+
+
+def _time_unit(seconds: float) -> tuple[float, str]:
+    """Factor from seconds, and unit: ms below 0.5 s, min from 5 min on."""
+    if seconds < 0.5:
+        return 1e3, "ms"
+    return (1.0 / 60.0, "min") if seconds > 300.0 else (1.0, "s")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= SHARE_MIN else "< 1 %"
+
+
+def _words(name: str) -> str:
+    """acceleration.x -> acceleration X"""
+    what, _, axis = name.partition(".")
+    return f"{what} {axis.upper()}".strip().replace("_", " ")

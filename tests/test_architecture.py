@@ -30,6 +30,7 @@ LAYERS = (
     "planner.feedrate",
     "planner.fir",
     "planner.trajectory",
+    "planner.time_law",
     "planner.timing",
     "planner.axis_motion",
     "planner.tube",

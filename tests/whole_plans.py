@@ -22,7 +22,8 @@ from planner.machine import Machine
 from planner.methods.on_path import corner_shape
 from planner.nc.program import Program
 from planner.path import RESOLUTION, PathSamples, sample_path
-from planner.timing import Motion, TimeLaw, law_of_solution
+from planner.time_law import TimeLaw, law_of_solution
+from planner.timing import Motion
 
 CORNERS = ("bezier", "fir", "kinematic")
 

@@ -13,7 +13,7 @@ import numpy as np
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
 from planner.methods.plan import GridHistory
-from planner.timing import TimeLaw
+from planner.time_law import TimeLaw
 
 # An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with jerk limits are within
 # 1e-3 of some limit for 94 to 98 % of their time, within 1e-2 for 98 to 99.6 % (pentagon, zig-zag, arcs, spiral); more does not help.

@@ -29,7 +29,8 @@ from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
 from planner.methods.slowing import slowed
 from planner.path import PathSamples, sample_path
-from planner.timing import Motion, law_of_moves
+from planner.time_law import law_of_moves
+from planner.timing import Motion
 
 # The share of every leg that its corners leave free, to change the speed on it [-]. Circle of chords 5.5 s with 0 (all corners as slow
 # as the first), 2.62 with 0.2, 2.54 with 0.3, 2.71 with 0.4; 100 random paths 2.4, 2.4, 2.8, 3.2 % faster than stopping.

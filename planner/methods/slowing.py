@@ -22,7 +22,8 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.reshape import OnPath
-from planner.timing import Motion, TimeLaw, dense_motion, law_of_solution, sample_motion
+from planner.time_law import TimeLaw, law_of_solution
+from planner.timing import Motion, dense_motion, sample_motion
 from planner.verify import Verdict
 
 # Tightening pays while a run is slowed down by more than this [-] ...

@@ -16,7 +16,8 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
 from planner.path import sample_path
-from planner.timing import Motion, law_of_phases
+from planner.time_law import law_of_phases
+from planner.timing import Motion
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,8 @@ from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.reshape import OnPath
 from planner.path import RESOLUTION, PathSamples, sample_path
-from planner.timing import Motion, law_of_solution
+from planner.time_law import law_of_solution
+from planner.timing import Motion
 
 SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
 

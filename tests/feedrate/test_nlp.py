@@ -19,7 +19,8 @@ from planner.feedrate.solution import Status, active_names, constraint_ratios
 from planner.machine import Machine
 from planner.nc.program import Program
 from planner.path import sample_path
-from planner.timing import Motion, dense_motion, law_of_solution
+from planner.time_law import law_of_solution
+from planner.timing import Motion, dense_motion
 
 SOLVERS = ("ipopt", "fatrop")
 

@@ -13,7 +13,8 @@ from benchmarks import problems
 from planner.feedrate.rest_to_rest import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.nc.reader import parse_program
 from planner.path import sample_path
-from planner.timing import Motion, dense_motion, law_of_phases, sample_motion
+from planner.time_law import law_of_phases
+from planner.timing import Motion, dense_motion, sample_motion
 from planner.trajectory import Trajectory
 
 MACHINE = problems.machine()

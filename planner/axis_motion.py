@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
+from planner.search import last_not_after
 from planner.trajectory import Trajectory
 
 # Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this share of it [-]; the better one is then good to rounding.
@@ -170,14 +171,7 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 def _sample(times, t, end, position, velocity, acceleration, jerk, s, columns, s_out, feed, piece):
     """Write position and derivatives at ascending times (T,) into columns (4, T, A), and s, feed and piece (T,)."""
     last = len(t) - 1
-    low, high = 0, last
-    while low < high:  # the last piece that begins no later than the first time
-        middle = (low + high + 1) // 2
-        if t[middle] <= times[0]:
-            low = middle
-        else:
-            high = middle - 1
-    m = low
+    m = last_not_after(t, times[0], 0, last)
     for n in range(len(times)):
         while m < last and t[m + 1] <= times[n]:
             m += 1

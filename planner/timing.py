@@ -22,6 +22,7 @@ from planner.arrays import Array, FloatArray
 from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
 from planner.errors import InputError
 from planner.path import PathSamples
+from planner.search import last_not_after
 from planner.time_law import TimeLaw
 from planner.trajectory import Trajectory
 
@@ -222,18 +223,6 @@ def _refine(legs, corners, spans, element, w0, w1, w, ds, h, work, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _last_not_after(values, limit, first, last):
-    """Largest index in [first, last] whose ascending value is <= limit; `first` if there is none."""
-    while first < last:
-        middle = (first + last + 1) // 2
-        if values[middle] <= limit:
-            first = middle
-        else:
-            last = middle - 1
-    return first
-
-
-@njit(cache=True, error_model="numpy")
 def _sample(
     legs, corners, spans, times, t, s_law, feed, acc_s, jerk_s, run, end, piece, s, element, w0, w1, position
 ):  # fmt: skip
@@ -245,7 +234,7 @@ def _sample(
     point, parameter = np.empty(count, np.int64), np.empty(count)
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     inverse, inverse_of, exact = np.zeros(6), -1, False
-    m = _last_not_after(t, times[0], 0, len(t) - 1)
+    m = last_not_after(t, times[0], 0, len(t) - 1)
     i = 0
     for n in range(count):
         while m + 1 < len(t) and t[m + 1] <= times[n]:
@@ -262,7 +251,7 @@ def _sample(
             v, u, j = 0.0, 0.0, 0.0
         first, last = piece[run[m]], piece[run[m] + 1] - 2  # the intervals of this run
         if i < first:
-            i = _last_not_after(s, s_here, first, last)
+            i = last_not_after(s, s_here, first, last)
         while i < last and s[i + 1] <= s_here:
             i += 1
         point[n] = i

@@ -17,6 +17,7 @@ LAYERS = (
     "planner.units",
     "planner.errors",
     "planner.arrays",
+    "planner.search",
     "planner.filters",
     "planner.machine",
     "planner.nc",

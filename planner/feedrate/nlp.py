@@ -44,6 +44,7 @@ import numpy as np
 
 from planner.arrays import Array, FloatArray
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.piecewise import INTERVALS_MIN, Found, solve_pieces, too_few
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution, Prices, Status
 
@@ -54,8 +55,6 @@ SLOWER = 0.7
 VIOLATION_MAX = 1e-6
 # Residual of ipopt's rows [-]; its default of 1e-4 leaves ratios to the limits of 1 + 1e-5 on long pieces.
 FEASIBILITY = 1e-8
-# Fewer intervals cannot go from rest to rest: the jerk must be positive, negative and positive again.
-INTERVALS_MIN = 3
 
 OUTCOMES = {
     "Solve_Succeeded": (Status.OPTIMAL, "time-optimal for the limits with jerk"),
@@ -104,34 +103,26 @@ class JerkLimitedNLP:
         if not guess.solved:
             took = time.perf_counter() - began
             return FeedrateSolution.failed(problem, guess.status, guess.sentence, repr(self), took)
-        points = len(problem)
-        columns = np.zeros((points, 4))
-        prices = np.zeros((points, 1 + 2 * len(problem.axes)))
-        status, sentence = OUTCOMES["Solve_Succeeded"]
-        iterations = 0
-        for g in range(len(problem.piece) - 1):
-            found = _solve_piece(problem, g, guess, self)
-            iterations = max(iterations, found.iterations)
-            if found.columns is None or found.prices is None:
-                where = f"piece {g} (from s = {problem.s[problem.piece[g]]:.6g} mm): {found.sentence}"
-                took = time.perf_counter() - began
-                return FeedrateSolution.failed(problem, found.status, where, repr(self), took, iterations)
-            if found.status is Status.ACCEPTABLE:
-                status, sentence = found.status, found.sentence
-            here = slice(problem.piece[g], problem.piece[g + 1])
-            columns[here], prices[here] = found.columns, found.prices
+        found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self))
+        took = time.perf_counter() - began
+        if found.columns is None:
+            return FeedrateSolution.failed(
+                problem, found.status, found.sentence, repr(self), took, found.iterations
+            )
+        v, acc, jerk, duration, *_ = found.columns.T
+        prices = found.columns[:, 4:]
         axes = len(problem.axes)
         relative = prices[:, 0] * problem.feed_sq_max  # dT / d(ln feed_sq_max)
         return FeedrateSolution(
-            status=status,
-            sentence=sentence,
+            status=found.status,
+            sentence=found.sentence,
             solver=repr(self),
-            feed_sq=columns[:, 0] ** 2,
-            acc_s=columns[:, 1],
-            jerk_s=columns[:, 2],
-            duration=columns[:, 3],
-            solve_time=time.perf_counter() - began,
-            iterations=iterations,
+            feed_sq=v**2,
+            acc_s=acc,
+            jerk_s=jerk,
+            duration=duration,
+            solve_time=took,
+            iterations=found.iterations,
             jerk_limited=True,
             prices=Prices.from_relative(
                 problem, prices[:, 1 : 1 + axes].sum(axis=0), prices[:, 1 + axes :].sum(axis=0), relative
@@ -139,22 +130,13 @@ class JerkLimitedNLP:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Found:
-    """One piece of n points: v, a, j, h (n, 4) and dT/d(feed_sq_max), then dT/d(ln limit) of acceleration and jerk
-    (n, 1 + 2A); both None on failure."""
-
-    status: Status
-    sentence: str
-    iterations: int
-    columns: FloatArray | None = None
-    prices: FloatArray | None = None
-
-
 def _solve_piece(
     problem: FeedrateProblem, g: int, guess: FeedrateSolution, settings: JerkLimitedNLP
-) -> _Found:
-    """Transcribe and solve piece g; the whole formulation, from top to bottom."""
+) -> Found:
+    """Transcribe and solve piece g; the whole formulation, from top to bottom.
+
+    The columns are v, a, j, h and dT/d(feed_sq_max), then dT/d(ln limit) of acceleration and jerk, one for each axis.
+    """
     import casadi as ca
 
     here = slice(problem.piece[g], problem.piece[g + 1])
@@ -163,11 +145,7 @@ def _solve_piece(
     points = intervals + 1
     v_start, v_end = np.sqrt(problem.feed_sq_start[g]), np.sqrt(problem.feed_sq_end[g])
     if v_start == 0.0 and v_end == 0.0 and intervals < INTERVALS_MIN:
-        return _Found(
-            status=Status.INFEASIBLE,
-            sentence=f"from rest to rest takes {INTERVALS_MIN} intervals, there are {intervals}; refine the grid",
-            iterations=0,
-        )
+        return too_few(intervals)
 
     # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
     h_guess = guess.duration[here][:-1] / SLOWER
@@ -239,7 +217,7 @@ def _solve_piece(
     if status in (Status.OPTIMAL, Status.ACCEPTABLE) and not violation <= VIOLATION_MAX:
         status, sentence = BROKE_DOWN
     if status not in (Status.OPTIMAL, Status.ACCEPTABLE):
-        return _Found(status=status, sentence=sentence, iterations=iterations)
+        return Found(status=status, sentence=sentence, iterations=iterations)
 
     # ---- unpack ---------------------------------------------------------------------------------------------------------------
     found = np.append(result["x"], [0.0, 0.0]).reshape(points, 5)
@@ -255,7 +233,9 @@ def _solve_piece(
     of_feed[1:] += shadow[:-1, 0] / (2.0 * cap)
     of_feed /= 2.0 * feed_max  # from feed to feed^2
     prices = -second * np.column_stack([of_feed, of_axes])
-    return _Found(status=status, sentence=sentence, iterations=iterations, columns=columns, prices=prices)
+    return Found(
+        status=status, sentence=sentence, iterations=iterations, columns=np.column_stack([columns, prices])
+    )
 
 
 def _stage_numbers(

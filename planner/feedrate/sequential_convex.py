@@ -57,6 +57,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.piecewise import INTERVALS_MIN, Found, solve_pieces, too_few
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution, Status
 
@@ -67,8 +68,6 @@ NEAR = 100.0  # distance from rest up to which the acceleration is shaped like a
 VIOLATION_MAX = 1e-6
 FEASIBILITY = 1e-8
 CONVEX_TOL = 1e-8  # relative tolerance of optimality of each convex problem [-]
-# Fewer intervals cannot go from rest to rest: two have one speed between them, which must rise and fall.
-INTERVALS_MIN = 3
 
 CONVERGED = (
     Status.OPTIMAL,
@@ -111,58 +110,41 @@ class SequentialConvex:
         if problem.feed_sq_start.any() or problem.feed_sq_end.any():
             raise ValueError("SequentialConvex: pieces must start and end at rest")
         guess = Reachability().solve(problem).require()  # from rest to rest there always is one
-        columns = np.zeros((len(problem), 4))
-        status, sentence = CONVERGED
-        iterations = 0
-        for g in range(len(problem.piece) - 1):
-            found = _solve_piece(problem, g, guess, self)
-            iterations = max(iterations, found.iterations)
-            if found.columns is None:
-                where = f"piece {g} (from s = {problem.s[problem.piece[g]]:.6g} mm): {found.sentence}"
-                took = time.perf_counter() - began
-                return FeedrateSolution.failed(problem, found.status, where, repr(self), took, iterations)
-            if found.status is Status.ACCEPTABLE:
-                status, sentence = found.status, found.sentence
-            columns[problem.piece[g] : problem.piece[g + 1]] = found.columns
+        found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self))
+        took = time.perf_counter() - began
+        if found.columns is None:
+            return FeedrateSolution.failed(
+                problem, found.status, found.sentence, repr(self), took, found.iterations
+            )
+        feed_sq, acc, jerk, duration = found.columns.T
         return FeedrateSolution(
-            status=status,
-            sentence=sentence,
+            status=found.status,
+            sentence=found.sentence,
             solver=repr(self),
-            feed_sq=columns[:, 0],
-            acc_s=columns[:, 1],
-            jerk_s=columns[:, 2],
-            duration=columns[:, 3],
-            solve_time=time.perf_counter() - began,
-            iterations=iterations,
+            feed_sq=feed_sq,
+            acc_s=acc,
+            jerk_s=jerk,
+            duration=duration,
+            solve_time=took,
+            iterations=found.iterations,
             jerk_limited=True,
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Found:
-    """One piece of n points: x, u, mean jerk, duration (n, 4), or None on failure."""
-
-    status: Status
-    sentence: str
-    iterations: int
-    columns: FloatArray | None = None
-
-
 def _solve_piece(
     problem: FeedrateProblem, g: int, guess: FeedrateSolution, settings: SequentialConvex
-) -> _Found:
-    """Transcribe piece g and solve it pass by pass; the whole formulation, from top to bottom."""
+) -> Found:
+    """Transcribe piece g and solve it pass by pass; the whole formulation, from top to bottom.
+
+    The columns are x, u, mean jerk and duration.
+    """
     import casadi as ca
 
     here = slice(problem.piece[g], problem.piece[g + 1])
     ds = np.diff(problem.s[here])
     n, axes = len(ds), len(problem.axes)
     if n < INTERVALS_MIN:
-        return _Found(
-            status=Status.INFEASIBLE,
-            sentence=f"from rest to rest takes {INTERVALS_MIN} intervals, there are {n}; refine the grid",
-            iterations=0,
-        )
+        return too_few(n)
 
     # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
     length, second = ds.mean(), guess.duration[here][:-1].mean()
@@ -238,7 +220,7 @@ def _solve_piece(
             too_long = stats["return_status"] == "Maximum_Iterations_Exceeded"
             status, sentence = TOO_LONG if too_long else BROKE_DOWN
             if done == 0:
-                return _Found(status=status, sentence=sentence, iterations=iterations)
+                return Found(status=status, sentence=sentence, iterations=iterations)
             status, sentence = (
                 STOPPED[0],
                 f"the result of {done} passes, which keeps all limits; then {sentence}",
@@ -256,7 +238,7 @@ def _solve_piece(
     columns = np.zeros((n + 1, 4))
     columns[:, 0], columns[:, 1] = x_found, u_found
     columns[:-1, 2], columns[:-1, 3] = np.diff(u_found) / h, h
-    return _Found(status=status, sentence=sentence, iterations=iterations, columns=columns)
+    return Found(status=status, sentence=sentence, iterations=iterations, columns=columns)
 
 
 @dataclass(frozen=True, kw_only=True)

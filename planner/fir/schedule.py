@@ -34,6 +34,7 @@ from planner.fir.command import Cells
 from planner.fir.course import Course
 from planner.fir.overlap import overlap_beside, overlap_within, overlap_within_limits
 from planner.machine import Machine
+from planner.search import last_not_after
 
 # Legs are cut where a speed limit ends on them only if they take longer than this share of Td at their own speed [-].
 CUT_LEGS = 0.25
@@ -307,7 +308,7 @@ def _over_dense(i, low, high, V, s, point, direction, tol, a_max, n_max, T1, T2)
     """The same by two nodes, -+V x with weights w, that have the kernel's second and fourth moment."""
     second, fourth = (T1 * T1 + T2 * T2) / 12.0, (T1**4 + T2**4) / 80.0 + T1 * T1 * T2 * T2 / 24.0
     x, weight = np.sqrt(fourth / second), second * second / (2.0 * fourth)
-    a, b = _leg_at(s, s[i] - V * x, low, i), _leg_at(s, s[i] + V * x, i, high)
+    a, b = last_not_after(s, s[i] - V * x, low, i - 1), last_not_after(s, s[i] + V * x, i, high - 1)
     sa, sb = max(s[i] - V * x, s[low]), min(s[i] + V * x, s[high])
     error_sq, over = 0.0, 0.0
     for c in range(point.shape[1]):
@@ -317,16 +318,3 @@ def _over_dense(i, low, high, V, s, point, direction, tol, a_max, n_max, T1, T2)
         error_sq += D * D
         over = max(over, abs(D) / (x * x * a_max[c]))
     return max(over, weight * np.sqrt(error_sq) / tol, np.sqrt(error_sq) / (x * x * n_max))
-
-
-@njit(cache=True, error_model="numpy")
-def _leg_at(s, x, low, high):
-    """The leg among low .. high - 1 on which the length x lies; the outermost if it lies beyond."""
-    high -= 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if s[middle] <= x:
-            low = middle
-        else:
-            high = middle - 1
-    return low

@@ -9,8 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-import uuid
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +20,7 @@ from rich.text import Text
 
 from planner.errors import InputError
 from planner.report.export import summary, verdict_summary, versions
+from planner.report.replace import replacing_file
 from planner.report.tables import ratio_text
 from planner.units import MICROMETRE
 
@@ -196,18 +195,8 @@ def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None
     """Write the comparison as JSON or CSV, the whole file or none of it. Raises InputError where it cannot be written."""
     check_place(path)
     text = comparison_csv(rows) if path.suffix == ".csv" else _json(comparison_dict(rows, about))
-    new = path.with_name(f".{path.name}.planner-{uuid.uuid4().hex[:12]}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with new.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
-    except OSError as fault:
-        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(path)) from fault
-    finally:
-        new.unlink(missing_ok=True)
+    with replacing_file(path) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:

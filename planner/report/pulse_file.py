@@ -9,8 +9,6 @@ appears as a whole: it is written beside its place, forced to disk and renamed.
 from __future__ import annotations
 
 import json
-import os
-import uuid
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.pulses import AxisPulses
+from planner.report.replace import replacing_file
 
 SUFFIXES = (".parquet", ".csv")
 
@@ -27,17 +26,8 @@ def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[s
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
-    new = path.with_name(f".{path.name}.planner-{uuid.uuid4().hex[:12]}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing_file(path) as new:
         _write(new, path.suffix, trains, about)
-        with new.open("rb+") as file:
-            os.fsync(file.fileno())
-        new.replace(path)
-    except OSError as fault:
-        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(path)) from fault
-    finally:
-        new.unlink(missing_ok=True)
 
 
 def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:

@@ -32,6 +32,8 @@ import uuid
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from planner.errors import InputError
+
 if sys.platform != "win32":
     import fcntl
 
@@ -69,6 +71,24 @@ def replacing(directory: Path, previous: Collection[str] = ()) -> Iterator[Path]
         shutil.rmtree(new, ignore_errors=True)
         if lock is not None:
             os.close(lock)
+
+
+@contextlib.contextmanager
+def replacing_file(path: Path) -> Iterator[Path]:
+    """The same for one file: give the place of a new one to write; when the block ends well, it takes the place of `path`.
+
+    After an exception `path` is as before. Raises InputError where it cannot be written.
+    """
+    new = path.with_name(f".{path.name}.planner-{uuid.uuid4().hex[:12]}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield new
+        _sync(new)
+        new.replace(path)
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(path)) from fault
+    finally:
+        new.unlink(missing_ok=True)
 
 
 def _exchangeable(directory: Path) -> bool:

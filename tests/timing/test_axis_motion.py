@@ -71,7 +71,9 @@ def test_arc_length_is_the_integral_of_the_speed(pieces):
         return np.linalg.norm(motion.velocity[m] + tau * (motion.acceleration[m] + tau * motion.jerk[m] / 2))
 
     edges = np.append(motion.t, motion.end)
-    parts = [quad(speed, edges[m], edges[m + 1], args=(m,), limit=200)[0] for m in range(len(motion))]
+    parts = [
+        quad(speed, edges[m], edges[m + 1], args=(m,), limit=200, epsabs=1e-12)[0] for m in range(len(motion))
+    ]
     np.testing.assert_allclose(np.diff(motion.s), parts, rtol=1e-6, atol=1e-12)
 
 

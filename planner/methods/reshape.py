@@ -39,7 +39,7 @@ from planner.smoothing.spline_path import SplineShape, cusps, with_spline
 WORK = 150_000
 # ... at most so many, and no more once so many of them together gained less than this [-].
 ROUNDS_MAX = 40
-ROUNDS_SEEN, GAIN_MIN = 5, 1e-4
+ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
 FIRST_FORCE = 0.5  # of the pull; 0.3 and 1 gain the same within 1e-3 in eight rounds
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
 SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 1e-4 to 1e-3 slower (pentagon, zig-zag, spiral)

@@ -1,8 +1,9 @@
 """Plan and verify every program of a folder: does each end with a verdict or a reason, and what does it take?
 
-    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME] [--name RESULT]
+    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME ...] [--name RESULT]
 
-Every file is planned in a process of its own, so that peak memory is the file's and nothing can take the others down.
+Every file is planned in a process of its own, so that peak memory is the file's and nothing can take the others down; with several
+corners once with each, and what the first of them gains over the others is in the table.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import argparse
 import json
 import multiprocessing
 import resource
+import statistics
 import time
 from pathlib import Path
 from typing import Any
@@ -26,33 +28,39 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("-m", "--machine", required=True)
     parser.add_argument("--method", default="optimal")
-    parser.add_argument("--corner", default="auto")
+    parser.add_argument("--corner", nargs="+", default=["auto", "bezier"])
     parser.add_argument("--name", default="jerk-nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
     options = parser.parse_args()
     files = sorted(file for file in options.folder.iterdir() if file.suffix not in KEEP_OUT)
     files = [file for file in files if not options.only or any(part in file.name for part in options.only)]
-    rows = []
-    context = multiprocessing.get_context("spawn")
+    rows: list[dict[str, Any]] = []
     for file in files:
-        began = time.perf_counter()
-        receive, send = context.Pipe(duplex=False)
-        process = context.Process(
-            target=_run, args=(send, str(file), options.machine, options.method, options.corner)
-        )
-        process.start()
-        send.close()
-        try:
-            row = receive.recv()
-        except EOFError:
-            row = {"outcome": "crashed", "message": f"the process ended with {process.exitcode}"}
-        process.join()
-        row |= {"program": file.name, "wall_s": round(time.perf_counter() - began, 2)}
-        rows.append(row)
-        print(file.name, json.dumps(row)[:200], flush=True)
-        write_results(
-            options.name, {"method": options.method, "corner": options.corner, "programs": rows}, _table(rows)
-        )  # a kill loses nothing
+        for corner in options.corner:
+            row = _in_own_process(file, options.machine, options.method, corner)
+            rows.append(row)
+            print(file.name, json.dumps(row)[:200], flush=True)
+            data = {"method": options.method, "corners": options.corner, "programs": rows}
+            write_results(options.name, data, _table(rows, options.corner))  # a kill loses nothing
+            if row["outcome"] == "refused":
+                break
+
+
+def _in_own_process(file: Path, machine: str, method: str, corner: str) -> dict[str, Any]:
+    """One file with one corner."""
+    began = time.perf_counter()
+    context = multiprocessing.get_context("spawn")
+    receive, send = context.Pipe(duplex=False)
+    process = context.Process(target=_run, args=(send, str(file), machine, method, corner))
+    process.start()
+    send.close()
+    try:
+        row: dict[str, Any] = receive.recv()
+    except EOFError:
+        row = {"outcome": "crashed", "message": f"the process ended with {process.exitcode}"}
+    process.join()
+    wall = round(time.perf_counter() - began, 2)
+    return row | {"program": file.name, "corner": corner, "wall_s": wall}
 
 
 def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
@@ -74,6 +82,7 @@ def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
         "grid_points": plan.grid_points,
         "stop_s": plan.stop_time,
         "timings_s": {name: round(seconds, 3) for name, seconds in plan.timings.items()},
+        "cpu_s": round(time.process_time(), 2),
         "peak_gb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, 2),
     }
     if plan.verdict is not None and plan.trajectory is not None:
@@ -92,16 +101,29 @@ def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
     pipe.send(row)
 
 
-def _table(rows: list[dict[str, Any]]) -> str:
+def _table(rows: list[dict[str, Any]], corners: list[str]) -> str:
+    """One line for each program: all about the first corner, and the cycle times with the others over its own."""
     columns = [
-        "program", "blocks", "grid points", "cycle [s]", "stops [s]", "worst limit", "contour, vertex [um]",
-        "corner/eq. 19-20", "read, geometry, solve, sample, verify [s]", "peak [GB]", "outcome",
+        "program", "blocks", "grid points", f"cycle, {corners[0]} [s]", *(f"{other} / {corners[0]}" for other in corners[1:]),
+        "stops [s]", "worst limit", "contour, vertex [um]", "corner/eq. 19-20", "read, geometry, solve, sample, verify [s]",
+        "CPU of all [s]", "peak [GB]", "outcome",
     ]  # fmt: skip
+    compared: dict[str, list[float]] = {other: [] for other in corners[1:]}
+    cycles = {(row["program"], row["corner"]): row["cycle_s"] for row in rows if "cycle_s" in row}
     lines = []
     for row in rows:
-        if "cycle_s" not in row:
-            lines.append([row["program"], *[""] * 9, f"{row['outcome']}: {row['message']}"])
+        if row["corner"] != corners[0]:
             continue
+        if "cycle_s" not in row:
+            blank = [""] * (len(columns) - 2)
+            lines.append([row["program"], *blank, f"{row['outcome']}: {row['message']}"])
+            continue
+        ratios = []
+        for other in corners[1:]:
+            cycle = cycles.get((row["program"], other))
+            ratios.append("" if cycle is None else f"{cycle / row['cycle_s']:.4f}")
+            if cycle is not None:
+                compared[other].append(cycle / row["cycle_s"])
         times = row["timings_s"]
         name, worst = max(row["limits"].items(), key=lambda item: item[1])
         corner = row["corner_speed_ratio"]
@@ -112,6 +134,7 @@ def _table(rows: list[dict[str, Any]]) -> str:
                 f"{row['blocks']:,}",
                 f"{row['grid_points']:,}",
                 f"{row['cycle_s']:.3f}",
+                *ratios,
                 f"{row['stop_s']:.3f}",
                 f"{worst:.6f} {name}",
                 f"{row['contour_mm'] * 1e3:.2f}, {row['vertex_mm'] * 1e3:.2f}",
@@ -120,11 +143,24 @@ def _table(rows: list[dict[str, Any]]) -> str:
                     f"{times.get(stage, 0):.2f}"
                     for stage in ("read", "geometry", "solve", "sample", "verify")
                 ),
+                f"{row['cpu_s']:.1f}",
                 f"{row['peak_gb']:.2f}",
                 outcome,
             ]
         )
-    return markdown(columns, lines)
+    text = markdown(columns, lines)
+    for other, ratio in compared.items():
+        if ratio:
+            text += (
+                f"\n{other} / {corners[0]}: {statistics.geometric_mean(ratio):.4f} in the geometric mean of {len(ratio)} programs, "
+                f"{min(ratio):.4f} to {max(ratio):.4f}\n"
+            )
+    failed = [
+        f"{row['program']} ({row['corner']}): {row['outcome']}: {row['message']}"
+        for row in rows
+        if row["corner"] != corners[0] and row["outcome"] != "passed"
+    ]
+    return text + "".join(f"\n* {line}" for line in failed)
 
 
 if __name__ == "__main__":

@@ -98,6 +98,7 @@ def make_plan(
     machine: str = "mill",
     passed: bool = True,
     solved: bool = True,
+    rounded: bool = True,
     prices: PriceList | None = None,
 ) -> Any:
     limits = load_machine(machine)
@@ -112,7 +113,7 @@ def make_plan(
         program=program,
         machine=limits,
         toolpath=toolpath,
-        corners=make_corners(),
+        corners=make_corners() if rounded else None,
         status=SimpleNamespace(name="OPTIMAL" if solved else "INFEASIBLE"),
         sentence="solved" if solved else "no feed satisfies all limits; loosen the tolerance",
         trajectory=trajectory,

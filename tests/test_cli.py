@@ -69,6 +69,12 @@ def test_plan_writes_and_exits_0(planned: Callable[..., None], job: Path, tmp_pa
     assert all(str(tmp_path / "out" / name) in result.stdout for name in files)
 
 
+def test_that_there_are_no_corners_is_said(planned: Callable[..., None], job: Path) -> None:
+    planned(rounded=False)
+    assert "no rounded corners" in run("plan", job, "--corners").stdout
+    assert "no rounded corners" not in run("plan", job).stdout
+
+
 def test_json_is_all_there_is_on_stdout(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
     planned()
     result = run("plan", job, "--json", "-o", tmp_path / "out")

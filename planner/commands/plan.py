@@ -22,6 +22,8 @@ from planner.commands.options import (
 from planner.commands.terminal import FAILED, ProgressBar, guarded, show
 from planner.errors import InputError, NotSolvedError
 
+NO_CORNERS = "no rounded corners to list: they lie on splines or are full stops (--corner bezier rounds each by itself)"
+
 
 @guarded
 def plan(
@@ -85,9 +87,8 @@ def plan(
         from planner.report.tables import corner_table, plan_table
 
         show(plan_table(result))
-        table = corner_table(result) if corners else None
-        if table is not None:
-            show("", table)
+        if corners:
+            show("", corner_table(result) or NO_CORNERS)
         for name in written:
             typer.echo(str(output / name) if output else name)
     if result.trajectory is None:

@@ -28,7 +28,7 @@ from planner.verify import Verdict
 # Tightening pays while a run is slowed down by more than this [-] ...
 TIGHTENED_EXCESS = 1e-5
 # ... at most so often, and once for jobs of more grid points, where the time it takes counts: it leaves less than half of the excess.
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 300_000
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.

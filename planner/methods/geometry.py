@@ -2,7 +2,7 @@
 
 "spline" puts splines in the place of all runs of corners that they fit (smoothing/) and reshapes them (methods/reshape.py). "auto"
 plans the rounded corners too and keeps them between the full stops where they are faster; beyond `COMPARED_POINTS`, where it would
-take as long again, it is "spline": corners were not faster between any two stops of the programs at hand.
+take as long again, it is "spline".
 """
 
 from __future__ import annotations

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from itertools import chain
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.reshape import OnPath
 from planner.time_law import TimeLaw, law_of_solution
-from planner.timing import Motion, dense_motion, sample_motion
+from planner.timing import Motion, inside_pieces
 from planner.verify import Verdict
 
 # Tightening pays while a run is slowed down by more than this [-] ...
@@ -40,14 +39,14 @@ ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, 
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, on the samples and densely
-    between them; <= 1 where it keeps them."""
+    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends and in its
+    middle; <= 1 where it keeps them."""
     axes = toolpath.axes
     limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
     programmed[toolpath.block] = toolpath.feed
     factor = np.zeros(len(motion.law.t))
-    for chunk in chain([sample_motion(motion, machine.dt)], dense_motion(motion, machine.dt)):
+    for chunk in inside_pieces(motion, machine.dt):
         worst = chunk.feed / programmed[chunk.block]
         motions = (chunk.velocity, chunk.acceleration, chunk.jerk)
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):

@@ -32,7 +32,8 @@ def main() -> None:
     parser.add_argument("--name", default="jerk-nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
     options = parser.parse_args()
-    files = sorted(file for file in options.folder.iterdir() if file.suffix not in KEEP_OUT)
+    files = [file for file in options.folder.iterdir() if file.suffix not in KEEP_OUT]
+    files.sort(key=lambda file: file.stat().st_size)  # the small ones first, so that most is there soon
     files = [file for file in files if not options.only or any(part in file.name for part in options.only)]
     rows: list[dict[str, Any]] = []
     for file in files:

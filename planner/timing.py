@@ -90,29 +90,22 @@ def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
 
 
 def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
-    """The motion between its samples at dt [s]: half-way between them and inside every piece (`inside_pieces`), in chunks."""
+    """The motion between its samples at dt [s]: half-way between them and inside every piece, in chunks."""
     halves = np.arange(0.5 * dt, motion.end, dt)
-    return _in_chunks(motion, dt, np.concatenate([[0.0], *_inside(motion), halves, [motion.end]]))
+    return in_chunks(motion, dt, np.concatenate([[0.0], inside_pieces(motion), halves, [motion.end]]))
 
 
-def inside_pieces(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
-    """The motion near both ends and in the middle of every piece, in chunks; dt [s] is the trajectory's period.
-
-    On a piece all speeds, accelerations and jerks are smooth and nearly linear, so that their extremes show there.
-    """
-    return _in_chunks(motion, dt, np.concatenate(_inside(motion)))
-
-
-def _inside(motion: MotionInTime) -> list[FloatArray]:
-    """Times of `inside_pieces`."""
+def inside_pieces(motion: MotionInTime) -> FloatArray:
+    """Times near both ends and in the middle of every piece [s]: all speeds, accelerations and jerks are smooth and nearly linear
+    there, so that their extremes show; but for the speed along the path, which has a peak of its own where its acceleration is 0."""
     edges = np.append(motion.t, motion.end)
     lasting = np.diff(edges) > SHORTEST_PIECE
     begin, end = edges[:-1][lasting], edges[1:][lasting]
-    return [near * begin + (1.0 - near) * end for near in (1.0 - DENSE_EDGE, 0.5, DENSE_EDGE)]
+    return np.concatenate([near * begin + (1.0 - near) * end for near in (1.0 - DENSE_EDGE, 0.5, DENSE_EDGE)])
 
 
-def _in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Trajectory]:
-    """The motion at the times, put in order; chunks share their ends."""
+def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Trajectory]:
+    """The motion at the times [s], put in order, in chunks that share their ends; dt [s] is the trajectories' period."""
     times = np.unique(times)
     for first in range(0, len(times), CHUNK):
         yield motion.at(times[first : first + CHUNK + 1], dt)

@@ -324,7 +324,7 @@ def test_ctrl_c(tmp_path: Path) -> None:
     ):
         time.sleep(0.2)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=120)
     assert process.returncode == 130
     assert out == ""
     assert err == "interrupted\n"

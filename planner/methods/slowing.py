@@ -21,7 +21,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.reshape import OnPath
 from planner.time_law import TimeLaw, law_of_solution
-from planner.timing import Motion, inside_pieces
+from planner.timing import Motion, in_chunks, inside_pieces
 from planner.verify import Verdict
 
 # Tightening pays while a run is slowed down by more than this [-] ...
@@ -39,14 +39,14 @@ ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, 
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends and in its
-    middle; <= 1 where it keeps them."""
+    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
+    middle and where it is fastest; <= 1 where it keeps them."""
     axes = toolpath.axes
     limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
     programmed[toolpath.block] = toolpath.feed
     factor = np.zeros(len(motion.law.t))
-    for chunk in inside_pieces(motion, machine.dt):
+    for chunk in in_chunks(motion, machine.dt, np.append(inside_pieces(motion), _fastest(motion.law))):
         worst = chunk.feed / programmed[chunk.block]
         motions = (chunk.velocity, chunk.acceleration, chunk.jerk)
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
@@ -54,6 +54,15 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor
+
+
+def _fastest(law: TimeLaw) -> FloatArray:
+    """When the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    lasting = np.diff(np.append(law.t, law.end))
+    braking = np.flatnonzero(law.jerk_s < 0.0)
+    tau = -law.acc_s[braking] / law.jerk_s[braking]
+    inside = (tau > 0.0) & (tau < lasting[braking])
+    return law.t[braking[inside]] + tau[inside]
 
 
 def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:

@@ -1,7 +1,7 @@
 """Symmetric banded matrices: Cholesky factorisation and solution, in time linear in their size.
 
-Row i holds the entries of the lower triangle within `width` of the diagonal, the diagonal last: band[i, width - 1 - d] is the
-entry (i, i - d).
+Row i holds the entries of the upper triangle within `width` of the diagonal, the diagonal first: band[i, d] is the entry (i, i + d).
+Inner loops run along whole rows, zeros included, so that a compiler makes vector instructions of them.
 """
 
 from __future__ import annotations
@@ -12,25 +12,21 @@ from numba import njit
 
 @njit(cache=True, error_model="numpy")
 def factorise(band):
-    """band (n, width) becomes its Cholesky factor, the diagonal inverted; False where it is not positive definite."""
+    """band (n, width) becomes its factor R with R'R = band, the diagonal inverted; False where it is not positive definite."""
     n, width = band.shape
+    row = np.zeros(2 * width)  # the second half stays 0
     for i in range(n):
-        first = max(i - width + 1, 0)
-        row = band[i]
-        for j in range(first, i):
-            other = band[j]
-            begin = max(first, j - width + 1)
-            shift_i, shift_j = width - 1 - i, width - 1 - j
-            total = row[shift_i + j]
-            for k in range(begin, j):
-                total -= row[shift_i + k] * other[shift_j + k]
-            row[shift_i + j] = total * other[width - 1]
-        total = row[width - 1]
-        for k in range(width - 1 - (i - first), width - 1):
-            total -= row[k] * row[k]
-        if not total > 0.0:
+        if not band[i, 0] > 0.0:
             return False
-        row[width - 1] = 1.0 / np.sqrt(total)
+        inverse = 1.0 / np.sqrt(band[i, 0])
+        band[i, 0] = inverse
+        for d in range(1, width):
+            band[i, d] *= inverse
+            row[d] = band[i, d]
+        for d in range(1, min(width, n - i)):
+            value = row[d]
+            for k in range(width):
+                band[i + d, k] -= value * row[d + k]
     return True
 
 
@@ -39,12 +35,12 @@ def solve(band, x):
     """x (n,) becomes the solution for the right-hand side x, with the factor of `factorise`."""
     n, width = band.shape
     for i in range(n):
-        total = x[i]
-        for d in range(1, min(i, width - 1) + 1):
-            total -= band[i, width - 1 - d] * x[i - d]
-        x[i] = total * band[i, width - 1]
-    for i in range(n - 1, -1, -1):
-        x[i] *= band[i, width - 1]
+        x[i] *= band[i, 0]
         value = x[i]
-        for d in range(1, min(i, width - 1) + 1):
-            x[i - d] -= band[i, width - 1 - d] * value
+        for d in range(1, min(width, n - i)):
+            x[i + d] -= band[i, d] * value
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for d in range(1, min(width, n - i)):
+            total -= band[i, d] * x[i + d]
+        x[i] = total * band[i, 0]

@@ -79,21 +79,18 @@ def _objective(H, linear, c, gradient):
 
 @njit(cache=True, error_model="numpy")
 def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
-    """The Newton matrix."""
+    """The Newton matrix (banded.py), with unit rows for control points that stay."""
     axes, n, width = H.shape
     full = band.shape[1]
     band[:] = 0.0
     for i in range(n):
         for k in range(axes):
-            row = i * axes + k
-            if not free[i]:
-                band[row, full - 1] = 1.0
-                continue
             for d in range(min(i, width - 1) + 1):
-                if free[i - d]:
-                    band[row, full - 1 - d * axes] = H[k, i, width - 1 - d]
-    block = np.empty((axes, axes))
+                band[(i - d) * axes + k, d * axes] = H[k, i, width - 1 - d]
     normal = np.empty(axes)
+    spread = np.zeros(
+        (axes, 2 * full)
+    )  # of a site: what its six control points get for each axis; then zeros
     for site in range(len(first)):
         # M'M = 1 - (1 - slide^2) t t'; grad g = N (x) M e / r^2, where e is already over r
         dot = 0.0
@@ -106,22 +103,26 @@ def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
         loose = 1.0 - slide[site] * slide[site]
         for k in range(axes):
             for m in range(axes):
-                block[k, m] = steep * normal[k] * normal[m] - flat * loose * along[site, k] * along[site, m]
-            block[k, k] += flat
-        for b in range(ORDER):
-            i = first[site] + b
-            if not free[i]:
-                continue
-            for a in range(b + 1):
-                j = first[site] + a
-                if not free[j]:
-                    continue
-                weight = values[site, b] * values[site, a]
-                for k in range(axes):
-                    row = band[i * axes + k]
-                    shift = full - 1 - (i * axes + k) + j * axes
-                    for m in range(axes if a < b else k + 1):
-                        row[shift + m] += weight * block[k, m]
+                block = steep * normal[k] * normal[m] - flat * loose * along[site, k] * along[site, m]
+                if k == m:
+                    block += flat
+                for b in range(ORDER):
+                    spread[k, b * axes + m] = values[site, b] * block
+        for a in range(ORDER):
+            value = values[site, a]
+            for k in range(axes):
+                begin = a * axes + k
+                into = band[first[site] * axes + begin]
+                for d in range(full):
+                    into[d] += value * spread[k, begin + d]
+    for i in range(n):
+        if not free[i]:
+            for column in range(i * axes, (i + 1) * axes):
+                for d in range(full):
+                    band[column, d] = 0.0
+                for row in range(max(column - full + 1, 0), column):
+                    band[row, column - row] = 0.0
+                band[column, 0] = 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -191,7 +192,7 @@ def minimise(
     value     : of the objective at the start, in as far as it matters
     gap_first : guess of the gap there, for the first multipliers
     gap_last, relative : where to end, gap <= gap_last + relative * value
-    H (A, n, 6) lower bands (banded.py), linear (n, A); free (n,) False for control points that stay; first (m,) first of the six
+    H (A, n, 6) lower bands, linear (n, A); free (n,) False for control points that stay; first (m,) first of the six
     control points of each site, values (m, 6) of their basis functions there.
     """
     axes, n, _ = H.shape

@@ -23,7 +23,7 @@ HALVINGS_MAX = 20
 REST_GROWTH = 0.5
 # Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by this share of the distance.
 STEEPEST, SLOPE = 4.0, 1.0
-# ... but not down to neighbours that are shorter than this share of them [-]: those are rounding.
+# ... but not down to neighbours, nor parts of them, that are shorter than this share of them [-]: those are rounding.
 FINEST = 1e-4
 
 
@@ -224,7 +224,7 @@ def grade(legs, rows):
             right = stack[depth - 1]
             a, b = (left - row.w0) / (row.w1 - row.w0), (right - row.w0) / (row.w1 - row.w0)
             allowed = min(size[r] + SLOPE * whole * a, size[r + 1] + SLOPE * whole * (1.0 - b))
-            if (b - a) * whole > STEEPEST * allowed and depth <= HALVINGS_MAX:
+            if (b - a) * whole > STEEPEST * allowed and b - a > FINEST and depth <= HALVINGS_MAX:
                 stack[depth] = 0.5 * (left + right)
                 depth += 1
             else:

@@ -44,12 +44,22 @@ def best_on_path(
     rounded: SmoothPath,
     corner: str | CornerShape,
     plan_on: Callable[[SmoothPath, float], OnPath],
+    *,
+    blend_tangents: bool,
     rounds: int | None,
 ) -> OnPath:
     """The time-optimal motion on rounded corners, or on splines if `corner` says so; the arguments are those of `on_spline`."""
     if corner not in (AUTO, SPLINE):
         return plan_on(rounded, 1.0)
-    return on_spline(rounded, job.machine, plan_on, auto=corner == AUTO, rounds=rounds, stages=job.stages)
+    return on_spline(
+        rounded,
+        job.machine,
+        plan_on,
+        blend_tangents=blend_tangents,
+        auto=corner == AUTO,
+        rounds=rounds,
+        stages=job.stages,
+    )
 
 
 def plan_of_solution(

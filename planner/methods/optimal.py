@@ -56,6 +56,7 @@ class OptimalMethod(Method):
             path,
             self.corner,
             lambda path, finer: self._on_path(path, machine, job.stages, finer=finer),
+            blend_tangents=True,
             rounds=self.rounds,
         )
         motion = made = prices = None

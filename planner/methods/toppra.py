@@ -50,7 +50,7 @@ class ToppraMethod(Method):
             with job.stage("solve"):
                 return _solve(path, samples, machine, solver)
 
-        best = best_on_path(job, path, self.corner, on_path, rounds=0)
+        best = best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=0)
         motion = made = None
         if best.solution.solved:
             motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))

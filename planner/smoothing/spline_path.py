@@ -75,17 +75,42 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
 
 
 def cusps(laid: Laid) -> Array:
-    """(Q,) True for runs on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are looked
-    at: no motion along it has a direction there."""
-    found = np.zeros(len(laid.fits), dtype=bool)
+    """(Q,) True for runs with a cusp."""
+    return np.logical_or.reduceat(cusp_spans(laid), laid.span_first[:-1]) if len(laid.fits) else laid.fits
+
+
+def cusp_spans(laid: Laid) -> Array:
+    """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are
+    looked at: no motion along it has a direction there."""
+    found = np.zeros(laid.span_first[-1], dtype=bool)
     powers = np.arange(1, DEGREE + 1)
     slopes = powers * np.linspace(0.0, 1.0, CUSP_PLACES)[:, None] ** (powers - 1)
     for q in range(len(laid.fits)):
         cut, coef = _polynomials(laid, q)
         tangent = np.einsum("tm,smk->stk", slopes, coef[:, 1:]) / np.diff(cut)[:, None, None]
         forward = np.einsum("stk,stk->st", tangent[:, 1:], tangent[:, :-1])
-        found[q] = np.linalg.norm(tangent, axis=2).min() < CUSP or forward.min() <= 0.0
+        found[laid.span_first[q] : laid.span_first[q + 1]] = (
+            np.linalg.norm(tangent, axis=2).min(axis=1) < CUSP
+        ) | (forward.min(axis=1) <= 0.0)
     return found
+
+
+def cusp_joints(path: SmoothPath, shape: SplineShape) -> Array:
+    """Joints of the toolpath where runs that do not fit have their cusps: of those around each, the one that turns most."""
+    laid, runs = shape.laid, shape.runs
+    lost = np.repeat(~laid.fits, np.diff(laid.span_first))
+    spans = np.flatnonzero(lost & cusp_spans(laid))
+    run = np.searchsorted(laid.span_first, spans, side="right") - 1
+    begin, end = laid.breaks[spans + run], laid.breaks[spans + run + 1]
+    place = path.legs.place
+    first = np.searchsorted(place, begin - (end - begin), side="left")
+    last = np.searchsorted(place, end + (end - begin), side="right") - 1
+    # one at least, and inside the run
+    first = np.clip(np.minimum(first, last), runs.joint_first[run], runs.joint_last[run])
+    last = np.clip(last, first, runs.joint_last[run])
+    theta = path.theta
+    most = [a + int(np.argmax(theta[a : b + 1])) for a, b in zip(first, last, strict=True)]
+    return path.legs.first[np.unique(np.array(most, dtype=np.int64))]
 
 
 def _polynomials(laid: Laid, q: int) -> tuple[FloatArray, FloatArray]:

@@ -16,7 +16,10 @@ from benchmarks import problems
 from planner.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.corners.elements import element_length, element_point, to_arc_length
+from planner.corners.kinematic import KinematicCorner
+from planner.corners.smooth import round_corners
 from planner.errors import InputError
+from planner.geometry.build import toolpath_from_program
 from planner.nc.reader import parse_program
 from planner.path import RESOLUTION, PathSamples, insert_points, sample_path
 from planner.timing import dense_motion
@@ -248,6 +251,16 @@ def test_points_grow_in_proportion_to_the_path():
     ]
     steps = np.diff(counts) / np.array([50, 100, 200])
     np.testing.assert_allclose(steps, steps[0], rtol=1e-3)
+
+
+def test_pieces_of_rounding_length_do_not_make_their_neighbours_as_short():
+    """A kinematic corner between chords of a circle ends within an ulp of its apex: an interval without length."""
+    machine = problems.machine()
+    toolpath = toolpath_from_program(problems.chord_circle(), machine, None)
+    corner = KinematicCorner.from_machine(machine, toolpath.axes)
+    path = round_corners(toolpath, machine, corner, blend_tangents=True)
+    samples = sample_path(path, machine, third_order=True)
+    assert len(samples) < 40 * len(toolpath)
 
 
 def test_a_straight_line_needs_one_interval():

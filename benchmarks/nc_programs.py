@@ -1,9 +1,10 @@
 """Plan and verify every program of a folder: does each end with a verdict or a reason, and what does it take?
 
-    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME ...] [--name RESULT]
+    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME ...] [--name RESULT] [--resume]
 
 Every file is planned in a process of its own, so that peak memory is the file's and nothing can take the others down; with several
-corners once with each, and what the first of them gains over the others is in the table.
+corners once with each, and what the first of them gains over the others is in the table. `--resume` keeps what the result holds
+already; every row names the commit it was made with.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.record import markdown, write_results
+from benchmarks.record import RESULTS, markdown, provenance, write_results
 
 KEEP_OUT = (".csv", ".md", ".txt")
 
@@ -31,13 +32,20 @@ def main() -> None:
     parser.add_argument("--corner", nargs="+", default=["auto", "bezier"])
     parser.add_argument("--name", default="jerk-nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
+    parser.add_argument("--resume", action="store_true", help="keep the rows of an earlier run")
     options = parser.parse_args()
     files = [file for file in options.folder.iterdir() if file.suffix not in KEEP_OUT]
     files.sort(key=lambda file: file.stat().st_size)  # the small ones first, so that most is there soon
     files = [file for file in files if not options.only or any(part in file.name for part in options.only)]
     rows: list[dict[str, Any]] = []
+    if options.resume:
+        rows = json.loads((RESULTS / f"{options.name}.json").read_text(encoding="utf-8"))["programs"]
+    there = {(row["program"], row["corner"]) for row in rows}
+    refused = {row["program"] for row in rows if row["outcome"] == "refused"}
     for file in files:
         for corner in options.corner:
+            if (file.name, corner) in there or file.name in refused:
+                continue
             row = _in_own_process(file, options.machine, options.method, corner)
             rows.append(row)
             print(file.name, json.dumps(row)[:200], flush=True)
@@ -61,7 +69,7 @@ def _in_own_process(file: Path, machine: str, method: str, corner: str) -> dict[
         row = {"outcome": "crashed", "message": f"the process ended with {process.exitcode}"}
     process.join()
     wall = round(time.perf_counter() - began, 2)
-    return row | {"program": file.name, "corner": corner, "wall_s": wall}
+    return row | {"program": file.name, "corner": corner, "wall_s": wall, "commit": provenance()["commit"]}
 
 
 def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:

@@ -57,14 +57,7 @@ def on_spline(
 
     given = rounded
     with stages.stage("geometry"):
-        shape = spline_shape(rounded, machine)
-        for _ in range(CUSP_ROUNDS):
-            at = cusp_joints(rounded, shape)
-            if not len(at):
-                break
-            stopping = _with_stops(rounded.toolpath, at)
-            rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
-            shape = spline_shape(rounded, machine)
+        rounded, shape = splined_with_stops(rounded, machine, blend_tangents)
     if not shape.laid.fits.any():
         return usual(given)
     shape, best = reshaped(rounded, shape, usual, rounds, stages)
@@ -79,6 +72,21 @@ def on_spline(
         if fine.solution.solved and fine.solution.cycle_time < best.solution.cycle_time:
             best = fine
     return dataclasses.replace(best, shape=shape)
+
+
+def splined_with_stops(
+    rounded: SmoothPath, machine: Machine, blend_tangents: bool
+) -> tuple[SmoothPath, SplineShape]:
+    """The splines of a path, and the path with full stops where they would have cusps."""
+    shape = spline_shape(rounded, machine)
+    for _ in range(CUSP_ROUNDS):
+        at = cusp_joints(rounded, shape)
+        if not len(at):
+            break
+        stopping = _with_stops(rounded.toolpath, at)
+        rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
+        shape = spline_shape(rounded, machine)
+    return rounded, shape
 
 
 def _with_stops(toolpath: Toolpath, at: Array) -> Toolpath:

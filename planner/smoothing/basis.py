@@ -13,8 +13,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from planner.arrays import FloatArray
-
 DEGREE = 5
 ORDER = DEGREE + 1
 
@@ -26,12 +24,6 @@ def clamped(breaks):
     for i in range(len(knots)):
         knots[i] = breaks[min(max(i - DEGREE, 0), len(breaks) - 1)]
     return knots
-
-
-def greville(knots: FloatArray) -> FloatArray:
-    """(n,) the places whose values as control points give back a straight line."""
-    sums = np.concatenate([[0.0], np.cumsum(knots)])
-    return (sums[ORDER:-1] - sums[1:-ORDER]) / DEGREE
 
 
 @njit(cache=True, error_model="numpy")

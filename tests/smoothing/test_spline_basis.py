@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
 from planner.smoothing.banded import factorise, solve
-from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, greville, span_basis
+from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
 
 seeds = st.integers(0, 10**6)
 
@@ -37,15 +37,6 @@ def test_basis_is_that_of_scipy(seed, spans):
             np.testing.assert_allclose(
                 out[order] @ control[i : i + ORDER], expected, rtol=1e-7, atol=1e-9 * np.abs(out[order]).max()
             )
-
-
-@given(seeds, st.integers(1, 12))
-@settings(max_examples=20)
-def test_control_points_at_greville_s_places_give_a_straight_line(seed, spans):
-    breaks = random_breaks(np.random.default_rng(seed), spans)
-    knots = clamped(breaks)
-    u = np.linspace(breaks[0], breaks[-1], 50)
-    np.testing.assert_allclose(BSpline(knots, greville(knots), DEGREE)(u), u, rtol=1e-12)
 
 
 @given(seeds, st.integers(9, 40), st.integers(1, 9))

@@ -16,9 +16,10 @@ from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.spline import DEGREE, span_point
 from planner.geometry.toolpath import Joint
+from planner.methods.geometry import splined_with_stops
 from planner.methods.optimal import OptimalMethod
-from planner.nc.reader import parse_program
-from planner.smoothing.spline_path import spline_shape, with_spline
+from planner.nc.reader import parse_program, read_program
+from planner.smoothing.spline_path import cusp_joints, cusps, spline_shape, with_spline
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
@@ -209,6 +210,39 @@ def test_extreme_tolerances_are_kept(tolerance, shortest):
 def test_random_polylines_are_verified(seed):
     rng = np.random.default_rng(seed)
     time_of(problems.polyline(random_polyline(rng, 12, axes=int(rng.integers(2, 4)), sharpest=179.0)))
+
+
+def test_a_cusp_is_found_at_the_joint_that_turns_there():
+    toolpath = toolpath_from_program(problems.zigzag(), MACHINE, None)
+    path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    shape = spline_shape(path, MACHINE)
+    assert not cusps(shape.laid).any()
+    assert not len(cusp_joints(path, shape))
+    # six control points in one place: the curve stands still on the span between them
+    span = len(shape.left) // 2
+    control = shape.laid.control.copy()
+    control[span : span + DEGREE + 1] = control[span]
+    laid = shape.laid._replace(control=control)
+    assert cusps(laid).all()
+    lost = dataclasses.replace(shape, laid=laid._replace(fits=np.zeros(1, bool)))
+    joints = cusp_joints(path, lost)
+    place = path.legs.place[np.searchsorted(path.legs.first, joints)]
+    begin, end = laid.breaks[span], laid.breaks[span + 1]
+    near = np.abs(path.legs.place - (begin + end) / 2).min()
+    assert len(joints)
+    assert np.abs(place - (begin + end) / 2).min() <= max(near, 2.0 * (end - begin))
+
+
+def test_stops_at_cusps_keep_the_splines_around_them(shared_dir):
+    """A plotter's drawing with five loops smaller than the tolerance."""
+    program = read_program(shared_dir / "nc" / "aiten__CNCLib__hedgehog.hpgl", MACHINE)
+    toolpath = toolpath_from_program(program, MACHINE, None)
+    path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    before = spline_shape(path, MACHINE)
+    assert len(cusp_joints(path, before))
+    after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
+    assert shape.laid.fits.all()
+    assert (after.joint == Joint.STOP).sum() > (path.joint == Joint.STOP).sum()
 
 
 def test_arcs_become_part_of_the_curve():

@@ -224,8 +224,9 @@ def grade(legs, rows):
             right = stack[depth - 1]
             a, b = (left - row.w0) / (row.w1 - row.w0), (right - row.w0) / (row.w1 - row.w0)
             allowed = min(size[r] + SLOPE * whole * a, size[r + 1] + SLOPE * whole * (1.0 - b))
-            if (b - a) * whole > STEEPEST * allowed and b - a > FINEST and depth <= HALVINGS_MAX:
-                stack[depth] = 0.5 * (left + right)
+            middle = 0.5 * (left + right)
+            if (b - a) * whole > STEEPEST * allowed and b - a > FINEST and left < middle < right:
+                stack[depth] = middle
                 depth += 1
             else:
                 out = grown(out, n + 1)

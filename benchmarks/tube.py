@@ -1,16 +1,18 @@
 """How far is the optimum on rounded corners from the physical limit? Every corner shape against method `tube`.
 
-    python -m benchmarks.tube
+    python -m benchmarks.tube [--resume]
 
 Single corners of 15 to 170 degrees between legs of 20 mm, pentagon, zig-zag, paper 002's 5-point path and a spiral of 100 chords, on
 the machine of problems.py (v 100 mm/s, a 2000 mm/s2, j 2e5 mm/s3, tolerance 0.05 mm, 1 ms). `tube` seeks the motion of the axes itself,
 its path included, and ends in a local optimum; a ratio below 1 would say that it missed a better one.
 
-Results: benchmarks/results/tube.json and .md, as far as they have come, after every job.
+Results: benchmarks/results/tube.json and .md, as far as they have come, after every job; `--resume` keeps those that are there.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import time
 from typing import Any
 
@@ -18,7 +20,7 @@ import numpy as np
 
 import planner
 from benchmarks import problems
-from benchmarks.record import markdown, write_results
+from benchmarks.record import RESULTS, markdown, write_results
 from planner.errors import PlannerError
 from planner.methods.on_path import CORNERS
 from planner.nc.program import Program
@@ -63,8 +65,16 @@ def measured(job: Program, **named: str) -> dict[str, Any]:
 
 def main() -> None:
     """Run all jobs and write the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--resume", action="store_true", help="keep the jobs of an earlier run")
     rows: dict[str, dict[str, Any]] = {}
+    if parser.parse_args().resume:
+        rows = json.loads((RESULTS / "tube.json").read_text(encoding="utf-8"))["jobs"]
     for name, job in jobs().items():
+        if name in rows:
+            continue
         rows[name] = {"tube": measured(job, method="tube")}
         rows[name] |= {shape: measured(job, method="optimal", corner=shape) for shape in CORNERS}
         print(name, {label: row["cycle_time_s"] for label, row in rows[name].items()}, flush=True)

@@ -318,13 +318,18 @@ def test_ctrl_c(tmp_path: Path) -> None:
     os.mkfifo(pipe)  # the reader waits for a writer, so that the interrupt surely meets it at work
     with (
         subprocess.Popen(
-            [*COMMAND, "info", str(pipe)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*COMMAND, "info", str(pipe)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            # a shell's background jobs, these tests perhaps among them, are born with interrupts ignored
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         ) as process,
         pipe.open("w"),
     ):
         time.sleep(0.2)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == ""
     assert err == "interrupted\n"

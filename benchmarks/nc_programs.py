@@ -87,6 +87,7 @@ def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
     row: dict[str, Any] = {
         "outcome": "not solved",
         "message": plan.sentence,
+        "sentence": plan.sentence,
         "blocks": len(plan.program),
         "grid_points": plan.grid_points,
         "stop_s": plan.stop_time,

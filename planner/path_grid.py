@@ -17,8 +17,9 @@ from planner.path_rows import grown, set_row
 MARGIN_SAFETY = 1.25
 # The jerk between grid points may be off by so many times `resolution` [-]: 1 %, made good by slowing down (methods/optimal.py).
 JERK_SHARE = 5.0
-# Halvings of one interval at most; 2^-20 of a corner is below a nanometre.
+# Halvings of one interval at most, and so its smallest part; 2^-20 of a corner is below a nanometre.
 HALVINGS_MAX = 20
+SMALLEST = 2.0**-HALVINGS_MAX
 # Intervals may be this share of their distance from the nearest full stop [-], for solvers of third order.
 REST_GROWTH = 0.5
 # Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by this share of the distance.
@@ -120,13 +121,15 @@ def _subdivide(
         error = _measure(
             legs, corners, spans, element, left, right, feed, velocity, acceleration, jerk, work, points
         )
-        share = (0.5 * (left + right) - wa) / (wb - wa)
+        middle = 0.5 * (left + right)
+        share = (middle - wa) / (wb - wa)
         away = from_a + (from_b - from_a) * share
         away = min(away, to_next - away)
         h = (from_b - from_a) * (right - left) / (wb - wa)
         coarse = error > resolution or h > max(shortest, REST_GROWTH * away)
-        if coarse and depth <= HALVINGS_MAX and count + depth < len(out):
-            stack[depth] = 0.5 * (left + right)
+        divisible = left < middle < right and right - left > SMALLEST * (wb - wa)
+        if coarse and divisible and count + depth < len(out):
+            stack[depth] = middle
             depth += 1
         else:
             out[count] = right

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.arrays import Array, FloatArray, freeze
-from planner.geometry.chords import chorded
+from planner.geometry.chords import chorded, parted_by_feed
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
@@ -140,10 +140,7 @@ class Course:
 def course_of(toolpath: Toolpath, machine: Machine) -> Course:
     """Lay out a toolpath as a course."""
     lines = chorded(toolpath, CHORD_SHARE, np.zeros(len(toolpath), bool))
-    joint = lines.joint.copy()
-    change = np.flatnonzero((joint[1:-1] == Joint.SMOOTH) & (lines.feed[1:] != lines.feed[:-1])) + 1
-    joint[change] = Joint.CORNER  # of angle 0: where the feed changes a leg ends
-    legs = legs_of(dataclasses.replace(lines, joint=joint))
+    legs = legs_of(parted_by_feed(lines))
     at = legs.first
     point = np.vstack([lines.start[at[:-1]], lines.end[-1:]])
     length = np.linalg.norm(np.diff(point, axis=0), axis=1)

@@ -98,6 +98,13 @@ def chorded(toolpath: Toolpath, share: float, whole: Array) -> Toolpath:
     )
 
 
+def parted_by_feed(toolpath: Toolpath) -> Toolpath:
+    """The same path with a corner of angle 0 where the programmed feed changes on a straight line: a leg ends there."""
+    same_way = toolpath.joint[1:-1] == Joint.SMOOTH
+    change = np.flatnonzero(same_way & (toolpath.feed[1:] != toolpath.feed[:-1])) + 1
+    return toolpath.with_joints(change, Joint.CORNER)
+
+
 def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
     """Points (n, A) at the parameters x (n,) [mm] of the arcs `segment` (n,), relative to their centres."""
     arcs, row = toolpath.arcs, toolpath.arc[segment]

@@ -14,6 +14,7 @@ so nothing downstream may assume |dp/dx| = 1 on arcs.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -115,3 +116,9 @@ class Toolpath:
 
     def __len__(self) -> int:
         return len(self.length)
+
+    def with_joints(self, at: Array | slice, how: Joint) -> Toolpath:
+        """The same path, passed like that at the joints `at` (indices, a mask or a slice)."""
+        joint = self.joint.copy()
+        joint[at] = how
+        return dataclasses.replace(self, joint=joint)

@@ -127,8 +127,9 @@ def _with_stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
         sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > angle)
         if not sharp.any() and np.isfinite(best_time).all():
             continue
-        joint = np.where(sharp, Joint.STOP, toolpath.joint).astype(np.uint8)
-        guide = _guide_of(dataclasses.replace(toolpath, joint=joint), machine)
+        stopping = toolpath.with_joints(sharp, Joint.STOP)
+        joint = stopping.joint
+        guide = _guide_of(stopping, machine)
         time = promised(guide.pick(np.ones(guide.runs, bool)), machine)[1].min(axis=0)
         run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
         time = np.bincount(run, time, len(ends) - 1)

@@ -15,9 +15,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.arrays import FloatArray
 from planner.corners.smooth import SmoothPath, round_corners
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.methods.reshape import OnPath, PlanOn, reshaped
 from planner.methods.stages import Stages
@@ -83,17 +83,10 @@ def splined_with_stops(
         at = cusp_joints(rounded, shape)
         if not len(at):
             break
-        stopping = _with_stops(rounded.toolpath, at)
+        stopping = rounded.toolpath.with_joints(at, Joint.STOP)
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
         shape = spline_shape(rounded, machine)
     return rounded, shape
-
-
-def _with_stops(toolpath: Toolpath, at: Array) -> Toolpath:
-    """The toolpath with full stops at some joints."""
-    joint = toolpath.joint.copy()
-    joint[at] = Joint.STOP
-    return dataclasses.replace(toolpath, joint=joint)
 
 
 def _with_corners(

@@ -12,7 +12,6 @@ A stretch between full stops that is not faster than stopping at every block is 
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +32,7 @@ from planner.feedrate.ramps import Kind
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
-from planner.geometry.chords import arc_sagitta, chorded
+from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
 from planner.geometry.legs import Legs as PathLegs
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
@@ -98,11 +97,7 @@ class KinematicMethod(Method):
             whole |= slow
 
     def _look_ahead(self, toolpath: Toolpath, machine: Machine, whole: Array) -> _Course:
-        lines = chorded(toolpath, CHORD_SHARE, whole)
-        change = np.flatnonzero((lines.joint[1:-1] == Joint.SMOOTH) & (lines.feed[1:] != lines.feed[:-1])) + 1
-        joint = lines.joint.copy()
-        joint[change] = Joint.CORNER  # of angle 0: where the programmed feed changes a leg ends
-        lines = dataclasses.replace(lines, joint=joint)
+        lines = parted_by_feed(chorded(toolpath, CHORD_SHARE, whole))
         path = legs_of(lines)
         legs = leg_limits(path, lines, machine)
         free = candidates(path, lines, legs, machine, self.start_stop)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from planner.corners.smooth import round_corners
 from planner.errors import NotSolvedError
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_phases
 from planner.feedrate.solution import Status
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Joint
 from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
 from planner.path import sample_path
@@ -27,7 +26,7 @@ class StopMethod(Method):
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):
-            exact = _stopping(job.toolpath)
+            exact = job.toolpath.with_joints(slice(None), Joint.STOP)
             samples = sample_path(round_corners(exact, machine, BezierCorner()), machine)
         status, sentence = Status.OPTIMAL, "every block runs from rest to rest in the shortest time"
         made = None
@@ -49,8 +48,3 @@ class StopMethod(Method):
             sentence=sentence,
             grid_points=len(samples),
         )
-
-
-def _stopping(toolpath: Toolpath) -> Toolpath:
-    """The same path with a full stop at every joint."""
-    return dataclasses.replace(toolpath, joint=np.full(len(toolpath) + 1, Joint.STOP))

@@ -23,9 +23,7 @@ from planner.smoothing.banded import factorise, solve
 from planner.smoothing.basis import ORDER
 
 TO_BOUNDARY = 0.95  # of the way to the nearest bound that a step may go [-]
-# A short step is followed by one towards the middle, with up to so much of the gap [-]: 340 iterations in all for the relief of
-# 2000 moves without windows, 378 with 1, 718 with 0.
-CENTRING = 3.0
+CENTRING = 3.0  # a short step is followed by one towards the middle, with up to so much of the gap [-]; 0 takes twice the iterations
 STALLED = 1e-6  # a step shorter than this ends the search [-]
 
 

@@ -189,10 +189,11 @@ def relax_run(
                         for k in range(axes):
                             c[i, k] += (1.0 - AGAIN) * taper * (c0[i, k] - c[i, k])
                     for j in range(j0, j1):
-                        if ratio_site[j] > 1.0:
-                            used[j] *= TIGHTENED / ratio_site[j]
-                        here_now = site_distance(j, c, span, weights, target, direction, slide, e)
-                        used[j] = max(used[j], INSIDE * here_now)
+                        needs = INSIDE * site_distance(j, c, span, weights, target, direction, slide, e)
+                        if needs >= INSIDE * used[j]:  # pushed out by the taper
+                            used[j] = needs
+                        elif ratio_site[j] > 1.0:
+                            used[j] = max(TIGHTENED / ratio_site[j] * used[j], min(needs, used[j]))
                 part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
                 near, aim = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
                 for k in range(axes):

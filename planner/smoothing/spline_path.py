@@ -102,7 +102,7 @@ def cusp_joints(path: SmoothPath, shape: SplineShape) -> Array:
     spans = np.flatnonzero(lost & cusp_spans(laid))
     run = np.searchsorted(laid.span_first, spans, side="right") - 1
     begin, end = laid.breaks[spans + run], laid.breaks[spans + run + 1]
-    place = path.legs.place
+    place = path.legs.place[path.legs.first]
     first = np.searchsorted(place, begin - (end - begin), side="left")
     last = np.searchsorted(place, end + (end - begin), side="right") - 1
     # one at least, and inside the run

@@ -13,7 +13,8 @@ multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever 
 end it: its first part is kept as far as the stop cannot be felt, three ways to brake before it, and the next window starts from
 the state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
 
-**Fall-backs.** A window that does not converge from the envelope is tried from the plain one, then in smaller windows. Where
+**Fall-backs.** A window is tried from the envelope tracked by a motion, where that is found, then from the envelope itself, whose
+kinematics are not exact, then from the plain start, and then in smaller windows. Where
 even a small one fails the profile stops: at the end of the window before, if the motion comes from there, or after the plain start,
 which always keeps the limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
 
@@ -25,7 +26,7 @@ satisfies every row the profile is feasible, always. Its cost, lam - 1, is in th
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,16 +35,15 @@ from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate import jerk_kernel as kernel
 from planner.feedrate.jerk_rows import Grid, empty_model, linearise
-from planner.feedrate.jerk_start import envelope, plain_start
+from planner.feedrate.jerk_start import envelope, envelope_profile, plain_start
 from planner.feedrate.lagrangian import acceleration_limits, lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 START_ROOM = 0.9  # the first profile of a piece keeps every limit times this [-] ...
 SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
-TRACKING_ROUNDS = 20  # at most, of the first profile; 3 to 6 are the rule
+TRACKING_ROUNDS = 20  # at most, of the first profile; 2 to 6 are the rule
 POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
 POLISHED = 1e-14  # defect, share of the largest feed [-]
-TRACKED = 0.1  # a round that changes no x by more than this share has done it [-]
 GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
@@ -177,17 +177,16 @@ class _Scaled:
         slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
         return x / slower**2, u / slower**2, p / slower**2
 
-    def track(
-        self, asked: FloatArray, x: FloatArray, u: FloatArray, p: FloatArray, rounds: int, change_max: float
-    ) -> float:
-        """Move a profile, in place, towards the feed^2 asked for; returns the defect of its kinematics."""
+    def track(self, x: FloatArray, u: FloatArray, p: FloatArray) -> bool:
+        """Bring a profile near to itself onto exact kinematics, in place and smoothly; False where that is not found."""
         jerk = float(1.0 / self.per_jerk.max())
-        return float(kernel.track(self.grid, jerk, asked, x, u, p, 1.0, rounds, change_max, kernel.DEFECT))
+        defect = kernel.track(self.grid, jerk, x, u, p, 1.0, TRACKING_ROUNDS, kernel.DEFECT)
+        return bool(defect <= kernel.DEFECT)
 
     def polish(self, x: FloatArray, u: FloatArray, p: FloatArray) -> None:
         """Bring a profile onto exact kinematics, in place, as far as rounding allows."""
         jerk = float(1.0 / self.per_jerk.max())
-        kernel.track(self.grid, jerk, x.copy(), x, u, p, 0.0, POLISHING_ROUNDS, np.inf, POLISHED)
+        kernel.track(self.grid, jerk, x, u, p, 0.0, POLISHING_ROUNDS, POLISHED)
 
     def window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray, pi: FloatArray) -> _Window:
         """A profile in the problem's units, with the multipliers of its rows and dynamics."""
@@ -299,8 +298,7 @@ class _Profile:
     def _solve_window(self, begin: int, end: int) -> _Window | None:
         """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
         scaled = self._scaled(begin, end)
-        for start in (self._tracked, self._plain)[: 1 if self.x[begin] > 0.0 else 2]:
-            x, u, p = start(begin, end, scaled)
+        for x, u, p in self._starts(begin, end, scaled):
             done, gap, residual, defect, lam, pi = kernel.minimise(
                 scaled.grid,
                 scaled.per_jerk,
@@ -317,26 +315,38 @@ class _Profile:
                 return scaled.window(x, u, p, lam, pi)
         return None
 
-    def _tracked(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The envelope tracked by a motion from rest to rest, not much faster than the limits allow; after a window before, its way
-        ahead as long as that is faster."""
-        asked = envelope(self.problem, begin, end) / scaled.feed**2
-        plain_x, plain_u = plain_start(np.concatenate([[0.0], np.cumsum(scaled.grid.ds)]))
-        for change_max in (TRACKED, np.inf):  # what cannot be tracked closely is at least approached
-            x, u = plain_x * asked.max(), plain_u * asked.max()
-            p = np.diff(u)
-            if scaled.track(asked, x, u, p, TRACKING_ROUNDS, change_max) <= kernel.DEFECT:
-                break
-        x, u, p = scaled.slowed(x, u, p, SLOWER_MAX)
+    def _starts(
+        self, begin: int, end: int, scaled: _Scaled
+    ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+        """Profiles to start from, the best first."""
+        asked, rate = envelope_profile(envelope(self.problem, begin, end) / scaled.feed**2, scaled.grid.ds)
+        x, u = asked.copy(), rate.copy()
+        p = np.diff(u)
+        tracked = scaled.track(x, u, p)
         if self.x[begin] > 0.0:
-            assert self._rest is not None  # motion comes out of a window
-            ahead, rate = self._rest.x / scaled.feed**2, self._rest.u * scaled.time / scaled.feed
-            faster = np.flatnonzero(ahead > x[: len(ahead)])
-            x[faster], u[faster] = ahead[faster], rate[faster]
-            x[0], u[0] = ahead[0], rate[0]
-            p = np.diff(u)
-            scaled.track(x.copy(), x, u, p, TRACKING_ROUNDS, TRACKED)
-        return x, u, p
+            if not tracked:
+                x, u, p = asked.copy(), rate.copy(), np.diff(rate)
+            x, u, p = self._with_way_ahead(*scaled.slowed(x, u, p, SLOWER_MAX), scaled)
+            raw = x.copy(), u.copy(), p.copy()
+            if scaled.track(x, u, p):
+                yield x, u, p
+            yield raw
+            return
+        if tracked:
+            yield scaled.slowed(x, u, p, SLOWER_MAX)
+        yield scaled.slowed(asked, rate, np.diff(rate), SLOWER_MAX)
+        yield self._plain(begin, end, scaled)
+
+    def _with_way_ahead(
+        self, x: FloatArray, u: FloatArray, p: FloatArray, scaled: _Scaled
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A profile from rest put behind the window before: its way ahead, as long as that is faster."""
+        assert self._rest is not None  # motion comes out of a window
+        ahead, rate = self._rest.x / scaled.feed**2, self._rest.u * scaled.time / scaled.feed
+        faster = np.flatnonzero(ahead > x[: len(ahead)])
+        x[faster], u[faster] = ahead[faster], rate[faster]
+        x[0], u[0] = ahead[0], rate[0]
+        return x, u, np.diff(u)
 
     def _plain(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The plain start, slow enough for all limits."""

@@ -205,14 +205,14 @@ def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual):
 
 
 @njit(cache=True, error_model="numpy")
-def track(grid, jerk, asked, x, u, p, smoothing, rounds, change_max, defect_max):
-    """Move a motion x, u (N+1,), p (N,) towards the feed^2 asked for: Gauss-Newton on the time integral of (dx/x)^2 J + j^2/J,
-    with the jerk j of the result and a jerk J of the machine's size; without smoothing, j is the change of the jerk. Both ends stay.
-    Returns the defect that is left."""
-    n = len(p)
+def track(grid, jerk, x, u, p, smoothing, rounds, defect_max):
+    """Bring a motion x, u (N+1,), p (N,) onto exact kinematics and not far from its x: Gauss-Newton on the time integral of
+    (dx/x)^2 J + j^2/J, with the jerk j of the result and a jerk J of the machine's size; without smoothing, j is the change of the
+    jerk. Both ends stay. Returns the defect that is left."""
+    n, asked = len(p), x.copy()
     ds, lam, pi = grid.ds, np.zeros((n, 0)), np.zeros(n)
     model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 8)), np.zeros((n + 1, 3)), np.zeros(n)
-    worst, change = np.inf, 1e300  # a first round always
+    worst = np.inf
     for _ in range(rounds):
         worst = 0.0
         for i in range(n):
@@ -224,15 +224,12 @@ def track(grid, jerk, asked, x, u, p, smoothing, rounds, change_max, defect_max)
             weight = span / (asked[i] * asked[i]) if i > 0 else 0.0
             model.convex[i, 0], model.convex[i, 5] = weight, 1.0 / span
             model.gradient[i, 0], model.gradient[i, 2] = weight * (x[i] - asked[i]), smoothing * p[i] / span
-        if (worst <= defect_max and change <= change_max) or not riccati(model, 0.0, gains):
+        if worst <= defect_max or not riccati(model, 0.0, gains):
             break
         offsets(model, 0.0, gains)
         primal, _, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, dz, lam, lam, dpi)
         primal = within_domain(ds, x, p, dz, primal)
-        change = 0.0
         for i in range(n):
-            if i > 0:
-                change = max(change, abs(dz[i, 0]) / x[i])
             x[i] += primal * dz[i, 0]
             u[i] += primal * dz[i, 1]
             p[i] += primal * dz[i, 2]

@@ -52,6 +52,17 @@ def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
     return x
 
 
+def envelope_profile(x: FloatArray, ds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over n >= 4 intervals ds, in any units: central differences,
+    and constant jerk on the first and the last interval, with no more of it than the next interval can take back."""
+    x, u = x.copy(), np.zeros(len(x))
+    for at, after, first, second in ((1, 2, ds[0], ds[1]), (-2, -3, ds[-1], ds[-2])):
+        x[at] = min(x[at], x[after] * 1.5 * first / (1.5 * first + second))
+    u[1:-1] = (x[2:] - x[:-2]) / (2.0 * (ds[1:] + ds[:-1]))
+    u[1], u[-2] = x[1] / (1.5 * ds[0]), -x[-2] / (1.5 * ds[-1])
+    return x, u
+
+
 def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Feed^2 and acceleration (n + 1,) over the points s of a piece with n >= 4 intervals, in units with fastest speed 1."""
     n = len(s) - 1

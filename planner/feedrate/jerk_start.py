@@ -53,12 +53,15 @@ def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
 
 
 def envelope_profile(x: FloatArray, ds: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over n >= 4 intervals ds, in any units: central differences,
-    and constant jerk on the first and the last interval, with no more of it than the next interval can take back."""
+    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over n >= 4 intervals ds, in any units: harmonic means of
+    the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals grow), and constant
+    jerk on the first and the last interval, with no more of it than the next interval can take back."""
     x, u = x.copy(), np.zeros(len(x))
-    for at, after, first, second in ((1, 2, ds[0], ds[1]), (-2, -3, ds[-1], ds[-2])):
-        x[at] = min(x[at], x[after] * 1.5 * first / (1.5 * first + second))
-    u[1:-1] = (x[2:] - x[:-2]) / (2.0 * (ds[1:] + ds[:-1]))
+    for at, beside, first, second in ((1, 2, ds[0], ds[1]), (-2, -3, ds[-1], ds[-2])):
+        x[at] = min(x[at], x[beside] * 1.5 * first / (1.5 * first + second))
+    rate = np.diff(x) / (2.0 * ds)
+    before, after = rate[:-1], rate[1:]
+    u[1:-1] = np.divide(2.0 * before * after, before + after, out=u[1:-1], where=before * after > 0.0)
     u[1], u[-2] = x[1] / (1.5 * ds[0]), -x[-2] / (1.5 * ds[-1])
     return x, u
 

@@ -340,12 +340,11 @@ class _Profile:
     def _with_way_ahead(
         self, x: FloatArray, u: FloatArray, p: FloatArray, scaled: _Scaled
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """A profile from rest put behind the window before: its way ahead, as long as that is faster."""
+        """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
         assert self._rest is not None  # motion comes out of a window
         ahead, rate = self._rest.x / scaled.feed**2, self._rest.u * scaled.time / scaled.feed
-        faster = np.flatnonzero(ahead > x[: len(ahead)])
-        x[faster], u[faster] = ahead[faster], rate[faster]
-        x[0], u[0] = ahead[0], rate[0]
+        beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
+        x[:beyond], u[:beyond] = ahead[:beyond], rate[:beyond]
         return x, u, np.diff(u)
 
     def _plain(self, begin: int, end: int, scaled: _Scaled) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -212,8 +212,12 @@ def test_random_polylines_are_verified(seed):
     time_of(problems.polyline(random_polyline(rng, 12, axes=int(rng.integers(2, 4)), sharpest=179.0)))
 
 
-def test_a_cusp_is_found_at_the_joint_that_turns_there():
-    toolpath = toolpath_from_program(problems.zigzag(), MACHINE, None)
+@pytest.mark.parametrize("before", [1, 40])  # blocks on one straight leg
+def test_a_cusp_is_found_at_the_joint_that_turns_there(before):
+    step = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)])
+    corners = np.vstack([np.zeros(2), np.cumsum([step * [1, (-1) ** k] for k in range(50)], axis=0)])
+    straight = np.linspace([-5.0, 0.0], [0.0, 0.0], before + 1)[:-1]
+    toolpath = toolpath_from_program(problems.polyline(np.vstack([straight, corners])), MACHINE, None)
     path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     shape = spline_shape(path, MACHINE)
     assert not cusps(shape.laid).any()
@@ -226,7 +230,7 @@ def test_a_cusp_is_found_at_the_joint_that_turns_there():
     assert cusps(laid).all()
     lost = dataclasses.replace(shape, laid=laid._replace(fits=np.zeros(1, bool)))
     joints = cusp_joints(path, lost)
-    place = path.legs.place[np.searchsorted(path.legs.first, joints)]
+    place = path.legs.place[joints]
     begin, end = laid.breaks[span], laid.breaks[span + 1]
     near = np.abs(path.legs.place - (begin + end) / 2).min()
     assert len(joints)
@@ -264,3 +268,14 @@ def test_feed_changes_keep_their_place():
     slow = plan.trajectory.position[:, 0] > 9.8 + 0.1
     assert plan.trajectory.feed[slow].max() <= 10.0 * (1 + 1e-6)
     assert plan.trajectory.feed.max() > 50.0
+
+
+def test_feed_changes_on_a_straight_leg_keep_their_place():
+    """A spline may slide along a straight leg by many tolerances, but not past a change of the feed."""
+    program = parse_program("G21 G90\nG1 X1 Z-0.7 F300\nX1.3 Z-7 F150\nX1.6\nX4.3 F300\nX4.6 Z-6.9\nM2\n")
+    path, shape = splined(program)
+    change = np.flatnonzero(path.legs.offset > 0.0)
+    assert len(change) == 1
+    assert np.isclose(shape.guide.place, path.legs.place[change[0]]).any()
+    plan = AS_IT_IS.plan(program, MACHINE)
+    assert plan.verdict.passed, plan.verdict.faults

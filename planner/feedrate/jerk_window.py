@@ -1,0 +1,204 @@
+"""One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point kernel, to its result.
+
+A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the envelope tracked by a motion,
+where that is found, then from the envelope itself, whose kinematics are not exact, and from rest then from the plain start, which
+keeps all limits and is far from optimal (jerk_start.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate import jerk_kernel as kernel
+from planner.feedrate.jerk_rows import Grid, empty_model, linearise
+from planner.feedrate.jerk_start import envelope, envelope_profile, plain_start
+
+START_ROOM = 0.9  # a start keeps every limit times this [-] ...
+SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
+TRACKING_ROUNDS = 20  # at most, of a start; 2 to 6 are the rule
+POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
+POLISHED = 1e-14  # defect, share of the largest feed [-]
+GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
+RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
+DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
+JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Window:
+    """The profile of a window in the problem's units; rows (N, A, 4), feed (N, 2) and dynamics (N,) as in `Multipliers`."""
+
+    x: FloatArray
+    u: FloatArray
+    jerk: FloatArray
+    duration: FloatArray
+    rows: FloatArray
+    feed: FloatArray
+    dynamics: FloatArray
+
+    def after(self, point: int) -> Window:
+        """The part from a point on."""
+        own = slice(point, None)
+        return replace(
+            self,
+            x=self.x[own],
+            u=self.u[own],
+            jerk=self.jerk[own],
+            duration=self.duration[own],
+            rows=self.rows[own],
+            feed=self.feed[own],
+            dynamics=self.dynamics[own],
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScaledWindow:
+    """A window's problem in units of its own: fastest feed 1, largest acceleration 1; `asked` is its envelope (jerk_start.py)."""
+
+    grid: Grid
+    per_jerk: FloatArray
+    jumps: int
+    asked: FloatArray
+    feed: float
+    time: float
+
+    @classmethod
+    def of(cls, problem: FeedrateProblem, acceleration: FloatArray, begin: int, end: int) -> ScaledWindow:
+        """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
+        own = slice(begin, end + 1)
+        feed = float(np.sqrt(problem.feed_sq_max[own].max()))
+        t = float(feed / problem.acceleration.max())
+        length = feed * t
+        grid = Grid(
+            ds=np.diff(problem.s[own]) / length,
+            x_max=problem.feed_sq_max[own] / feed**2,
+            d1=problem.d1[own],
+            d2_left=problem.d2_left[own] * length,
+            d2_right=problem.d2_right[own] * length,
+            d3_left=problem.d3_left[own] * length**2,
+            d3_right=problem.d3_right[own] * length**2,
+            per_acceleration=feed / t / acceleration[own],
+        )
+        return cls(
+            grid=grid,
+            per_jerk=feed / (t * t) / problem.jerk,
+            jumps=_jumps(grid),
+            asked=envelope(problem, begin, end) / feed**2,
+            feed=feed,
+            time=t,
+        )
+
+    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int]:
+        """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
+        Also the iterations of the longest try."""
+        most = 0
+        for x, u, p in self._starts(behind):
+            done, gap, residual, defect, lam, pi = kernel.minimise(
+                self.grid, self.per_jerk, x, u, p, self.jumps, tol, iterations
+            )
+            most = max(most, done)
+            if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
+                kernel.track(self.grid, self._jerk, x, u, p, 0.0, POLISHING_ROUNDS, POLISHED)
+                return self._window(x, u, p, lam, pi), most
+        return None, most
+
+    def plain(self) -> Window:
+        """The plain start as a profile from rest: feasible, and slow."""
+        x, u, p = self._plain()
+        n = len(p)
+        return self._window(x, u, p, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+
+    def _starts(self, behind: Window | None) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+        """Profiles x, u (N+1,), p (N,) to start from, the best first."""
+        asked, rate = envelope_profile(self.asked, self.grid.ds)
+        raw = asked, rate, np.diff(rate)
+        tracked = self._tracked(*raw)
+        if behind is None:
+            if tracked is not None:
+                yield self._slowed(*tracked, SLOWER_MAX)
+            yield self._slowed(*raw, SLOWER_MAX)
+            yield self._plain()
+            return
+        joined = self._joined(behind, *self._slowed(*(tracked or raw), SLOWER_MAX))
+        tracked = self._tracked(*joined)
+        if tracked is not None:
+            yield tracked
+        yield joined
+
+    def _joined(
+        self, behind: Window, x: FloatArray, u: FloatArray, p: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
+        ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
+        beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
+        x, u = np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
+        return x, u, np.diff(u)
+
+    def _tracked(
+        self, x: FloatArray, u: FloatArray, p: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+        """A profile near to the given one with exact kinematics; None where that is not found."""
+        x, u, p = x.copy(), u.copy(), p.copy()
+        defect = kernel.track(self.grid, self._jerk, x, u, p, 1.0, TRACKING_ROUNDS, kernel.DEFECT)
+        return (x, u, p) if defect <= kernel.DEFECT else None
+
+    def _plain(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The plain start, slow enough for all limits."""
+        x, u = plain_start(np.concatenate([[0.0], np.cumsum(self.grid.ds)]))
+        return self._slowed(x, u, np.diff(u))
+
+    @property
+    def _jerk(self) -> float:
+        """Of the slowest axis."""
+        return float(1.0 / self.per_jerk.max())
+
+    @property
+    def _rows(self) -> int:
+        """Rows per interval."""
+        return (3 + self.jumps) * len(self.per_jerk) + 2
+
+    def _slowed(
+        self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
+        n, axes = len(p), len(self.per_jerk)
+        model, h = empty_model(n, self._rows), np.empty(n)
+        lam = np.zeros((n, 2 * self._rows - 2))
+        linearise(self.grid, self.per_jerk, x, u, p, h, lam, np.zeros(n), model, self.jumps)
+        worst = np.abs(model.values).max(axis=0)
+        jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
+        worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
+        slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
+        return x / slower**2, u / slower**2, p / slower**2
+
+    def _window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray, pi: FloatArray) -> Window:
+        """A profile in the problem's units, with the multipliers of its rows and dynamics."""
+        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
+        h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
+        feed, t, lower = self.feed, self.time, self._rows - 2
+        rows = np.zeros((len(p), len(self.per_jerk), 4))
+        rows[:, :, : 3 + self.jumps] = (lam[:, :lower] - lam[:, self._rows :]).reshape(
+            len(p), -1, 3 + self.jumps
+        )
+        of_feed = lam[:, lower : self._rows].copy()
+        of_feed[[0, -1], 1] = 0.0  # these limit the kinematics, not the feed
+        return Window(
+            x=x * feed**2,
+            u=u * feed / t,
+            jerk=p / h * feed / t**2,
+            duration=h * t,
+            rows=rows * t,
+            feed=of_feed * t,
+            dynamics=pi * t / feed**2,
+        )
+
+
+def _jumps(grid: Grid) -> int:
+    """1 if r'' jumps by more than rounding at an inner point."""
+    left, right = grid.d2_left[1:-1], grid.d2_right[1:-1]
+    return int((np.abs(left - right).max(axis=1) > JUMP_ROUNDING * np.abs(right).max(axis=1)).any())

@@ -162,3 +162,15 @@ def test_the_time_converges_with_the_grid():
     distance = np.abs(np.array(times[:-1]) - times[-1]) / times[-1]
     assert distance[0] < 2e-3
     assert distance[2] < 0.5 * distance[0]
+
+
+@pytest.mark.parametrize(("feed", "window"), [(0.01, 5000), (0.1, 5000), (0.1, 800), (1.0, 800)])
+def test_feeds_far_below_what_the_axes_can_do_converge(feed, window):
+    """At 0.1 mm/s the ramps are a nanometre of a path of millimetres."""
+    side = 2.0 * np.array([np.cos(np.pi / 12), np.sin(np.pi / 12)])
+    points = np.vstack([np.zeros(2), np.cumsum([side * [1, (-1) ** k] for k in range(12)], axis=0)])
+    problem = third_order(problems.polyline(points, feed=feed), problems.machine())
+    solution = JerkLimited(window=window).solve(problem)
+    assert solution.status is Status.OPTIMAL, solution.sentence
+    length = problem.s[-1] - problem.s[0]
+    assert length / feed <= solution.cycle_time <= length / feed * 1.001

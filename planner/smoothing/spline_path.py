@@ -10,6 +10,7 @@ from planner.arrays import Array, FloatArray
 from planner.corners.allocation import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
+from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.forms import third_derivative_forms
@@ -47,7 +48,9 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     """Splines inside the tolerance for all runs of a path with rounded corners. Raises InputError if the machine lacks an axis."""
     tolerance = path.toolpath.tolerance
     axes = path.toolpath.axes
-    reach = np.full(len(tolerance), np.linalg.norm(machine.limits("acceleration", axes)))
+    reach = np.full(
+        len(tolerance), np.linalg.norm(machine.limits("acceleration", axes)[_moving(path.toolpath)])
+    )
     tol = allocate(tolerance, reach, error_rate(machine))
     at = path.legs.first
     of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
@@ -120,6 +123,13 @@ def _polynomials(laid: Laid, q: int) -> tuple[FloatArray, FloatArray]:
     control = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
     of_span = control[np.arange(s1 - s0)[:, None] + np.arange(ORDER)]
     return cut, np.einsum("sbm,sbk->smk", span_basis(clamped(cut)), of_span)
+
+
+def _moving(toolpath: Toolpath) -> Array:
+    """(A,) True for axes that a toolpath moves somewhere: the others accelerate nowhere on its splines either."""
+    points = np.vstack([toolpath.start, toolpath.end])
+    arcs = np.vstack([toolpath.arcs.e1, toolpath.arcs.e2, toolpath.arcs.drift])
+    return np.asarray((np.ptp(points, axis=0) > 0.0) | (arcs != 0.0).any(axis=0))
 
 
 def _smallest(longest: FloatArray, runs: Runs) -> FloatArray:

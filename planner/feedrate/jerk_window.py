@@ -1,8 +1,8 @@
 """One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point kernel, to its result.
 
 A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the envelope tracked by a motion,
-where that is found, then from the envelope itself, whose kinematics are not exact, and from rest then from the plain start, which
-keeps all limits and is far from optimal (jerk_start.py).
+where that is found, then from the envelope itself, whose kinematics are not exact, and from rest then from the plain start
+(jerk_start.py): as fast as the envelope, and so slow that it keeps all limits.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still 
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
 JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
+
+_Profile = tuple[FloatArray, FloatArray, FloatArray]  # x, u (N+1,), p (N,) of jerk_rows.py
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,48 +111,47 @@ class ScaledWindow:
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""
-        x, u, p = self._plain()
+        x, u, p = self._slowed(*self._plain(1.0))
         n = len(p)
         return self._window(x, u, p, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
 
-    def _starts(self, behind: Window | None) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Profiles x, u (N+1,), p (N,) to start from, the best first."""
-        asked, rate = envelope_profile(self.asked, self.grid.ds)
-        raw = asked, rate, np.diff(rate)
-        tracked = self._tracked(*raw)
-        if behind is None:
-            if tracked is not None:
-                yield self._slowed(*tracked, SLOWER_MAX)
-            yield self._slowed(*raw, SLOWER_MAX)
-            yield self._plain()
-            return
-        joined = self._joined(behind, *self._slowed(*(tracked or raw), SLOWER_MAX))
-        tracked = self._tracked(*joined)
-        if tracked is not None:
-            yield tracked
-        yield joined
+    def _starts(self, behind: Window | None) -> Iterator[_Profile]:
+        """Profiles to start from, the best first."""
+        for start in self._from_rest():
+            if behind is None:
+                yield start
+            else:
+                joined = self._joined(behind, *start)
+                yield self._tracked(*joined) or joined
 
-    def _joined(
-        self, behind: Window, x: FloatArray, u: FloatArray, p: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _from_rest(self) -> Iterator[_Profile]:
+        """The same from rest."""
+        asked, rate = envelope_profile(self.asked, self.grid.ds)
+        near = asked, rate, np.diff(rate)
+        tracked = self._tracked(*near)
+        if tracked is not None:
+            yield self._slowed(*tracked, SLOWER_MAX)
+        yield self._slowed(*near, SLOWER_MAX)
+        yield self._slowed(*self._plain(asked.max()), SLOWER_MAX)
+        yield self._slowed(*self._plain(1.0))
+
+    def _joined(self, behind: Window, x: FloatArray, u: FloatArray, p: FloatArray) -> _Profile:
         """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
         ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
         beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
         x, u = np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
         return x, u, np.diff(u)
 
-    def _tracked(
-        self, x: FloatArray, u: FloatArray, p: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    def _tracked(self, x: FloatArray, u: FloatArray, p: FloatArray) -> _Profile | None:
         """A profile near to the given one with exact kinematics; None where that is not found."""
         x, u, p = x.copy(), u.copy(), p.copy()
         defect = kernel.track(self.grid, self._jerk, x, u, p, 1.0, TRACKING_ROUNDS, kernel.DEFECT)
         return (x, u, p) if defect <= kernel.DEFECT else None
 
-    def _plain(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The plain start, slow enough for all limits."""
+    def _plain(self, fastest: float) -> _Profile:
+        """The plain start with a largest feed^2, whatever its limits."""
         x, u = plain_start(np.concatenate([[0.0], np.cumsum(self.grid.ds)]))
-        return self._slowed(x, u, np.diff(u))
+        return fastest * x, fastest * u, fastest * np.diff(u)
 
     @property
     def _jerk(self) -> float:
@@ -162,9 +163,7 @@ class ScaledWindow:
         """Rows per interval."""
         return (3 + self.jumps) * len(self.per_jerk) + 2
 
-    def _slowed(
-        self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _slowed(self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf) -> _Profile:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
         n, axes = len(p), len(self.per_jerk)
         model, h = empty_model(n, self._rows), np.empty(n)

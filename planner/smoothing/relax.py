@@ -24,10 +24,13 @@ ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rul
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
 TUBE = 0.998  # of the tolerance that sites may use at first [-]
 TIGHTENED = 0.995  # a tightened site aims at this share of the tolerance [-]
-ROUNDS = 20  # of tightening, of the windows where it is needed; 2 are the rule
+ROUNDS = 20  # of tightening, in windows around the sites that need it; 2 are the rule
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 INSIDE = 1.002  # ... with tubes at least so much wider than it needs [-]
-WINDOW, OVERLAP = 240, 30  # control points relaxed at a time, and of them with the next window again
+WINDOW, OVERLAP = (
+    240,
+    30,
+)  # control points relaxed at a time, and of them again with the next window, or around a tightened site
 PARTS = 8  # into which a piece is cut if its bound is too large
 
 
@@ -159,70 +162,105 @@ def _first_site(span, value):
 
 
 @njit(cache=True, error_model="numpy")
+def _next_window(attempt, done, site, fixed_first, end, span, ratio_site):
+    """Control points lo, hi of the next window to relax, and the first site after those that it is for; lo = end if there is none.
+    At first windows of `WINDOW` after each other, the last of which ended at `done`; then around sites from `site` on whose bound is
+    too large."""
+    if attempt == 0:
+        lo = max(done - OVERLAP, fixed_first)
+        hi = min(lo + WINDOW, end)
+        if end - hi < OVERLAP:
+            hi = end
+        return (lo, hi, site) if done < end else (end, end, site)
+    lo = hi = end
+    for j in range(site, len(span)):
+        if ratio_site[j] <= 1.0:
+            continue
+        first, last = max(span[j] - OVERLAP, fixed_first), min(span[j] + ORDER + OVERLAP, end)
+        if lo == end:
+            lo = first
+        elif first > hi or last - lo > WINDOW:
+            return lo, hi, j
+        hi = last
+    return lo, hi, len(span)
+
+
+@njit(cache=True, error_model="numpy")
+def _tighten(lo, hi, j0, j1, c, c0, span, weights, target, direction, slide, used, ratio_site):
+    """Smaller tubes for the sites j0 .. j1 - 1 whose bound is too large, and the control points lo .. hi - 1 a little closer to the
+    path c0, which is well inside, so that they are inside again."""
+    axes = c.shape[1]
+    e = np.empty(axes)
+    for i in range(lo, hi):
+        taper = min(min(i - lo + 1, hi - i) / OVERLAP, 1.0)
+        for k in range(axes):
+            c[i, k] += (1.0 - AGAIN) * taper * (c0[i, k] - c[i, k])
+    for j in range(j0, j1):
+        needs = INSIDE * site_distance(j, c, span, weights, target, direction, slide, e)
+        if needs >= INSIDE * used[j]:  # pushed out by the taper
+            used[j] = needs
+        elif ratio_site[j] > 1.0:
+            used[j] = max(TIGHTENED / ratio_site[j] * used[j], min(needs, used[j]))
+
+
+@njit(cache=True, error_model="numpy")
+def _relax_window(
+    lo, hi, j0, j1, cut, basis, c, H, linear, span, weights, target, direction, slide, used, axis_weights, gap_last, relative,
+    multiplier,
+):  # fmt: skip
+    """Relax the control points lo .. hi - 1, in place, while the others stay; j0 .. j1 - 1 are the sites they move."""
+    n, axes = c.shape
+    a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
+    origin = c[a].copy()
+    part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
+    near, aim = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
+    for i in range(a, b):
+        free[i - a] = lo <= i < hi
+        for k in range(axes):
+            near[i - a, k] = c[i, k] - origin[k]
+            for d in range(ORDER):
+                part[k, i - a, d] = H[k, i, d]
+    here = np.empty(j1 - j0, np.int64)
+    for j in range(j0, j1):
+        here[j - j0] = span[j] - a
+        for k in range(axes):
+            aim[j - j0, k] = target[j, k] - origin[k]
+    energy = 0.0
+    if relative > 0.0:
+        energy = third_derivative_energy(cut, basis, axis_weights, c, a, min(hi, len(cut) - 1))
+    minimise(
+        part, linear[a:b], free, here, weights[j0:j1], aim, direction[j0:j1], slide[j0:j1], used[j0:j1], near, multiplier[j0:j1],
+        energy, energy + FIRST_GAP * gap_last, gap_last, relative, ITERATIONS,
+    )  # fmt: skip
+    for i in range(lo, hi):
+        for k in range(axes):
+            c[i, k] = near[i - a, k] + origin[k]
+
+
+@njit(cache=True, error_model="numpy")
 def relax_run(
     place, point, along, tol, tol_chord, cut, basis, c, c0, H, linear, fixed_first, fixed_last, span, weights, site_place, target,
     direction, slide, used, axis_weights, gap_last, relative, left, multiplier,
 ):  # fmt: skip
     """Relax one run, `c` (n, A) inside the tube of radii `used` (J,), window by window; returns whether the result has a certificate.
     `c0` is a path well inside the tube."""
-    n, axes = c.shape
-    sites, spans = len(span), len(cut) - 1
-    ratio_site, ratio_span = np.zeros(sites), np.empty(spans)
-    end = n - fixed_last
-    origin, e = np.empty(axes), np.empty(axes)
+    spans = len(cut) - 1
+    ratio_site, ratio_span = np.zeros(len(span)), np.empty(spans)
+    end = len(c) - fixed_last
     for attempt in range(ROUNDS):
-        lo = fixed_first
-        while lo < end:
-            hi = min(lo + WINDOW, end)
-            if end - hi < OVERLAP:
-                hi = end
-            a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
-            j0, j1 = _first_site(span, a), _first_site(span, min(hi, spans))
-            dirty = attempt == 0
-            for j in range(j0, j1):
-                if ratio_site[j] > 1.0:
-                    dirty = True
-            if dirty:
-                if attempt > 0:
-                    for i in range(lo, hi):
-                        taper = min(min(i - lo + 1, hi - i) / OVERLAP, 1.0)
-                        for k in range(axes):
-                            c[i, k] += (1.0 - AGAIN) * taper * (c0[i, k] - c[i, k])
-                    for j in range(j0, j1):
-                        needs = INSIDE * site_distance(j, c, span, weights, target, direction, slide, e)
-                        if needs >= INSIDE * used[j]:  # pushed out by the taper
-                            used[j] = needs
-                        elif ratio_site[j] > 1.0:
-                            used[j] = max(TIGHTENED / ratio_site[j] * used[j], min(needs, used[j]))
-                part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
-                near, aim = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
-                for k in range(axes):
-                    origin[k] = c[a, k]
-                for i in range(a, b):
-                    free[i - a] = lo <= i < hi
-                    for k in range(axes):
-                        near[i - a, k] = c[i, k] - origin[k]
-                        for d in range(ORDER):
-                            part[k, i - a, d] = H[k, i, d]
-                here = np.empty(j1 - j0, np.int64)
-                for j in range(j0, j1):
-                    here[j - j0] = span[j] - a
-                    for k in range(axes):
-                        aim[j - j0, k] = target[j, k] - origin[k]
-                energy = 0.0
-                if relative > 0.0:
-                    energy = third_derivative_energy(cut, basis, axis_weights, c, a, min(hi, spans))
-                minimise(
-                    part, linear[a:b], free, here, weights[j0:j1], aim, direction[j0:j1], slide[j0:j1], used[j0:j1], near,
-                    multiplier[j0:j1], energy,
-                    energy + FIRST_GAP * gap_last, gap_last, relative, ITERATIONS,
-                )  # fmt: skip
-                for i in range(lo, hi):
-                    for k in range(axes):
-                        c[i, k] = near[i - a, k] + origin[k]
-            if hi == end:
+        done, site = fixed_first, 0
+        while True:
+            lo, hi, site = _next_window(attempt, done, site, fixed_first, end, span, ratio_site)
+            if lo == end:
                 break
-            lo = hi - OVERLAP
+            j0, j1 = _first_site(span, max(lo - DEGREE, 0)), _first_site(span, min(hi, spans))
+            if attempt > 0:
+                _tighten(lo, hi, j0, j1, c, c0, span, weights, target, direction, slide, used, ratio_site)
+            _relax_window(
+                lo, hi, j0, j1, cut, basis, c, H, linear, span, weights, target, direction, slide, used, axis_weights, gap_last,
+                relative, multiplier,
+            )  # fmt: skip
+            done = hi
         certify(
             place, point, along, tol, tol_chord, cut, basis, c, span, site_place, ratio_site, ratio_span, left
         )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.allocation import allocate, error_rate
@@ -12,18 +13,18 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
+from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
 from planner.smoothing.forms import third_derivative_forms
 from planner.smoothing.guide import Guide, guide
 from planner.smoothing.lay import Laid, lay
 from planner.smoothing.relax import TUBE, relax
 from planner.smoothing.runs import Runs, find_runs, longest_span
 
-CUSP, CUSP_PLACES = (
-    1e-2,
-    17,
-)  # slowest advance of a curve per mm of the programmed path [-], looked for at so many places per span
-RELATIVE_GAP = 1e-2  # the integral of the squared third derivatives need not be smaller than this [-]
+CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
+CUSP_PLACES = 17  # ... looked for at so many places per span
+# The integral of the squared third derivatives need not be smaller than this [-]: relief, pockets and chips are planned to the same
+# time within 2e-4 with 0.001, in half the time of smoothing.
+RELATIVE_GAP = 0.1
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,17 +86,32 @@ def cusps(laid: Laid) -> Array:
 def cusp_spans(laid: Laid) -> Array:
     """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are
     looked at: no motion along it has a direction there."""
-    found = np.zeros(laid.span_first[-1], dtype=bool)
-    powers = np.arange(1, DEGREE + 1)
-    slopes = powers * np.linspace(0.0, 1.0, CUSP_PLACES)[:, None] ** (powers - 1)
-    for q in range(len(laid.fits)):
-        cut, coef = _polynomials(laid, q)
-        tangent = np.einsum("tm,smk->stk", slopes, coef[:, 1:]) / np.diff(cut)[:, None, None]
-        forward = np.einsum("stk,stk->st", tangent[:, 1:], tangent[:, :-1])
-        found[laid.span_first[q] : laid.span_first[q + 1]] = (
-            np.linalg.norm(tangent, axis=2).min(axis=1) < CUSP
-        ) | (forward.min(axis=1) <= 0.0)
+    found = np.zeros(laid.span_first[-1], dtype=np.bool_)
+    _find_cusps(laid.span_first, laid.breaks, laid.control, found)
     return found
+
+
+@njit(cache=True, error_model="numpy")
+def _find_cusps(span_first, breaks, control, found):
+    """What `cusp_spans` says into found (S,)."""
+    axes = control.shape[1]
+    rows, tangent, before = np.empty((4, ORDER)), np.empty(axes), np.empty(axes)
+    for q in range(len(span_first) - 1):
+        cut = breaks[span_first[q] + q : span_first[q + 1] + q + 1]
+        basis = span_basis(clamped(cut))
+        for i in range(len(cut) - 1):
+            at = span_first[q] + DEGREE * q + i
+            for place in range(CUSP_PLACES):
+                derivatives(basis[i], place / (CUSP_PLACES - 1.0), cut[i + 1] - cut[i], rows)
+                square, forward = 0.0, 0.0
+                for k in range(axes):
+                    before[k], tangent[k] = tangent[k], 0.0
+                    for d in range(ORDER):
+                        tangent[k] += rows[1, d] * control[at + d, k]
+                    square += tangent[k] * tangent[k]
+                    forward += tangent[k] * before[k]
+                if square < CUSP * CUSP or (place > 0 and forward <= 0.0):
+                    found[span_first[q] + i] = True
 
 
 def cusp_joints(path: SmoothPath, shape: SplineShape) -> Array:

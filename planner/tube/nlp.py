@@ -300,10 +300,6 @@ def _step_numbers(
     beside = np.minimum(course.room[:-1], course.room[1:])
     room_end[last] = np.minimum(course.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
     feed_end[last] = np.minimum(feed[last], feed[last + 1])
-    at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
-    pace = np.maximum(
-        at_nodes[:-1], at_nodes[1:]
-    )  # near rest the normal acceleration needs rows as small as the speed
     fastest = np.linalg.norm(course.velocity)  # instead of inf, where nothing else limits
     strongest = 2.0 * np.linalg.norm(course.acceleration)
     return np.column_stack(
@@ -322,13 +318,14 @@ def _step_numbers(
             np.minimum(feed_end, fastest) / speed,
             np.minimum(course.normal_max[leg], strongest) / acc,
             part / length,
-            pace / speed,
+            _pace(guess) / speed,
         ]
     )
 
 
 def _pace(guess: Guess) -> FloatArray:
-    """(N,) speed of each step [mm/s]; at most a thousand times below the fastest."""
+    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
+    to be as small as the speed."""
     at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
     pace: FloatArray = np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * at_nodes.max())
     return pace

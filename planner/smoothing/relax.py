@@ -3,11 +3,8 @@
 Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed is known yet;
 methods/reshape.py weights them by what the time-optimal motion pays for.
 
-**Certificate.** On a piece of a span between neighbouring sites and vertices the curve is a polynomial, which lies in the convex hull
-of its six Bezier points. If these are within r of the chord that the piece belongs to, so is the piece, since what is within r of a
-chord is convex. The largest such r, plus the chord's sagitta on arcs, bounds the deviation of the path from the curve and back;
-vertices lie on it because neighbouring pieces share their ends. Where the bound exceeds the tolerance, the sites around are
-tightened by as much and the run is relaxed again.
+A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are tightened by as much as the bound
+is too large, and relaxed again.
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
+from planner.smoothing.certificate import certify
 from planner.smoothing.forms import third_derivative_energy
 from planner.smoothing.interior import minimise, site_distance
 from planner.smoothing.lay import follow
@@ -27,125 +25,8 @@ TIGHTENED = 0.995  # a tightened site aims at this share of the tolerance [-]
 ROUNDS = 20  # of tightening, in windows around the sites that need it; 2 are the rule
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 INSIDE = 1.002  # ... with tubes at least so much wider than it needs [-]
-WINDOW, OVERLAP = (
-    240,
-    30,
-)  # control points relaxed at a time, and of them again with the next window, or around a tightened site
-PARTS = 8  # into which a piece is cut if its bound is too large
-
-
-@njit(cache=True, error_model="numpy")
-def _piece_error(basis, control, i, a, b, chord_start, along, length, bezier):
-    """Largest distance of the Bezier points of span i between tau = a and b from a chord."""
-    axes = control.shape[1]
-    step = b - a
-    for k in range(axes):
-        # power coefficients, shifted to a and scaled to the piece, then to Bernstein form
-        for m in range(ORDER):
-            value = 0.0
-            for d in range(ORDER):
-                value += basis[i, d, m] * control[i + d, k]
-            bezier[m, k] = value
-        for m in range(DEGREE):
-            for n in range(DEGREE - 1, m - 1, -1):
-                bezier[n, k] += a * bezier[n + 1, k]
-        scale = 1.0
-        for m in range(ORDER):
-            bezier[m, k] *= scale
-            scale *= step
-        # b_i = sum_m C(i, m)/C(5, m) a_m by repeated sums of a_m / C(5, m)
-        bezier[1, k] /= 5.0
-        bezier[2, k] /= 10.0
-        bezier[3, k] /= 10.0
-        bezier[4, k] /= 5.0
-        for m in range(DEGREE):
-            for n in range(DEGREE, m, -1):
-                bezier[n, k] += bezier[n - 1, k]
-    worst = 0.0
-    for m in range(ORDER):
-        dot = 0.0
-        for k in range(axes):
-            dot += (bezier[m, k] - chord_start[k]) * along[k]
-        dot = min(max(dot, 0.0), length)
-        square = 0.0
-        for k in range(axes):
-            square += (bezier[m, k] - chord_start[k] - dot * along[k]) ** 2
-        worst = max(worst, square)
-    return np.sqrt(worst)
-
-
-@njit(cache=True, error_model="numpy")
-def certify(
-    place,
-    point,
-    along,
-    tol,
-    tol_chord,
-    breaks,
-    basis,
-    control,
-    span,
-    weights_place,
-    ratio_site,
-    ratio_span,
-    left,
-):
-    """Bounds of the deviation over the tolerance: of each span into ratio_span (S,), and around each site into ratio_site (J,);
-    into left (S,) what the bound leaves of the tolerance [mm]. weights_place (J,) is the place of each site."""
-    bezier = np.empty((ORDER, control.shape[1]))
-    spans, sites = len(breaks) - 1, len(span)
-    for i in range(spans):
-        ratio_span[i], left[i] = 0.0, np.inf
-    for j in range(sites):
-        ratio_site[j] = 0.0
-    v, i, j = 0, 0, 0
-    u = breaks[0]
-    end = breaks[spans]
-    while u < end:
-        while v + 2 < len(place) and place[v + 1] <= u:
-            v += 1
-        while i + 1 < spans and breaks[i + 1] <= u:
-            i += 1
-        while j < sites and weights_place[j] <= u:
-            j += 1
-        following = min(breaks[i + 1], place[v + 1])
-        if j < sites:
-            following = min(following, weights_place[j])
-        if not following > u:  # the last piece, by rounding
-            break
-        h = breaks[i + 1] - breaks[i]
-        length = 0.0
-        for k in range(point.shape[1]):
-            length += (point[v + 1, k] - point[v, k]) * along[v, k]
-        tau, step = (u - breaks[i]) / h, (following - u) / h
-        error = _piece_error(basis, control, i, tau, tau + step, point[v], along[v], length, bezier)
-        if (
-            error > tol_chord[v]
-        ):  # the points of smaller pieces are nearer to the curve, by the square of their size
-            error = 0.0
-            for part in range(PARTS):
-                a, b = tau + step * part / PARTS, tau + step * (part + 1) / PARTS
-                error = max(error, _piece_error(basis, control, i, a, b, point[v], along[v], length, bezier))
-        ratio = error / tol_chord[v]
-        if following == place[v + 1]:
-            square = 0.0
-            for k in range(point.shape[1]):
-                value = -point[v + 1, k]
-                for d in range(ORDER):
-                    total = 0.0
-                    for m in range(DEGREE, -1, -1):
-                        total = total * (tau + step) + basis[i, d, m]
-                    value += total * control[i + d, k]
-                square += value * value
-            ratio = max(ratio, np.sqrt(square) / tol[v + 1])
-            error = max(error, np.sqrt(square) - (tol[v + 1] - tol_chord[v]))
-        ratio_span[i] = max(ratio_span[i], ratio)
-        left[i] = min(left[i], tol_chord[v] - error)
-        if j < sites:
-            ratio_site[j] = max(ratio_site[j], ratio)
-        if j > 0:
-            ratio_site[j - 1] = max(ratio_site[j - 1], ratio)
-        u = following
+WINDOW = 240  # control points relaxed at a time ...
+OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,6 +1,6 @@
 """Profiles to start the jerk-limited solver from.
 
-`envelope` is what the solver starts from, after a tracking controller (jerk_kernel.join) has turned it into a motion:
+`envelope` is what the solver starts from, turned into a motion where that is found (jerk_kernel.track):
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.

@@ -166,8 +166,8 @@ def _segment(samples: PathSamples, point: Array, parameter: FloatArray) -> Array
     span = samples.element[point] - len(samples.table.legs)
     at = np.flatnonzero(span >= 0)
     if len(at):
-        spans = samples.table.spans[span[at]]
-        place = spans["begin"] + spans["width"] * parameter[at]
+        spans, of = samples.table.spans, span[at]
+        place = spans["begin"][of] + spans["width"][of] * parameter[at]
         ends = samples.path.legs.place
         segment[at] = np.clip(np.searchsorted(ends, place, side="right") - 1, 0, len(ends) - 2)
     return segment

@@ -30,7 +30,7 @@ CUSP_ROUNDS = 4
 POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
 COMPARED_POINTS = 300_000
 # A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
-FINE_POINTS, FINER = 20_000, 0.25
+FINE_POINTS, FINER = 20_000, 0.1
 
 
 def on_spline(

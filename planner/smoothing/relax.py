@@ -20,8 +20,8 @@ from planner.smoothing.lay import follow
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
-TUBE = 0.998  # of the tolerance that sites may use at first [-]
-TIGHTENED = 0.995  # a tightened site aims at this share of the tolerance [-]
+TUBE = 0.9995  # of the tolerance that sites may use at first [-]
+TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]
 ROUNDS = 20  # of tightening, in windows around the sites that need it; 2 are the rule
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 INSIDE = 1.002  # ... with tubes at least so much wider than it needs [-]

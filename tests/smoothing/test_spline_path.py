@@ -19,6 +19,9 @@ from planner.geometry.toolpath import Joint
 from planner.methods.geometry import splined_with_stops
 from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program, read_program
+from planner.smoothing.interior import site_distance
+from planner.smoothing.lay import follow
+from planner.smoothing.relax import OVERLAP, _tighten
 from planner.smoothing.spline_path import cusp_joints, cusps, spline_shape, with_spline
 
 MACHINE = problems.machine()
@@ -279,3 +282,26 @@ def test_feed_changes_on_a_straight_leg_keep_their_place():
     assert np.isclose(shape.guide.place, path.legs.place[change[0]]).any()
     plan = AS_IT_IS.plan(program, MACHINE)
     assert plan.verdict.passed, plan.verdict.faults
+
+
+def test_tightening_leaves_every_site_inside_and_widens_no_tube():
+    _, shape = splined(problems.zigzag())
+    laid, chain = shape.laid, shape.guide
+    control, middle, used = laid.control.copy(), np.empty_like(laid.control), shape.used.copy()
+    follow(chain.place, chain.point, laid.breaks, middle)
+    ratio = np.ones(len(used))
+    ratio[len(used) // 2] = 1.01
+    sites = laid.span, laid.weights, laid.target, laid.along, laid.slide
+    around = laid.span[len(used) // 2]
+    first, last = np.searchsorted(laid.span, [around - OVERLAP, around + OVERLAP])
+    _tighten(
+        around - OVERLAP, around + OVERLAP + DEGREE + 1, first, last, control, middle, *sites, used, ratio
+    )
+    e = np.empty(control.shape[1])
+    distance = [
+        site_distance(j, control, laid.span, laid.weights, laid.target, laid.along, laid.slide, e)
+        for j in range(first, last)
+    ]
+    assert (distance < used[first:last]).all()
+    assert (used <= shape.used).all()
+    assert used[len(used) // 2] < 0.99 * shape.used[len(used) // 2]

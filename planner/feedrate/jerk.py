@@ -129,6 +129,10 @@ class _Profile:
         begin, size, divided = first, self.solver.window, False
         while begin < last:
             end = self._window_end(begin, size, last)
+            if (
+                self.x[begin] > 0.0 and self._rest is not None
+            ):  # no sooner than the stop that the way ahead knows
+                end = max(end, begin + len(self._rest.x) - 1)
             found = self._solve_window(begin, end)
             if found is None:
                 if end - begin > SMALLEST_WINDOW and self.x[begin] == 0.0:

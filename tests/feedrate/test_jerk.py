@@ -174,3 +174,11 @@ def test_feeds_far_below_what_the_axes_can_do_converge(feed, window):
     assert solution.status is Status.OPTIMAL, solution.sentence
     length = problem.s[-1] - problem.s[0]
     assert length / feed <= solution.cycle_time <= length / feed * 1.001
+
+
+@pytest.mark.parametrize("window", [90, 200, 450])
+def test_windows_shorter_than_the_way_to_brake_are_made_longer(window):
+    problem = third_order(problems.star_spiral(60), problems.machine())
+    whole = JerkLimited(window=100_000).solve(problem).require()
+    windows = JerkLimited(window=window).solve(problem).require()
+    assert whole.cycle_time * (1 - 1e-4) <= windows.cycle_time <= whole.cycle_time * 1.01

@@ -22,8 +22,7 @@ from planner.smoothing.runs import Runs, find_runs, longest_span
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span
-# The integral of the squared third derivatives need not be smaller than this [-]: relief, pockets and chips are planned to the same
-# time within 2e-4 with 0.001, in half the time of smoothing.
+# Gap of the first shape, share of its integral of squared third derivatives [-]: that is only a guess of what the motion wants.
 RELATIVE_GAP = 0.1
 
 

@@ -13,8 +13,8 @@ multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever 
 end it: its first part is kept as far as the stop cannot be felt, three ways to brake before it, and the next window starts from
 the state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
 
-**Fall-backs.** A window that does not converge from any of its starts is divided into smaller ones. Where even a small one fails the
-profile stops: at the end of the window before, if the motion comes from there, or after the plain start, which always keeps the
+**Fall-backs.** A window that does not converge from any of its starts gets another end, or is divided into smaller ones if it
+starts at rest. Where even that fails the profile stops: at the end of the window before, if the motion comes from there, or after the plain start, which always keeps the
 limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
 
 **Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece down by lam >= 1
@@ -36,7 +36,9 @@ from planner.feedrate.lagrangian import acceleration_limits, lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 BRAKING_WAYS = 3.0  # how far a window's stop must be from what is kept, in ways to brake [-]
-OVERLAP_SHARE = 0.8  # at most this share of a window is kept [-]
+KEPT_SHARE_MAX = 0.95  # at most this share of a window is kept [-]
+OTHER_ENDS = (2.0, 0.5)  # lengths tried in turn where a window that comes from motion does not converge [-]
+KEPT_SHARE_MIN = 0.5  # where less can be kept, the next window is twice as long [-]
 END_SHARE = 0.25  # a window ends where the grid is finest in this last part of it [-]: a stop needs points
 SMALLEST_WINDOW = 100  # intervals: a smaller window that does not converge is not divided any further
 DIVISION = 5  # into so many smaller windows one that does not converge is divided
@@ -55,7 +57,7 @@ class JerkLimited:
 
     tol: float = 1e-4
     iterations: int = 100
-    window: int = 5_000
+    window: int = 1_000
 
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
@@ -128,12 +130,7 @@ class _Profile:
         """Solve the points first..last in windows."""
         begin, size, divided = first, self.solver.window, False
         while begin < last:
-            end = self._window_end(begin, size, last)
-            if (
-                self.x[begin] > 0.0 and self._rest is not None
-            ):  # no sooner than the stop that the way ahead knows
-                end = max(end, begin + len(self._rest.x) - 1)
-            found = self._solve_window(begin, end)
+            end, found = self._solve_from(begin, size, last)
             if found is None:
                 if end - begin > SMALLEST_WINDOW and self.x[begin] == 0.0:
                     divided = True
@@ -149,8 +146,28 @@ class _Profile:
                     keep = end
                     self.stops.append(end)
                 self._keep(begin, keep, found)
+                little = keep - begin < KEPT_SHARE_MIN * (end - begin)
                 begin = keep
+                if little and not divided:
+                    size *= 2
+                    continue
             size, divided = self.solver.window, False
+
+    def _solve_from(self, begin: int, size: int, last: int) -> tuple[int, Window | None]:
+        """A window of about that size from `begin`: its last point and its profile, None if it does not converge, where it comes
+        from motion not with another end either."""
+        moving = self.x[begin] > 0.0
+        ends: list[int] = []
+        for share in (1.0, *OTHER_ENDS) if moving else (1.0,):
+            end = self._window_end(begin, int(share * size), last)
+            if moving and self._rest is not None:  # no sooner than the stop that the way ahead knows
+                end = max(end, begin + len(self._rest.x) - 1)
+            if end not in ends:
+                ends.append(end)
+                found = self._solve_window(begin, end)
+                if found is not None:
+                    return end, found
+        return ends[0], None
 
     def _window_end(self, begin: int, size: int, last: int) -> int:
         """The last point of a window: where the grid is finest near its end."""
@@ -187,7 +204,7 @@ class _Profile:
         a, j = problem.acceleration.min(), problem.jerk.min()
         brake = found.x / (2.0 * a) + np.sqrt(found.x) * a / (2.0 * j)
         free = np.flatnonzero(problem.s[end] - problem.s[begin : end + 1] >= BRAKING_WAYS * brake)
-        free = free[free <= OVERLAP_SHARE * (end - begin)]
+        free = free[free <= KEPT_SHARE_MAX * (end - begin)]
         return begin + int(free[-1]) if len(free) else begin
 
     def _keep(self, begin: int, end: int, found: Window) -> None:

@@ -4,6 +4,9 @@ Each row of jerk_rows.py has slacks s and multipliers lam. Eliminating their New
 Hessian; what remains is the linear-quadratic problem of jerk_riccati.py. The Hessian is that of the Lagrangian; where it is not
 convex, the curvature of rows and dynamics counts less, or not at all. Steps are predictor-corrector (Mehrotra 1992): the step
 without a barrier says how far the barrier may fall, and its second-order terms are made up for.
+
+The barrier counts by time: an interval's rows share mu times its duration h, as if the barrier were integrated along the motion. So a
+ramp of a nanometre beside millimetres at constant speed has no more than its part in it, and finer grids do not change the problem.
 """
 
 from __future__ import annotations
@@ -15,8 +18,8 @@ from planner.feedrate.jerk_riccati import offsets, riccati, slope
 from planner.feedrate.jerk_rows import empty_model, kinematics, linearise
 
 HESSIAN_MIN = 1e-12  # keeps the reduced Hessian positive where no row is near; far below any row's weight [-]
-SLACK_MIN = 1e-2  # of the first slacks [-]
-START_GAP = 0.1  # complementarity of the start, share of the time per row
+SLACK_MIN = 0.3  # of the first slacks [-]; smaller ones block the way of a start that violates other rows
+START_GAP = 0.3  # the first barrier: complementarity of every row per time [-]
 RESIDUAL = 1e-6  # of the rows at the end, share of the limits [-]
 DEFECT = 1e-9  # of the kinematics at the end, share of the largest feed [-]
 GAP_FLOOR = 0.1  # the barrier stays above this share of the gap asked for [-]
@@ -78,22 +81,23 @@ def weigh(model, slack, lam):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def correct(model, slack, mu, bending, dslack, dlam):
-    """Second half of a predictor-corrector step: add the barrier mu to the gradient, less the predicted steps' second-order terms
+def correct(model, h, slack, mu, bending, dslack, dlam):
+    """Second half of a predictor-corrector step: add the barrier mu h to the gradient, less the predicted steps' second-order terms
     dslack dlam, which replace dlam."""
     gradient, rows = model.gradient, model.rows
     n, _, count = rows.shape
     lower = slack.shape[1] - count
     pushes = np.empty(count)
     for i in range(n):
+        asked = mu * h[i]
         for r in range(count):
             bent = bending * dslack[i, r] * dlam[i, r]
             dlam[i, r] = bent
-            pushes[r] = (mu - bent) / slack[i, r]
+            pushes[r] = (asked - bent) / slack[i, r]
         for r in range(lower):
             bent = bending * dslack[i, count + r] * dlam[i, count + r]
             dlam[i, count + r] = bent
-            pushes[r] -= (mu - bent) / slack[i, count + r]
+            pushes[r] -= (asked - bent) / slack[i, count + r]
         gx, gu, gp = 0.0, 0.0, 0.0
         for r in range(count):
             gx += pushes[r] * rows[i, 0, r]
@@ -105,7 +109,7 @@ def correct(model, slack, mu, bending, dslack, dlam):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi):
+def direction(model, h, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi):
     """Newton step (dx, du, dp) in dz (N+1, 3), of slacks, multipliers and costates.
 
     dlam : (N, M) in, the second-order terms to make up for; out, the step
@@ -120,6 +124,7 @@ def direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
     mixed, mixed_dual, product, now = 0.0, 0.0, 0.0, 0.0
     dz[0, 0] = dz[0, 1] = 0.0
     for i in range(n):
+        asked = mu * h[i]
         dx, du = dz[i, 0], dz[i, 1]
         dp = gains[i, 0] * dx + gains[i, 1] * du + gains[i, 2]
         dz[i, 2] = dp
@@ -136,7 +141,7 @@ def direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
             s, y = slack[i, r], lam[i, r]
             move = 1.0 - after[r] - s
             share_s = move / s
-            push = (mu - dlam[i, r]) / s - y * (1.0 + share_s)
+            push = (asked - dlam[i, r]) / s - y * (1.0 + share_s)
             dslack[i, r], dlam[i, r] = move, push
             nearest, nearest_dual = min(nearest, share_s), min(nearest_dual, push / y)
             mixed, mixed_dual, product, now = (
@@ -149,7 +154,7 @@ def direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
             s, y = slack[i, count + r], lam[i, count + r]
             move = 1.0 + after[r] - s
             share_s = move / s
-            push = (mu - dlam[i, count + r]) / s - y * (1.0 + share_s)
+            push = (asked - dlam[i, count + r]) / s - y * (1.0 + share_s)
             dslack[i, count + r], dlam[i, count + r] = move, push
             nearest, nearest_dual = min(nearest, share_s), min(nearest_dual, push / y)
             mixed, mixed_dual, product, now = (
@@ -227,7 +232,7 @@ def track(grid, jerk, x, u, p, smoothing, rounds, defect_max):
         if worst <= defect_max or not riccati(model, 0.0, gains):
             break
         offsets(model, 0.0, gains)
-        primal, _, _ = direction(model, 0.0, gains, x, lam, lam, pi, 0.0, dz, lam, lam, dpi)
+        primal, _, _ = direction(model, ds, 0.0, gains, x, lam, lam, pi, 0.0, dz, lam, lam, dpi)
         primal = within_domain(ds, x, p, dz, primal)
         for i in range(n):
             x[i] += primal * dz[i, 0]
@@ -252,17 +257,16 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
     slack, lam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
     dslack, dlam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
     total, _ = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
-    pairs = slack.size
-    mu = START_GAP * total / n
+    mu = START_GAP
     for i in range(n):
         for r in range(count):
             slack[i, r] = max(1.0 - model.values[i, r], SLACK_MIN)
         for r in range(lower):
             slack[i, count + r] = max(1.0 + model.values[i, r], SLACK_MIN)
         for r in range(count + lower):
-            lam[i, r] = mu / slack[i, r]
+            lam[i, r] = mu * h[i] / slack[i, r]
     share, stalled = 1.0, 0
-    gap, hold, residual, defect, done = mu * pairs, 0.0, np.inf, np.inf, iterations
+    gap, hold, residual, defect, done = mu * total * (count + lower), 0.0, np.inf, np.inf, iterations
     for it in range(iterations):
         total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
         residual = weigh(model, slack, lam)
@@ -276,13 +280,13 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
             share = 0.25 * share if share > SHARE_MIN else 0.0
         offsets(model, share, gains)
         dlam[:] = 0.0
-        primal, dual, left = direction(model, share, gains, x, slack, lam, pi, 0.0, dz, dslack, dlam, dpi)
+        primal, dual, left = direction(model, h, share, gains, x, slack, lam, pi, 0.0, dz, dslack, dlam, dpi)
         sigma = hold if hold > 0.0 else min((left / gap) ** 3, SIGMA_MAX)
-        mu = max(sigma * gap, GAP_FLOOR * tol * total) / pairs
+        mu = max(sigma * gap / total, GAP_FLOOR * tol) / (count + lower)
         bending = 1.0 if min(primal, dual) > PREDICTED_MIN else 0.0
-        correct(model, slack, mu, bending, dslack, dlam)
+        correct(model, h, slack, mu, bending, dslack, dlam)
         offsets(model, share, gains)
-        primal, dual, _ = direction(model, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
+        primal, dual, _ = direction(model, h, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
         primal = within_domain(grid.ds, x, p, dz, primal)
         gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual)
         hold = 1.0 if change > CHANGE_MAX else 0.0

@@ -1,6 +1,7 @@
 """Plan and verify every program of a folder: does each end with a verdict or a reason, and what does it take?
 
-    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME ...] [--name RESULT] [--resume]
+    python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME ...] [--processes N]
+                                     [--name RESULT] [--resume]
 
 Every file is planned in a process of its own, so that peak memory is the file's and nothing can take the others down; with several
 corners once with each, and what the first of them gains over the others is in the table. `--resume` keeps what the result holds
@@ -14,7 +15,9 @@ import json
 import multiprocessing
 import resource
 import statistics
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +35,7 @@ def main() -> None:
     parser.add_argument("--corner", nargs="+", default=["auto", "bezier"])
     parser.add_argument("--name", default="jerk-nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
+    parser.add_argument("--processes", type=int, default=1, help="programs planned at the same time")
     parser.add_argument("--resume", action="store_true", help="keep the rows of an earlier run")
     options = parser.parse_args()
     files = [file for file in options.folder.iterdir() if file.suffix not in KEEP_OUT]
@@ -40,19 +44,28 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     if options.resume:
         rows = json.loads((RESULTS / f"{options.name}.json").read_text(encoding="utf-8"))["programs"]
-    there = {(row["program"], row["corner"]) for row in rows}
+    done = {(row["program"], row["corner"]) for row in rows}
     refused = {row["program"] for row in rows if row["outcome"] == "refused"}
-    for file in files:
+    place = {file.name: number for number, file in enumerate(files)}
+    writing = threading.Lock()
+
+    def plan_all(file: Path) -> None:
         for corner in options.corner:
-            if (file.name, corner) in there or file.name in refused:
+            if (file.name, corner) in done or file.name in refused:
                 continue
             row = _in_own_process(file, options.machine, options.method, corner)
-            rows.append(row)
-            print(file.name, json.dumps(row)[:200], flush=True)
-            data = {"method": options.method, "corners": options.corner, "programs": rows}
-            write_results(options.name, data, _table(rows, options.corner))  # a kill loses nothing
+            with writing:
+                rows.append(row)
+                rows.sort(key=lambda own: place.get(own["program"], len(place)))
+                print(file.name, json.dumps(row)[:200], flush=True)
+                data = {"method": options.method, "corners": options.corner, "programs": rows}
+                write_results(options.name, data, _table(rows, options.corner))  # a kill loses nothing
             if row["outcome"] == "refused":
                 break
+
+    with ThreadPoolExecutor(options.processes) as pool:
+        for finished in [pool.submit(plan_all, file) for file in files]:
+            finished.result()
 
 
 def _in_own_process(file: Path, machine: str, method: str, corner: str) -> dict[str, Any]:

@@ -14,8 +14,8 @@ end it: its first part is kept as far as the stop cannot be felt, three ways to 
 the state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
 
 **Fall-backs.** A window that does not converge from any of its starts gets another end, or is divided into smaller ones if it
-starts at rest. Where even that fails the profile stops: at the end of the window before, if the motion comes from there, or after the plain start, which always keeps the
-limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
+starts at rest. Where even that fails the profile stops: at the end of the window before, if the motion comes from there, or after
+the plain start, which always keeps the limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
 
 **Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece down by lam >= 1
 divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and keeps the kinematics exact; with the smallest lam that

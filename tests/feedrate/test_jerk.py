@@ -15,6 +15,7 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.jerk_window import ScaledWindow
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.rest_to_rest import rest_to_rest_times
 from planner.feedrate.solution import Status, constraint_ratios
@@ -164,7 +165,9 @@ def test_the_time_converges_with_the_grid():
     assert distance[2] < 0.5 * distance[0]
 
 
-@pytest.mark.parametrize(("feed", "window"), [(0.01, 5000), (0.1, 5000), (0.1, 800), (1.0, 800)])
+@pytest.mark.parametrize(
+    ("feed", "window"), [(0.01, 5000), (0.01, 1000), (0.1, 5000), (0.1, 800), (1.0, 800)]
+)
 def test_feeds_far_below_what_the_axes_can_do_converge(feed, window):
     """At 0.1 mm/s the ramps are a nanometre of a path of millimetres."""
     side = 2.0 * np.array([np.cos(np.pi / 12), np.sin(np.pi / 12)])
@@ -182,3 +185,39 @@ def test_windows_shorter_than_the_way_to_brake_are_made_longer(window):
     whole = JerkLimited(window=100_000).solve(problem).require()
     windows = JerkLimited(window=window).solve(problem).require()
     assert whole.cycle_time * (1 - 1e-4) <= windows.cycle_time <= whole.cycle_time * 1.01
+
+
+@pytest.mark.parametrize("failures", [1, 2])
+def test_a_window_behind_motion_that_fails_gets_another_end(monkeypatch, failures):
+    problem = third_order(problems.zigzag(), problems.machine())
+    whole = JerkLimited(window=100_000).solve(problem).require()
+    solve, failed = ScaledWindow.solve, []
+
+    def failing(window, behind, tol, iterations):
+        if behind is not None and len(failed) < failures:
+            failed.append(len(window.asked))
+            return None, 0
+        return solve(window, behind, tol, iterations)
+
+    monkeypatch.setattr(ScaledWindow, "solve", failing)
+    solution = JerkLimited(window=1000).solve(problem)
+    assert len(set(failed)) == failures  # another end every time
+    assert solution.status is Status.OPTIMAL
+    assert solution.cycle_time == pytest.approx(whole.cycle_time, rel=1e-4)
+
+
+def test_a_window_behind_motion_that_never_converges_ends_in_the_stop_before(monkeypatch):
+    problem = third_order(problems.zigzag(), problems.machine())
+    solve, rest = ScaledWindow.solve, []
+
+    def failing(window, behind, tol, iterations):
+        if behind is not None and len(rest) < 3:
+            rest.append(len(behind.x))
+            return None, 0
+        return solve(window, behind, tol, iterations)
+
+    monkeypatch.setattr(ScaledWindow, "solve", failing)
+    solution = JerkLimited(window=1000).solve(problem)
+    assert solution.status is Status.ACCEPTABLE
+    assert "except 1 full stops where the method did not converge" in solution.sentence
+    assert constraint_ratios(problem, solution)[0].max() <= 1.0 + 1e-6

@@ -103,7 +103,7 @@ def test_a_small_excess_of_the_verdict_is_made_good_and_a_large_one_left_to_be_s
         return verify(sample_motion(motion, MACHINE.dt), toolpath, MACHINE)
 
     runs = len(kept.samples.piece) - 1
-    near_limit = slower(kept, np.full(runs, 1.0 - 1e-3))
+    near_limit = slower(kept, np.full(runs, 1.0 - 1.6e-3))
     seen = verdict_of(near_limit)
     assert not seen.passed
     assert verdict_of(without_seen_excess(near_limit, seen, 0)).passed

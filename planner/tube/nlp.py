@@ -42,6 +42,7 @@ from planner.arrays import FloatArray
 from planner.feedrate.solution import Status
 from planner.tube.course import Course
 from planner.tube.guess import Guess
+from planner.tube.numbers import acceleration_along, step_numbers
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
 # iterations on single corners; without it, the pentagon does not converge in 500. 1e-2 costs 5e-4.
@@ -65,8 +66,6 @@ NOT_SLOWER = 1e-4
 FEASIBILITY = 1e-6
 # Complementarity at which the search may end [-]: the time is then good to 1e-4.
 COMPLEMENTARITY = 1e-4
-# The tolerance is narrowed by this share [-], so that rounding stays inside it.
-ROUNDING = 1e-4
 
 SOLVED = (Status.OPTIMAL, Status.ACCEPTABLE)
 OUTCOMES = {
@@ -226,7 +225,7 @@ class TubeNLP:
             *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace),
         )
         of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
-        data = ca.DM(_step_numbers(course, guess, part[:-1], length, speed, acc).T)
+        data = ca.DM(step_numbers(course, guess, part[:-1], length, speed, acc).T)
         constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
         row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
         row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
@@ -257,7 +256,7 @@ class TubeNLP:
                 np.diff(a0, axis=0) / h_guess[:, None],
                 h_guess,
                 guess.place[:, 1:3] / part[:-1, None],
-                np.tile(_along(guess)[:, None] / acc, (1, watched)),
+                np.tile(acceleration_along(guess)[:, None] / acc, (1, watched)),
             ]
         )
 
@@ -288,53 +287,6 @@ class TubeNLP:
             jerk=found[:, :axes] * jerk,
             place=nodes[:, -1] * part,
         )
-
-
-def _step_numbers(
-    course: Course, guess: Guess, part: FloatArray, length: float, speed: float, acc: float
-) -> FloatArray:
-    """(N, 4 A + 11) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
-    leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
-    room, feed = course.room[leg] * (1.0 - ROUNDING), course.feed[leg]
-    room_end, feed_end = room.copy(), feed.copy()
-    beside = np.minimum(course.room[:-1], course.room[1:])
-    room_end[last] = np.minimum(course.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
-    feed_end[last] = np.minimum(feed[last], feed[last + 1])
-    fastest = np.linalg.norm(course.velocity)  # instead of inf, where nothing else limits
-    strongest = 2.0 * np.linalg.norm(course.acceleration)
-    return np.column_stack(
-        [
-            course.base[leg] / length,
-            course.drift[leg],
-            course.e1[leg],
-            course.e2[leg],
-            course.offset[leg] / length,
-            course.radius[leg] / length,
-            course.rate[leg] * length,
-            room / length,
-            room_end / length,
-            np.minimum(course.step_max[leg], course.offset[-1]) / length,
-            np.minimum(feed, fastest) / speed,
-            np.minimum(feed_end, fastest) / speed,
-            np.minimum(course.normal_max[leg], strongest) / acc,
-            part / length,
-            _pace(guess) / speed,
-        ]
-    )
-
-
-def _pace(guess: Guess) -> FloatArray:
-    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
-    to be as small as the speed."""
-    at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
-    pace: FloatArray = np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * at_nodes.max())
-    return pace
-
-
-def _along(guess: Guess) -> FloatArray:
-    """(N,) pace times u = v.a/|v|^2 in the middle of each step [mm/s2]."""
-    v, a = (guess.state[:-1, k] / 2 + guess.state[1:, k] / 2 for k in (1, 2))
-    return _pace(guess) * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * _pace(guess)) ** 2)
 
 
 def _options(settings: TubeNLP) -> dict[str, Any]:

@@ -1,0 +1,59 @@
+"""What the free optimum (nlp.py) needs to know of its steps, in numbers: their legs and limits, and how fast they are about."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.tube.course import Course
+from planner.tube.guess import Guess
+
+# The tolerance is narrowed by this share [-], so that rounding stays inside it.
+ROUNDING = 1e-4
+
+
+def step_numbers(
+    course: Course, guess: Guess, part: FloatArray, length: float, speed: float, acc: float
+) -> FloatArray:
+    """(N, 4 A + 11) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
+    leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
+    room, feed = course.room[leg] * (1.0 - ROUNDING), course.feed[leg]
+    room_end, feed_end = room.copy(), feed.copy()
+    beside = np.minimum(course.room[:-1], course.room[1:])
+    room_end[last] = np.minimum(course.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
+    feed_end[last] = np.minimum(feed[last], feed[last + 1])
+    fastest = np.linalg.norm(course.velocity)  # instead of inf, where nothing else limits
+    strongest = 2.0 * np.linalg.norm(course.acceleration)
+    return np.column_stack(
+        [
+            course.base[leg] / length,
+            course.drift[leg],
+            course.e1[leg],
+            course.e2[leg],
+            course.offset[leg] / length,
+            course.radius[leg] / length,
+            course.rate[leg] * length,
+            room / length,
+            room_end / length,
+            np.minimum(course.step_max[leg], course.offset[-1]) / length,
+            np.minimum(feed, fastest) / speed,
+            np.minimum(feed_end, fastest) / speed,
+            np.minimum(course.normal_max[leg], strongest) / acc,
+            part / length,
+            _pace(guess) / speed,
+        ]
+    )
+
+
+def _pace(guess: Guess) -> FloatArray:
+    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
+    to be as small as the speed."""
+    at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
+    pace: FloatArray = np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * at_nodes.max())
+    return pace
+
+
+def acceleration_along(guess: Guess) -> FloatArray:
+    """(N,) pace times u = v.a/|v|^2 in the middle of each step [mm/s2]."""
+    v, a = (guess.state[:-1, k] / 2 + guess.state[1:, k] / 2 for k in (1, 2))
+    return _pace(guess) * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * _pace(guess)) ** 2)

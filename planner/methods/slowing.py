@@ -21,12 +21,16 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.reshape import OnPath
 from planner.time_law import TimeLaw, law_of_solution
-from planner.timing import Motion, in_chunks, inside_pieces
+from planner.timing import CHUNK, DENSE_EDGE, SHORTEST_PIECE, Motion, in_chunks
 from planner.verify import Verdict
 
-# Tightening pays while a run is slowed down by more than this [-] ...
-TIGHTENED_EXCESS = 1e-5
-# ... at most so often, and once for jobs of more grid points, where the time it takes counts: it leaves less than half of the excess.
+# Where a motion is looked at [share of each piece of its time law].
+WATCHED = np.array([DENSE_EDGE, 0.5, 1.0 - DENSE_EDGE])
+# The peak of a parabola through these counts by so much more of what it exceeds them by [-]: jerks are parabolas to about 10 %.
+PEAK_MORE = 1.2
+# Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
+# the time it takes counts, by more than the second, once: it leaves less than half of the excess.
+TIGHTENED_EXCESS = 1e-5, 1e-4
 TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
@@ -40,20 +44,42 @@ ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
-    middle and where it is fastest; <= 1 where it keeps them."""
+    middle, where it is fastest, and at the peaks of parabolas through these; <= 1 where it keeps them."""
     axes = toolpath.axes
     limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
     programmed[toolpath.block] = toolpath.feed
+    edges = np.append(motion.law.t, motion.law.end)
     factor = np.zeros(len(motion.law.t))
-    for chunk in in_chunks(motion, machine.dt, np.append(inside_pieces(motion), _fastest(motion.law))):
-        worst = chunk.feed / programmed[chunk.block]
-        motions = (chunk.velocity, chunk.acceleration, chunk.jerk)
+    pieces = np.flatnonzero(np.diff(edges) > SHORTEST_PIECE)
+    for first in range(0, len(pieces), CHUNK // len(WATCHED)):
+        own = pieces[first : first + CHUNK // len(WATCHED)]
+        times = edges[own, None] + (edges[own + 1] - edges[own])[:, None] * WATCHED
+        seen = motion.at(times.ravel(), machine.dt)
+        worst = (seen.feed / programmed[seen.block]).reshape(times.shape).max(axis=1)
+        motions = (seen.velocity, seen.acceleration, seen.jerk)
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
-            worst = np.maximum(worst, (np.abs(values) / limit).max(axis=1) ** (1.0 / order))
+            peak = _peaks((values / limit).reshape(*times.shape, -1)).max(axis=1)
+            worst = np.maximum(worst, peak ** (1.0 / order))
+        factor[own] = worst
+    fastest = _fastest(motion.law)
+    for chunk in in_chunks(motion, machine.dt, fastest):
+        worst = np.maximum(
+            chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
+        )
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor
+
+
+def _peaks(y: FloatArray) -> FloatArray:
+    """(n, A) largest |y| of values (n, 3, A) at the shares `WATCHED` of each piece, and of the parabolas through them in between."""
+    slope = (y[:, 2] - y[:, 0]) / (WATCHED[2] - WATCHED[0])
+    bend = (y[:, 2] - 2.0 * y[:, 1] + y[:, 0]) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+    inside = np.abs(slope) < np.abs(bend)  # the peak is less than half of the piece from its middle
+    peak = y[:, 1] - np.divide(slope**2, 4.0 * bend, out=np.zeros_like(bend), where=inside)
+    seen = np.abs(y).max(axis=1)
+    return np.where(np.abs(peak) > seen, seen + PEAK_MORE * (np.abs(peak) - seen), seen)
 
 
 def _fastest(law: TimeLaw) -> FloatArray:
@@ -94,8 +120,9 @@ def within_limits(
     factor = excess(motion, toolpath, machine)
     best = planned, slowed(motion, toolpath, machine, factor)
     room = np.ones(len(planned.problem))
-    for _ in range(TIGHTENING_ROUNDS if len(room) <= TIGHTENED_POINTS else 1):
-        if factor.max() <= 1.0 + TIGHTENED_EXCESS:
+    large = len(room) > TIGHTENED_POINTS
+    for _ in range(1 if large else TIGHTENING_ROUNDS):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS[large]:
             break
         room *= np.maximum(factor, 1.0)
         problem = tightened(planned.problem, room)

@@ -109,3 +109,22 @@ def test_a_small_excess_of_the_verdict_is_made_good_and_a_large_one_left_to_be_s
     assert verdict_of(without_seen_excess(near_limit, seen, 0)).passed
     assert without_seen_excess(near_limit, verdict_of(slower(kept, np.full(runs, 0.9))), 0) is None
     assert without_seen_excess(kept, verdict_of(kept), 0) is None
+
+
+def test_peaks_between_the_places_looked_at_are_seen():
+    toolpath = toolpath_from_program(problems.star_spiral(40), MACHINE, None)
+    path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    samples = sample_path(path, MACHINE, third_order=True)
+    problem = feedrate_problem(samples, MACHINE)
+    motion = Motion(samples=samples, law=law_of_solution(samples, SOLVE(problem)))
+    edges = np.append(motion.t, motion.end)
+    pieces = np.flatnonzero(np.diff(edges) > 1e-6)
+    shares = np.linspace(0.05, 0.95, 41)
+    times = edges[pieces, None] + np.diff(edges)[pieces, None] * shares
+    jerk = np.abs(motion.at(times.ravel(), MACHINE.dt).jerk) / MACHINE.limits("jerk", toolpath.axes)
+    jerk = jerk.reshape(*times.shape, -1).max(axis=2)
+    unseen = jerk.max(axis=1) - jerk[:, [0, 20, 40]].max(axis=1)
+    missed = jerk.max(axis=1) - excess(motion, toolpath, MACHINE)[pieces] ** 3
+    near = jerk.max(axis=1) > 1.0 - 1e-4
+    assert unseen[near].max() > 1e-4  # else this test shows nothing
+    assert missed[near].max() < 0.1 * unseen[near].max()

@@ -9,9 +9,12 @@ One window's problem is in jerk_window.py, its second-order model in jerk_rows.p
 the Lagrangian at the current profile, minimises the barrier problem's linear-quadratic model exactly and goes as far as slacks,
 multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever the size.
 
-**Windows.** A long piece is solved in windows of about `window` intervals. Each window ends in a full stop, which is only a way to
-end it: its first part is kept as far as the stop cannot be felt, three ways to brake before it, and the next window starts from
-the state reached there. What is kept agrees with the one-piece solution (tested). Memory is that of one window.
+**Windows.** A long piece is solved in windows of about `window` intervals, or more where the way to brake is long beside that. Each
+window ends in a full stop, which is only a way to end it: its first part is kept as far as the stop cannot be felt, three ways to
+brake before it, and the next window starts from the state reached there. It starts where more speed would help, by the costate of
+the kinematics, not where the motion brakes into a bend with all its jerk: a state that can hardly be continued leaves a problem
+without room, and multipliers that mean nothing. What is kept agrees with the one-piece solution (tested). Memory is that of one
+window.
 
 **Fall-backs.** A window that does not converge from any of its starts gets another end, or is divided into smaller ones if it
 starts at rest. Where even that fails the profile stops: at the end of the window before, if the motion comes from there, or after
@@ -37,8 +40,11 @@ from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Sta
 
 BRAKING_WAYS = 3.0  # how far a window's stop must be from what is kept, in ways to brake [-]
 KEPT_SHARE_MAX = 0.95  # at most this share of a window is kept [-]
+JOIN_SHARE = 0.85  # ... and at least this share of what can be
+KEPT_SHARE_MIN = 0.5  # where less of a window can be kept, windows become twice as large, ...
+LARGEST = 32  # ... up to so many times the usual one, ...
+KEPT_SHARE_HIGH = 0.8  # ... and where more is, half as large again, down to the usual one
 OTHER_ENDS = (2.0, 0.5)  # lengths tried in turn where a window that comes from motion does not converge [-]
-KEPT_SHARE_MIN = 0.5  # where less can be kept, the next window is twice as long [-]
 END_SHARE = 0.25  # a window ends where the grid is finest in this last part of it [-]: a stop needs points
 SMALLEST_WINDOW = 100  # intervals: a smaller window that does not converge is not divided any further
 DIVISION = 5  # into so many smaller windows one that does not converge is divided
@@ -133,25 +139,27 @@ class _Profile:
             end, found = self._solve_from(begin, size, last)
             if found is None:
                 if end - begin > SMALLEST_WINDOW and self.x[begin] == 0.0:
-                    divided = True
-                    size = max((end - begin) // DIVISION, SMALLEST_WINDOW)
-                    continue
-                begin = self._stop(begin, end)
-            else:
-                keep = end if end == last else self._unfelt(begin, end, found)
-                if keep <= begin:  # the window is shorter than the way to brake
-                    if not divided:
-                        size *= 2
-                        continue
-                    keep = end
-                    self.stops.append(end)
-                self._keep(begin, keep, found)
-                little = keep - begin < KEPT_SHARE_MIN * (end - begin)
-                begin = keep
-                if little and not divided:
-                    size *= 2
-                    continue
-            size, divided = self.solver.window, False
+                    size, divided = max((end - begin) // DIVISION, SMALLEST_WINDOW), True
+                else:
+                    begin = self._stop(begin, end)
+                    size, divided = self.solver.window, False
+                continue
+            keep = end if end == last else self._unfelt(begin, end, found)
+            share = (keep - begin) / (end - begin)
+            if not divided and (
+                share == 0.0 or (share < KEPT_SHARE_MIN and size < LARGEST * self.solver.window)
+            ):
+                size *= 2  # beside this window the way to brake is long
+                continue
+            if keep == begin:
+                keep = end
+                self.stops.append(end)
+            self._keep(begin, keep, found)
+            begin = keep
+            if divided:
+                size, divided = self.solver.window, False
+            elif share > KEPT_SHARE_HIGH and size > self.solver.window:
+                size //= 2
 
     def _solve_from(self, begin: int, size: int, last: int) -> tuple[int, Window | None]:
         """A window of about that size from `begin`: its last point and its profile, None if it does not converge, where it comes
@@ -199,13 +207,21 @@ class _Profile:
         return found
 
     def _unfelt(self, begin: int, end: int, found: Window) -> int:
-        """Last point of a window from which its end is far beyond the way to brake."""
+        """Where to go on from: a point from which the window's end is far beyond the way to brake, one of the last such points.
+
+        Of these the one where more speed would help most (costate times feed^2). Where less would help, while the motion brakes into a
+        bend with all its jerk, its state is at the edge of what can still be continued: a problem that starts there has hardly any
+        room, and its multipliers say nothing.
+        """
         problem = self.problem
         a, j = problem.acceleration.min(), problem.jerk.min()
         brake = found.x / (2.0 * a) + np.sqrt(found.x) * a / (2.0 * j)
         free = np.flatnonzero(problem.s[end] - problem.s[begin : end + 1] >= BRAKING_WAYS * brake)
         free = free[free <= KEPT_SHARE_MAX * (end - begin)]
-        return begin + int(free[-1]) if len(free) else begin
+        if not len(free):
+            return begin
+        last = free[free >= JOIN_SHARE * free[-1]]
+        return begin + int(last[np.argmin(found.dynamics[last] * found.x[last])])
 
     def _keep(self, begin: int, end: int, found: Window) -> None:
         """Take over the intervals begin..end of a window and the state at `end`."""

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import Array, FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Toolpath
@@ -26,7 +26,7 @@ from planner.verify import Verdict
 
 # Where a motion is looked at [share of each piece of its time law].
 WATCHED = np.array([DENSE_EDGE, 0.5, 1.0 - DENSE_EDGE])
-# The peak of a parabola through these counts by so much more of what it exceeds them by [-]: jerks are parabolas to about 10 %.
+# The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
 # the time it takes counts, by more than the second, once: it leaves less than half of the excess.
@@ -44,7 +44,8 @@ ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
-    middle, where it is fastest, and at the peaks of parabolas through these; <= 1 where it keeps them."""
+    middle, where it is fastest and, if it lies on one grid interval, at the peaks of parabolas through these; <= 1 where it keeps
+    them."""
     axes = toolpath.axes
     limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
@@ -52,6 +53,7 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     edges = np.append(motion.law.t, motion.law.end)
     factor = np.zeros(len(motion.law.t))
     pieces = np.flatnonzero(np.diff(edges) > SHORTEST_PIECE)
+    smooth = _on_one_interval(motion)
     for first in range(0, len(pieces), CHUNK // len(WATCHED)):
         own = pieces[first : first + CHUNK // len(WATCHED)]
         times = edges[own, None] + (edges[own + 1] - edges[own])[:, None] * WATCHED
@@ -59,8 +61,8 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         worst = (seen.feed / programmed[seen.block]).reshape(times.shape).max(axis=1)
         motions = (seen.velocity, seen.acceleration, seen.jerk)
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
-            peak = _peaks((values / limit).reshape(*times.shape, -1)).max(axis=1)
-            worst = np.maximum(worst, peak ** (1.0 / order))
+            most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
+            worst = np.maximum(worst, most ** (1.0 / order))
         factor[own] = worst
     fastest = _fastest(motion.law)
     for chunk in in_chunks(motion, machine.dt, fastest):
@@ -72,14 +74,25 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     return factor
 
 
-def _peaks(y: FloatArray) -> FloatArray:
-    """(n, A) largest |y| of values (n, 3, A) at the shares `WATCHED` of each piece, and of the parabolas through them in between."""
+def _on_one_interval(motion: Motion) -> Array:
+    """(L,) True for pieces of the law on one interval of the grid, where the path's derivatives do not jump."""
+    s, grid = motion.law.s, motion.samples.s
+    interval = np.searchsorted(grid, s, side="right") - 1
+    beyond = np.append(s[1:], s[-1])
+    return np.asarray(beyond <= grid[np.minimum(interval + 1, len(grid) - 1)])
+
+
+def _most(y: FloatArray, smooth: Array) -> FloatArray:
+    """(n, A) largest |y| of values (n, 3, A) at the shares `WATCHED` of pieces, on smooth ones of the parabolas through them too."""
+    seen = np.abs(y).max(axis=1)
     slope = (y[:, 2] - y[:, 0]) / (WATCHED[2] - WATCHED[0])
     bend = (y[:, 2] - 2.0 * y[:, 1] + y[:, 0]) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
-    inside = np.abs(slope) < np.abs(bend)  # the peak is less than half of the piece from its middle
-    peak = y[:, 1] - np.divide(slope**2, 4.0 * bend, out=np.zeros_like(bend), where=inside)
-    seen = np.abs(y).max(axis=1)
-    return np.where(np.abs(peak) > seen, seen + PEAK_MORE * (np.abs(peak) - seen), seen)
+    inside = smooth[:, None] & (
+        np.abs(slope) < np.abs(bend)
+    )  # the peak is less than half of the piece from its middle
+    peak = np.abs(y[:, 1] - np.divide(slope**2, 4.0 * bend, out=np.zeros_like(bend), where=inside))
+    known = np.maximum(seen, 1.0)
+    return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
 
 
 def _fastest(law: TimeLaw) -> FloatArray:

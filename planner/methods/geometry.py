@@ -2,7 +2,7 @@
 
 "spline" puts splines in the place of all runs of corners that they fit (smoothing/) and reshapes them (methods/reshape.py). "auto"
 plans the rounded corners too, wherever they could be faster as far as their time without jerk limits tells, and keeps them between
-the full stops where they are; beyond `COMPARED_POINTS`, where two plans at a time would take too much memory, it is "spline".
+the full stops where they are; beyond `COMPARED_POINTS`, where that takes minutes and twice the memory, it is "spline".
 
 A run on which the spline has a cusp, where the path turns back within the tolerance, would keep its single corners as a whole: the
 motion stops there instead, and the run is two.
@@ -33,7 +33,7 @@ SPLINE, AUTO = "spline", "auto"
 # Stops at cusps change the runs around them, which may then have others; so often at most.
 CUSP_ROUNDS = 4
 POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
-COMPARED_POINTS = 2_000_000
+COMPARED_POINTS = 1_000_000
 # On a grid of so many times the usual resolution the second-order time on corners is up to 9 % too long (chords of 0.1 mm), never more
 # than a few thousandths too short: this share of it is less than what corners take.
 COARSER, COARSE_SHARE = 100.0, 0.9

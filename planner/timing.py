@@ -33,8 +33,8 @@ LENGTH_ROUNDING = 1e-13
 REFINE_STEPS = 12
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
 CUBE_ROOT_ROUNDING = 4e-5
-# Distance of the outer samples of a piece of the law from its ends [share of the piece].
-DENSE_EDGE = 0.05
+# Where a piece of the law is looked at [share of the piece].
+WATCHED = np.array([0.05, 0.5, 0.95])
 # Pieces shorter than this get no samples of their own [s]: the rounding of times puts them into their neighbours, and what happens
 # there moves nothing (2e5 mm/s3 for 1e-9 s are 1e-13 mm/s).
 SHORTEST_PIECE = 1e-9
@@ -92,16 +92,17 @@ def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
 def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
     """The motion between its samples at dt [s]: half-way between them and inside every piece, in chunks."""
     halves = np.arange(0.5 * dt, motion.end, dt)
-    return in_chunks(motion, dt, np.concatenate([[0.0], inside_pieces(motion), halves, [motion.end]]))
+    return in_chunks(
+        motion, dt, np.concatenate([[0.0], inside_pieces(motion)[1].ravel(), halves, [motion.end]])
+    )
 
 
-def inside_pieces(motion: MotionInTime) -> FloatArray:
-    """Times near both ends and in the middle of every piece [s]: all speeds, accelerations and jerks are smooth and nearly linear
-    there, so that their extremes show; but for the speed along the path, which has a peak of its own where its acceleration is 0."""
+def inside_pieces(motion: MotionInTime) -> tuple[Array, FloatArray]:
+    """Pieces (n,) that last, and times (n, 3) near both ends and in the middle of each [s], at its shares `WATCHED`: all speeds,
+    accelerations and jerks are smooth there, and peaks in between close to those of parabolas."""
     edges = np.append(motion.t, motion.end)
-    lasting = np.diff(edges) > SHORTEST_PIECE
-    begin, end = edges[:-1][lasting], edges[1:][lasting]
-    return np.concatenate([near * begin + (1.0 - near) * end for near in (1.0 - DENSE_EDGE, 0.5, DENSE_EDGE)])
+    pieces = np.flatnonzero(np.diff(edges) > SHORTEST_PIECE)
+    return pieces, edges[pieces, None] * (1.0 - WATCHED) + edges[pieces + 1, None] * WATCHED
 
 
 def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Trajectory]:

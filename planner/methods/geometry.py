@@ -16,16 +16,14 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.smooth import SmoothPath, round_corners
-from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.methods.reshape import OnPath, PlanOn, reshaped
+from planner.methods.second_order import second_order
 from planner.methods.stages import Stages
-from planner.path import RESOLUTION, PathSamples, sample_path
+from planner.path import RESOLUTION, sample_path
 from planner.smoothing.spline_path import SplineShape, cusp_joints, spline_shape, with_spline
 
 SPLINE, AUTO = "spline", "auto"
@@ -34,8 +32,8 @@ SPLINE, AUTO = "spline", "auto"
 CUSP_ROUNDS = 4
 POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
 COMPARED_POINTS = 1_000_000
-# On a grid of so many times the usual resolution the second-order time on corners is up to 9 % too long (chords of 0.1 mm), never more
-# than a few thousandths too short: this share of it is less than what corners take.
+# On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on chords of 0.1 mm): this
+# share of it is less than what corners take (tested).
 COARSER, COARSE_SHARE = 100.0, 0.9
 # A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
 FINE_POINTS, FINER = 20_000, 0.1
@@ -72,8 +70,9 @@ def on_spline(
     if auto and POINTS_PER_SPAN * len(shape.left) <= COMPARED_POINTS:
         with stages.stage("solve"):
             least = _least_times(rounded, machine)
+            least_given = least if rounded is given else _least_times(given, machine)
         shape, best = _with_corners(rounded, shape, best, usual, least)
-        if rounded is not given and _least_times(given, machine).sum() < best.solution.cycle_time:
+        if rounded is not given and least_given.sum() < best.solution.cycle_time:
             without = usual(given)
             if without.solution.solved and without.solution.cycle_time < best.solution.cycle_time:
                 return without
@@ -107,7 +106,9 @@ def _with_corners(
         corners = plan_on(rounded)
         return shape, corners if corners.solution.solved else best
     piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
-    on_corners = least < _piece_times(best)
+    on_corners = np.zeros(len(least), dtype=bool)
+    on_corners[piece[shape.laid.fits]] = True  # elsewhere there is nothing to choose
+    on_corners &= least < _piece_times(best)
     for _ in range(2):  # the second time on those that turned out to be faster
         fits = shape.laid.fits & ~on_corners[piece]
         if (fits == shape.laid.fits).all():
@@ -126,18 +127,15 @@ def _with_corners(
 
 
 def _least_times(path: SmoothPath, machine: Machine) -> FloatArray:
-    """(G,) time between full stops that a motion on corners takes at least, about [s]: without jerk limits, on a coarse grid."""
+    """(G,) time between full stops that a motion on a path's corners takes at least [s]: without jerk limits, on a coarse grid.
+    None at all where that has no solution: then the corners are planned to see."""
     samples = sample_path(path, machine, COARSER * RESOLUTION)
-    problem = feedrate_problem(samples, machine)
-    samples = add_switching_points(samples, problem, Reachability().solve(problem), machine)
-    solution = Reachability().solve(feedrate_problem(samples, machine))
-    return COARSE_SHARE * _times(samples, solution)
+    planned = second_order(path, samples, machine, Reachability())
+    if not planned.solution.solved:
+        return np.zeros(len(samples.piece) - 1)
+    return COARSE_SHARE * _piece_times(planned)
 
 
 def _piece_times(planned: OnPath) -> FloatArray:
     """(G,) time between full stops [s]."""
-    return _times(planned.samples, planned.solution)
-
-
-def _times(samples: PathSamples, solution: FeedrateSolution) -> FloatArray:
-    return np.add.reduceat(solution.duration, samples.piece[:-1])
+    return np.add.reduceat(planned.solution.duration, planned.samples.piece[:-1])

@@ -21,11 +21,9 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.reshape import OnPath
 from planner.time_law import TimeLaw, law_of_solution
-from planner.timing import CHUNK, DENSE_EDGE, SHORTEST_PIECE, Motion, in_chunks
+from planner.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
 from planner.verify import Verdict
 
-# Where a motion is looked at [share of each piece of its time law].
-WATCHED = np.array([DENSE_EDGE, 0.5, 1.0 - DENSE_EDGE])
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
@@ -50,13 +48,12 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
     programmed[toolpath.block] = toolpath.feed
-    edges = np.append(motion.law.t, motion.law.end)
     factor = np.zeros(len(motion.law.t))
-    pieces = np.flatnonzero(np.diff(edges) > SHORTEST_PIECE)
+    pieces, inside = inside_pieces(motion)
     smooth = _on_one_interval(motion)
     for first in range(0, len(pieces), CHUNK // len(WATCHED)):
-        own = pieces[first : first + CHUNK // len(WATCHED)]
-        times = edges[own, None] + (edges[own + 1] - edges[own])[:, None] * WATCHED
+        part = slice(first, first + CHUNK // len(WATCHED))
+        own, times = pieces[part], inside[part]
         seen = motion.at(times.ravel(), machine.dt)
         worst = (seen.feed / programmed[seen.block]).reshape(times.shape).max(axis=1)
         motions = (seen.velocity, seen.acceleration, seen.jerk)
@@ -64,8 +61,7 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
             most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
             worst = np.maximum(worst, most ** (1.0 / order))
         factor[own] = worst
-    fastest = _fastest(motion.law)
-    for chunk in in_chunks(motion, machine.dt, fastest):
+    for chunk in in_chunks(motion, machine.dt, _fastest(motion.law)):
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
@@ -87,9 +83,7 @@ def _most(y: FloatArray, smooth: Array) -> FloatArray:
     seen = np.abs(y).max(axis=1)
     slope = (y[:, 2] - y[:, 0]) / (WATCHED[2] - WATCHED[0])
     bend = (y[:, 2] - 2.0 * y[:, 1] + y[:, 0]) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
-    inside = smooth[:, None] & (
-        np.abs(slope) < np.abs(bend)
-    )  # the peak is less than half of the piece from its middle
+    inside = smooth[:, None] & (np.abs(slope) < np.abs(bend))  # less than half of the piece from its middle
     peak = np.abs(y[:, 1] - np.divide(slope**2, 4.0 * bend, out=np.zeros_like(bend), where=inside))
     known = np.maximum(seen, 1.0)
     return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
-from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
-from planner.machine import Machine
 from planner.methods.geometry import AUTO
 from planner.methods.job import Job, Method
 from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.reshape import OnPath
-from planner.path import RESOLUTION, PathSamples, sample_path
+from planner.methods.second_order import second_order
+from planner.path import RESOLUTION, sample_path
 from planner.time_law import law_of_solution
 from planner.timing import Motion
 
@@ -48,7 +46,7 @@ class ToppraMethod(Method):
             with job.stage("geometry"):
                 samples = sample_path(path, machine, None if finer == 1.0 else RESOLUTION * finer)
             with job.stage("solve"):
-                return _solve(path, samples, machine, solver)
+                return second_order(path, samples, machine, solver)
 
         best = best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=0)
         motion = made = None
@@ -56,14 +54,3 @@ class ToppraMethod(Method):
             motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
             made = job.deliver(motion, not_limited=("jerk",))
         return plan_of_solution(job, best, motion, made, method="toppra", corner=self.corner)
-
-
-def _solve(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
-    """Solve, add the points where the profile switches on straight stretches, and solve again."""
-    problem = feedrate_problem(samples, machine)
-    solution = solver.solve(problem)
-    if solution.solved:
-        samples = add_switching_points(samples, problem, solution, machine)
-        problem = feedrate_problem(samples, machine)
-        solution = solver.solve(problem)
-    return OnPath(path=path, samples=samples, problem=problem, solution=solution)

@@ -13,9 +13,12 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.reachability import Reachability
 from planner.geometry.build import toolpath_from_program
+from planner.methods.geometry import _least_times, _piece_times, _with_corners
 from planner.methods.optimal import OptimalMethod
 from planner.methods.reshape import OnPath, price_bands
+from planner.methods.second_order import second_order
 from planner.path import sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
 
@@ -84,3 +87,36 @@ def test_auto_is_never_slower_than_single_corners(name):
     for corner in ("bezier", "spline"):
         single = OptimalMethod(corner=corner).plan(JOBS[name], MACHINE)
         assert auto.trajectory.cycle_time <= single.trajectory.cycle_time * (1 + 5e-3)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [problems.zigzag(), problems.star_spiral(60), problems.chord_circle(60)],
+    ids=lambda own: own.source,
+)
+def test_the_coarse_time_is_less_than_what_corners_take(program):
+    """What `auto` does not even try could not have been faster."""
+    rounded = round_corners(toolpath_from_program(program, MACHINE, None), MACHINE, BezierCorner())
+    exact = second_order(rounded, sample_path(rounded, MACHINE), MACHINE, Reachability())
+    assert (_least_times(rounded, MACHINE) < _piece_times(exact)).all()
+
+
+def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_are():
+    points = np.array([[k, 0.6 * (k % 2)] for k in range(8)] + [[7.0, 20.0], [7.0, 5.0]])
+    rounded, shape = shaped(problems.polyline(points))
+    splines = planned_on(with_spline(rounded, shape))
+    first = splines.samples.piece[1]
+    duration = splines.solution.duration * np.where(np.arange(len(splines.samples)) < first, 2.0, 1.0)
+    slow = dataclasses.replace(splines, solution=dataclasses.replace(splines.solution, duration=duration))
+    calls = []
+
+    def plan_on(path):
+        calls.append(path)
+        return planned_on(path)
+
+    least = np.zeros(len(splines.samples.piece) - 1)
+    mixed, best = _with_corners(rounded, shape, slow, plan_on, least)
+    assert len(least) == 2
+    assert len(calls) == 1
+    assert not mixed.laid.fits.any()
+    assert best.solution.cycle_time < slow.solution.cycle_time

@@ -34,6 +34,7 @@ LAYERS = (
     "planner.time_law",
     "planner.timing",
     "planner.axis_motion",
+    "planner.shaping",
     "planner.tube",
     "planner.pulses",
     "planner.verify",

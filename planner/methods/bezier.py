@@ -66,6 +66,7 @@ class BezierMethod(Method):
             samples = sample_path(path, shares) if stops.any() else samples
         with job.stage("solve"):
             motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
+        motion = job.behind_filters(motion)
         made = job.deliver(motion)
         with job.stage("report"):
             corners = _corner_table(motion, limits)

@@ -50,7 +50,7 @@ class FirMethod(Method):
                 course, schedule = fastest(course, job.machine)
             pieces = make(course, job.machine, schedule).pieces
         return job.plan(
-            job.deliver(motion_of(course, pieces)),
+            job.deliver(job.behind_filters(motion_of(course, pieces))),
             method="fir-plain" if self.plain else "fir",
             corner="fir",
             solver="pulses",

@@ -98,7 +98,7 @@ class FirSplineMethod(Method):
             motion = _motion(guide, held, job.toolpath)
         delay = 1e3 * (held.T1 + held.T2)
         return job.plan(
-            job.deliver(motion),
+            job.deliver(job.behind_filters(motion)),
             method="fir-spline-plain" if self.plain else "fir-spline",
             corner=corner,
             solver="filters",

@@ -15,7 +15,9 @@ from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.methods.behind import kept
 from planner.methods.closed_form import CornerTable
+from planner.methods.pacing import Timed
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
@@ -50,6 +52,11 @@ class Job:
         times = rest_to_rest_times(self.toolpath.length, *block_limits(self.toolpath, self.machine))
         return float(times.sum() + np.sum(self.toolpath.dwell))
 
+    def behind_filters(self, motion: Timed) -> Timed:
+        """The motion, slower where the machine's own filters would otherwise leave the tolerance (methods/behind.py)."""
+        with self.stage("filters"):
+            return kept(motion, self.toolpath, self.machine)
+
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too."""
         with self.stage("sample"):
@@ -60,6 +67,7 @@ class Job:
                 self.toolpath,
                 self.machine,
                 dense=dense_motion(motion, self.machine.dt),
+                motion=motion,
                 not_limited=not_limited,
                 progress=progress,
             )

@@ -71,7 +71,7 @@ class KinematicMethod(Method):
         with job.stage("solve"):
             course = self._course(job.toolpath, job.machine, exact)
             motion = _motion(course, job.toolpath.axes)
-        made = job.deliver(motion)
+        made = job.deliver(job.behind_filters(motion))
         with job.stage("report"):
             corners = _corner_table(course, job.machine)
         return job.plan(

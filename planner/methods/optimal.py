@@ -63,6 +63,7 @@ class OptimalMethod(Method):
         if best.solution.solved:
             with job.stage("solve"):
                 best, motion = within_limits(best, self.solver.solve, job.toolpath, machine)
+            motion = job.behind_filters(motion)
             made = job.deliver(motion)
             for again in range(SEEN_ROUNDS):
                 gentler = without_seen_excess(motion, made[1], again)

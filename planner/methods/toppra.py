@@ -51,6 +51,8 @@ class ToppraMethod(Method):
         best = best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=0)
         motion = made = None
         if best.solution.solved:
-            motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
+            motion = job.behind_filters(
+                Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
+            )
             made = job.deliver(motion, not_limited=("jerk",))
         return plan_of_solution(job, best, motion, made, method="toppra", corner=self.corner)

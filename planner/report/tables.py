@@ -183,6 +183,9 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
     table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
     table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    if (after := verdict.after_filters) is not None:
+        table.add_row("contour error after the filters", f"{after.contour_error_mm / MICROMETRE:.3f} µm")
+        table.add_row("corners missed after the filters by", f"{after.vertex_error_mm / MICROMETRE:.3f} µm")
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
     for mode in verdict.ringing:
         table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))

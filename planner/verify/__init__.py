@@ -6,6 +6,7 @@ path, no constraint, no solver. What it checks, and how sharp each check is:
     limits.py     velocity, acceleration, jerk per axis, feed, normal acceleration: on the columns and on differences of the
                   delivered positions
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
+    filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
     ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
@@ -16,6 +17,6 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 
 from planner.verify.judge import verify
 from planner.verify.ringing import Ringing
-from planner.verify.verdict import LimitCheck, Verdict
+from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
 
-__all__ = ["LimitCheck", "Ringing", "Verdict", "verify"]
+__all__ = ["AfterFilters", "LimitCheck", "Ringing", "Verdict", "verify"]

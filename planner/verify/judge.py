@@ -12,11 +12,12 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
 from planner.verify import findings
 from planner.verify.dense import PERIOD_ROUNDING, Comparison
+from planner.verify.filtered import Asked, look_behind, motion_asked, motion_of_samples
 from planner.verify.findings import QUANTITIES, Look
-from planner.verify.pieces import pieces_of
+from planner.verify.pieces import Pieces, pieces_of
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
-from planner.verify.verdict import Verdict
+from planner.verify.verdict import AfterFilters, Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
 
@@ -27,6 +28,7 @@ def verify(
     machine: Machine,
     *,
     dense: Iterable[Trajectory] | None = None,
+    motion: Asked | None = None,
     not_limited: tuple[str, ...] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Verdict:
@@ -36,6 +38,7 @@ def verify(
     toolpath    : the programmed path (lines, arcs, helices) with feeds, budgets and stops
     dense       : the same motion evaluated between the samples too: chunks in order, adjoining or overlapping; None to
                   judge the samples alone
+    motion      : the same motion, to be asked at any time: what the machine's filters are fed with; None for cubics through the samples
     not_limited : quantities that are reported but not part of passing, of `NOT_LIMITED_NAMES`
     progress    : called now and then with the share that is done, 0 to 1
 
@@ -74,6 +77,8 @@ def verify(
     faults += findings.vertex_faults(looks, toolpath, pieces)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    after = _after_filters(trajectory, motion, toolpath, machine, pieces)
+    faults += after.faults if after is not None else ()
     return Verdict(
         passed=not faults,
         limits=checks,
@@ -88,6 +93,29 @@ def verify(
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
         faults=tuple(faults),
         ringing=ringing_of(trajectory, machine),
+        after_filters=after,
+    )
+
+
+def _after_filters(
+    trajectory: Trajectory, motion: Asked | None, toolpath: Toolpath, machine: Machine, pieces: Pieces
+) -> AfterFilters | None:
+    """What the machine's filters make of the motion; None for a machine without."""
+    if machine.fir is None:
+        return None
+    at = motion_of_samples(trajectory) if motion is None else motion_asked(motion, machine.dt)
+    end = trajectory.cycle_time if motion is None else motion.end
+    looks = [look_behind(at, end, machine.fir.time_constants, trajectory.dt, pieces)]
+    contour = findings.contour_check(looks, toolpath, pieces)
+    faults = [contour.sentence(toolpath.axes)] if contour.broken else []
+    faults += findings.vertex_faults(looks, toolpath, pieces)
+    faults += findings.order(looks, toolpath, pieces)[2]
+    return AfterFilters(
+        contour=contour,
+        vertex=findings.vertex_check(looks, toolpath, pieces),
+        contour_error_mm=findings.contour_error(looks),
+        vertex_error_mm=findings.vertex_error(looks, pieces),
+        faults=tuple(faults),
     )
 
 

@@ -53,6 +53,17 @@ class LimitCheck:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class AfterFilters:
+    """What the machine's own filters leave of the tolerance (filtered.py); fields as in `Verdict`."""
+
+    contour: LimitCheck
+    vertex: LimitCheck
+    contour_error_mm: float
+    vertex_error_mm: float
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Verdict:
     """What `verify` found.
 
@@ -69,6 +80,7 @@ class Verdict:
     lost_lines       : their NC lines
     faults           : one sentence per failure: what, by how much, when, where, NC line
     ringing          : what each vibration mode of the machine does; reported, not judged
+    after_filters    : the motion behind the machine's filters, judged likewise; None for a machine without
     """
 
     passed: bool
@@ -84,10 +96,20 @@ class Verdict:
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
     ringing: tuple[Ringing, ...] = ()
+    after_filters: AfterFilters | None = None
 
     def summary(self) -> dict[str, Any]:
         """The part of `summary.json` that is called `verdict`."""
-        return {
+        after = self.after_filters
+        behind = (
+            {}
+            if after is None
+            else {
+                "contour_error_after_filters_mm": after.contour_error_mm,
+                "vertex_error_after_filters_mm": after.vertex_error_mm,
+            }
+        )
+        return behind | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},
             "contour_error_mm": self.contour_error_mm,

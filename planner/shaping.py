@@ -102,7 +102,9 @@ class ShapedMotion:
         }
         at_mean = self._copy(times - self.shaper.middle, dt)
         base = self._ends[0]
-        return Trajectory(axes=base.axes, dt=dt, t=times, block=at_mean["block"], line=at_mean["line"], **means)
+        return Trajectory(
+            axes=base.axes, dt=dt, t=times, block=at_mean["block"], line=at_mean["line"], **means
+        )
 
     @cached_property
     def _ends(self) -> tuple[Trajectory, Trajectory]:
@@ -125,5 +127,3 @@ class ShapedMotion:
                 column[begin:stop] = getattr(there, name)
             columns[name] = column
         return columns
-
-

@@ -45,6 +45,12 @@ def plan(
             min=0, help="of reshaping splines for optimal [default: as many as the size of the job lets pay]"
         ),
     ] = None,
+    shaped: Annotated[
+        bool,
+        typer.Option(
+            "--shaped", help="set points that leave the machine's [[modes]] at rest, for optimal and toppra"
+        ),
+    ] = False,
     tolerance: ToleranceOption = None,
     output: Annotated[
         Path | None,
@@ -73,6 +79,7 @@ def plan(
             corner=corner.value,
             rounds=rounds,
             solver=solver.value,
+            shaped=shaped,
             tolerance=tolerance,
             progress=progress,
         )

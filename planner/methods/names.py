@@ -44,6 +44,7 @@ def plan(
     corner: str = "auto",
     solver: str = "reachability",
     rounds: int | None = None,
+    shaped: bool = False,
     tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
@@ -55,13 +56,14 @@ def plan(
     corner    : "auto", "spline", "bezier", "fir" or "kinematic"; for "toppra" and "optimal"
     solver    : "reachability" or "toppra"; for "toppra"
     rounds    : in which "optimal" reshapes splines by what their motion pays for; None for as many as the size of the job lets pay
+    shaped    : deliver set points that leave the machine's vibration modes at rest; for "toppra" and "optimal"
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
     Raises InputError naming file, line and column. A problem that could not be solved is the plan's status; `Plan.require`
     turns it into an exception.
     """
-    chosen = _method(method, corner, solver, rounds) if isinstance(method, str) else method
+    chosen = _method(method, corner, solver, rounds, shaped) if isinstance(method, str) else method
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if isinstance(program, Program):
@@ -73,15 +75,19 @@ def plan(
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 
-def _method(name: str, corner: str, solver: str, rounds: int | None) -> Method:
+def _method(name: str, corner: str, solver: str, rounds: int | None, shaped: bool) -> Method:
     if solver not in SOLVERS:
         raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
     if rounds is not None and rounds < 0:
         raise InputError(f"{rounds} rounds; it must be 0 or more")
+    if shaped and name not in ("optimal", "toppra"):
+        raise InputError(
+            f"method {name} does not shape its set points for vibration modes; optimal and toppra can"
+        )
     if name == "optimal":
-        return OptimalMethod(corner=corner, rounds=rounds)
+        return OptimalMethod(corner=corner, rounds=rounds, shaped=shaped)
     if name == "toppra":
-        return ToppraMethod(corner=corner, solver=solver)
+        return ToppraMethod(corner=corner, solver=solver, shaped=shaped)
     if name == "bezier":
         return BezierMethod()
     if name == "kinematic":

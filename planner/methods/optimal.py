@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
 from planner.constraints.assemble import feedrate_problem
@@ -23,6 +24,7 @@ from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.prices import price_list
 from planner.methods.reshape import OnPath, tube_prices
+from planner.methods.shaped import shaped_plan
 from planner.methods.slowing import within_limits, without_seen_excess
 from planner.methods.stages import Stages
 from planner.path import RESOLUTION, sample_path
@@ -40,25 +42,22 @@ class OptimalMethod(Method):
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : a solver of third order
     rounds : of reshaping splines (methods/reshape.py); None for as many as the size of the job lets pay
+    shaped : deliver set points that leave the machine's vibration modes at rest (methods/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: JerkLimited = field(default_factory=JerkLimited)
     rounds: int | None = None
+    shaped: bool = False
 
     def plan_job(self, job: Job) -> Plan:
+        if self.shaped:
+            plan_on = dataclasses.replace(
+                self, rounds=self.rounds or 0
+            )._best  # reshaping is for motions as they are planned
+            return shaped_plan(job, plan_on, self.solver.solve, method="optimal", corner=self.corner)
         machine = job.machine
-        with job.stage("geometry"):
-            shape = corner_shape(self.corner, machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
-            path = round_corners(job.toolpath, machine, shape, blend_tangents=True)
-        best = best_on_path(
-            job,
-            path,
-            self.corner,
-            lambda path, finer: self._on_path(path, machine, job.stages, finer=finer),
-            blend_tangents=True,
-            rounds=self.rounds,
-        )
+        best = self._best(job)
         motion = made = prices = None
         if best.solution.solved:
             with job.stage("solve"):
@@ -80,6 +79,20 @@ class OptimalMethod(Method):
                     )
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
         return plan_of_solution(job, best, motion, made, method="optimal", corner=self.corner, prices=prices)
+
+    def _best(self, job: Job) -> OnPath:
+        """The time-optimal motion of a job, and the path that it is on."""
+        with job.stage("geometry"):
+            shape = corner_shape(self.corner, job.machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
+            path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
+        return best_on_path(
+            job,
+            path,
+            self.corner,
+            lambda path, finer: self._on_path(path, job.machine, job.stages, finer=finer),
+            blend_tangents=True,
+            rounds=self.rounds,
+        )
 
     def _on_path(self, path: SmoothPath, machine: Machine, stages: Stages, finer: float = 1.0) -> OnPath:
         """The time-optimal motion on a path; `finer` divides the grid's resolution."""

@@ -61,7 +61,7 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
             most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
             worst = np.maximum(worst, most ** (1.0 / order))
         factor[own] = worst
-    for chunk in in_chunks(motion, machine.dt, _fastest(motion.law)):
+    for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
@@ -89,7 +89,7 @@ def _most(y: FloatArray, smooth: Array) -> FloatArray:
     return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
 
 
-def _fastest(law: TimeLaw) -> FloatArray:
+def fastest_inside(law: TimeLaw) -> FloatArray:
     """When the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
     lasting = np.diff(np.append(law.t, law.end))
     braking = np.flatnonzero(law.jerk_s < 0.0)

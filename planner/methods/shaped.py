@@ -43,7 +43,8 @@ from planner.timing import Motion, in_chunks, inside_pieces
 
 # Corners that turn by more than the first of these are stops of p [rad], and p is planned with so many times the accelerations and
 # jerks [-].
-CANDIDATES = tuple((float(np.deg2rad(20.0)), more) for more in (1.0, 1.5, 1.75, 2.0)) + ((np.inf, 1.75),)
+SHARP = float(np.deg2rad(20.0))
+CANDIDATES = ((SHARP, 1.0), (SHARP, 1.5), (SHARP, 1.75), (SHARP, 2.0), (np.inf, 1.75))
 # Share of the tolerance that the path of p may use; the rest is for the shaper [-].
 OF_PATH = 0.5
 ROUNDS = 12

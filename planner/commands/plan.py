@@ -63,7 +63,7 @@ def plan(
     if plot and output is None:
         raise InputError("--plot writes its pictures into the output directory: give one with -o DIR")
     from planner import plan as plan_program
-    from planner.report.export import summary, write_plan
+    from planner.report.export import SUMMARY, summary, write_plan
 
     with ProgressBar() as progress:
         result = plan_program(
@@ -81,12 +81,15 @@ def plan(
             progress("write", 0.0)
             written = write_plan(result, output, file_format=file_format.value, plots=plot)
 
+    said = summary(result)
+    if written and output is not None:  # with what was not written, and why
+        said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]
     if as_json:
-        typer.echo(json.dumps(summary(result), indent=2, allow_nan=False))
+        typer.echo(json.dumps(said, indent=2, allow_nan=False))
     else:
         from planner.report.tables import corner_table, plan_table
 
-        show(plan_table(result))
+        show(plan_table(result, said["notes"]))
         if corners:
             show("", corner_table(result) or NO_CORNERS)
         for name in written:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.closed_form import CornerTable
+from planner.methods.notes import job_notes
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
@@ -33,16 +34,22 @@ class Job:
 
     toolpath : the program's exact path, with its tolerances
     stages   : the clock
+    noted    : what the method has said of what it gave up (`note`)
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
+    noted: list[str] = field(default_factory=list)
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
         return self.stages.stage(name)
+
+    def note(self, *sentences: str) -> None:
+        """Add to the notes of the plan: what was given up, with its first line and how often."""
+        self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
 
     @cached_property
     def stop_time(self) -> float:
@@ -97,6 +104,7 @@ class Job:
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=prices,
+            notes=(*job_notes(self.program, self.machine, self.toolpath), *self.noted),
             timings=self.stages.timings,
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.passing import segments_at
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.closed_form import CornerTable
@@ -60,7 +61,7 @@ class Job:
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too."""
         with self.stage("sample"):
-            trajectory = sample_motion(motion, self.machine.dt)
+            trajectory = self._named(sample_motion(motion, self.machine.dt))
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
@@ -71,6 +72,17 @@ class Job:
                 progress=progress,
             )
         return trajectory, verdict
+
+    def _named(self, trajectory: Trajectory) -> Trajectory:
+        """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
+        method's own blocks and a note."""
+        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
+        if segment is None:
+            self.note(
+                "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
+            )
+            return trajectory
+        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
 
     def plan(
         self,

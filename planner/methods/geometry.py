@@ -4,8 +4,9 @@
 plans the rounded corners too, wherever they could be faster as far as their time without jerk limits tells, and keeps them between
 the full stops where they are; beyond `COMPARED_POINTS`, where that takes minutes and twice the memory, it is "spline".
 
-A run on which the spline has a cusp, where the path turns back within the tolerance, would keep its single corners as a whole: the
-motion stops there instead, and the run is two.
+A run of which one place gets no spline, because the curve leaves the tolerance there, has no certificate or has a cusp where the path
+turns back within the tolerance, would keep its single corners as a whole: the motion stops there instead, and the run is two. What
+still gets none after some rounds is fenced off by two full stops, and keeps its single corners alone. `given_up` says all of it.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from planner.methods.reshape import OnPath, PlanOn, reshaped
 from planner.methods.second_order import second_order
 from planner.methods.stages import Stages
 from planner.path import RESOLUTION, sample_path
-from planner.smoothing.spline_path import SplineShape, cusp_joints, spline_shape, with_spline
+from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape, with_spline
 
 SPLINE, AUTO = "spline", "auto"
 
-# Stops at cusps change the runs around them, which may then have others; so often at most.
-CUSP_ROUNDS = 4
+# Stops change the runs around them, which may then get no spline elsewhere; so often at most, the last time with fences.
+STOP_ROUNDS = 4
 POINTS_PER_SPAN = 4  # about, on the grid that is not there yet
 COMPARED_POINTS = 1_000_000
 # On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on chords of 0.1 mm): this
@@ -65,7 +66,8 @@ def on_spline(
     with stages.stage("geometry"):
         rounded, shape = splined_with_stops(rounded, machine, blend_tangents)
     if not shape.laid.fits.any():
-        return usual(given)
+        return dataclasses.replace(usual(given), notes=given_up(rounded, rounded, shape))
+    notes = given_up(given, rounded, shape)
     shape, best = reshaped(rounded, shape, usual, rounds, stages)
     if auto and POINTS_PER_SPAN * len(shape.left) <= COMPARED_POINTS:
         with stages.stage("solve"):
@@ -80,22 +82,46 @@ def on_spline(
         fine = plan_on(best.path, FINER)
         if fine.solution.solved and fine.solution.cycle_time < best.solution.cycle_time:
             best = fine
-    return dataclasses.replace(best, shape=shape)
+    return dataclasses.replace(best, shape=shape, notes=notes)
 
 
 def splined_with_stops(
     rounded: SmoothPath, machine: Machine, blend_tangents: bool
 ) -> tuple[SmoothPath, SplineShape]:
-    """The splines of a path, and the path with full stops where they would have cusps."""
+    """The splines of a path, and the path with full stops where runs get none (module text)."""
     shape = spline_shape(rounded, machine)
-    for _ in range(CUSP_ROUNDS):
-        at = cusp_joints(rounded, shape)
+    for again in range(STOP_ROUNDS):
+        at = lost_joints(rounded, shape, fence=again == STOP_ROUNDS - 1)
         if not len(at):
             break
         stopping = rounded.toolpath.with_joints(at, Joint.STOP)
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
         shape = spline_shape(rounded, machine)
     return rounded, shape
+
+
+def given_up(given: SmoothPath, rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
+    """Sentences on what splines did not do: full stops that `given` did not have, and runs that keep their single corners."""
+    said = []
+    stops = np.flatnonzero((rounded.toolpath.joint == Joint.STOP) & (given.toolpath.joint != Joint.STOP))
+    if len(stops):
+        said.append(
+            f"{len(stops)} full stops where no curve fits inside the tolerance, the first after line {_line(rounded, stops[0])}"
+        )
+    lost = np.flatnonzero(~shape.laid.fits)
+    if len(lost):
+        corners = int((shape.runs.joint_last - shape.runs.joint_first + 1)[lost].sum())
+        first = rounded.legs.first[shape.runs.joint_first[lost[0]]]
+        said.append(
+            f"{corners} corners are rounded one by one because no curve through them fits inside the tolerance, "
+            f"the first after line {_line(rounded, first)}"
+        )
+    return tuple(said)
+
+
+def _line(path: SmoothPath, joint: int) -> int:
+    """The program's line that ends at a joint of the toolpath."""
+    return int(path.toolpath.line[joint - 1])
 
 
 def _with_corners(

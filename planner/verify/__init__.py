@@ -8,6 +8,7 @@ path, no constraint, no solver. What it checks, and how sharp each check is:
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
     filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
+    ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
     judge.py      `verify` itself
 
@@ -15,6 +16,13 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 """
 
 from planner.verify.judge import verify
+<<<<<<< HEAD
 from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
 
 __all__ = ["AfterFilters", "LimitCheck", "Verdict", "verify"]
+=======
+from planner.verify.ringing import Ringing
+from planner.verify.verdict import LimitCheck, Verdict
+
+__all__ = ["LimitCheck", "Ringing", "Verdict", "verify"]
+>>>>>>> main

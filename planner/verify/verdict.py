@@ -7,6 +7,7 @@ from typing import Any
 
 from planner.arrays import FloatArray, freeze
 from planner.verify.pieces import RATIO_ROUNDING
+from planner.verify.ringing import Ringing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,6 +80,7 @@ class Verdict:
     lost_lines       : their NC lines
     faults           : one sentence per failure: what, by how much, when, where, NC line
     after_filters    : the motion behind the machine's filters, judged likewise; None for a machine without
+    ringing          : what each vibration mode of the machine does; reported, not judged
     """
 
     passed: bool
@@ -94,6 +96,7 @@ class Verdict:
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
     after_filters: AfterFilters | None = None
+    ringing: tuple[Ringing, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The part of `summary.json` that is called `verdict`."""
@@ -112,4 +115,5 @@ class Verdict:
             "contour_error_mm": self.contour_error_mm,
             "vertex_error_mm": self.vertex_error_mm,
             "end_error_mm": self.end_error_mm,
+            "ringing": [mode.summary() for mode in self.ringing],
         }

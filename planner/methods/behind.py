@@ -112,7 +112,7 @@ class Behind:
         )
 
     def rests(self, motion: Timed, runs: Runs) -> FloatArray:
-        """(G,) the shortest rest behind each run [s] with which the filtered motion comes near enough to the stop; 0 behind the last."""
+        """(G,) the shortest rest [s] behind each run with which the filtered motion comes near enough; 0 behind the last."""
         found = np.zeros(len(runs))
         for low in range(0, len(runs) - 1, STOPS_AT_ONCE):
             stop = np.arange(low, min(low + STOPS_AT_ONCE, len(runs) - 1))

@@ -16,13 +16,7 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 """
 
 from planner.verify.judge import verify
-<<<<<<< HEAD
+from planner.verify.ringing import Ringing
 from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
 
-__all__ = ["AfterFilters", "LimitCheck", "Verdict", "verify"]
-=======
-from planner.verify.ringing import Ringing
-from planner.verify.verdict import LimitCheck, Verdict
-
-__all__ = ["LimitCheck", "Ringing", "Verdict", "verify"]
->>>>>>> main
+__all__ = ["AfterFilters", "LimitCheck", "Ringing", "Verdict", "verify"]

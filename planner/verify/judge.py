@@ -14,12 +14,8 @@ from planner.verify import findings
 from planner.verify.dense import PERIOD_ROUNDING, Comparison
 from planner.verify.filtered import Asked, look_behind, motion_asked, motion_of_samples
 from planner.verify.findings import QUANTITIES, Look
-<<<<<<< HEAD
 from planner.verify.pieces import Pieces, pieces_of
-=======
-from planner.verify.pieces import pieces_of
 from planner.verify.ringing import ringing_of
->>>>>>> main
 from planner.verify.stream import Limits, watch
 from planner.verify.verdict import AfterFilters, Verdict
 
@@ -96,7 +92,7 @@ def verify(
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
         faults=tuple(faults),
-<<<<<<< HEAD
+        ringing=ringing_of(trajectory, machine),
         after_filters=after,
     )
 
@@ -120,9 +116,6 @@ def _after_filters(
         contour_error_mm=findings.contour_error(looks),
         vertex_error_mm=findings.vertex_error(looks, pieces),
         faults=tuple(faults),
-=======
-        ringing=ringing_of(trajectory, machine),
->>>>>>> main
     )
 
 

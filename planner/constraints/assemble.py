@@ -37,7 +37,7 @@ def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
         collected.tighten(f"velocity.{letter}", np.where(axis == k, per_axis, np.inf))
     budget = _remaining_budget(samples, machine)
     for side, kappa in ((left, samples.kappa_left), (right, samples.kappa_right)):
-        for name, bound in _curvature_bounds(kappa, budget[side], machine):
+        for name, bound in _curvature_bounds(kappa, budget[side], _programmed(samples)[side], machine):
             collected.tighten(name, bound * (1.0 - CURVATURE_MARGIN))
     jump, axis = bounds.curvature_jump(*_jumps(samples), machine.limits("acceleration", axes))
     for k, letter in enumerate(axes):
@@ -95,19 +95,31 @@ def _remaining_budget(samples: PathSamples, machine: Machine) -> FloatArray:
     return budget
 
 
+def _programmed(samples: PathSamples) -> Array:
+    """(P,) True for intervals on programmed lines and arcs."""
+    return (samples.element >= 0) & (samples.element < len(samples.table.legs))
+
+
 def _curvature_bounds(
-    kappa: FloatArray, budget: FloatArray, machine: Machine
+    kappa: FloatArray, budget: FloatArray, programmed: Array, machine: Machine
 ) -> list[tuple[str, FloatArray]]:
-    """The bounds that depend on curvature; chord and filter errors share the budget in proportion (PAPERS D)."""
+    """The bounds that depend on curvature. On programmed arcs chord and filter errors share the budget in proportion (PAPERS D). What
+    rounds corners is shorter than the filters: there the filtered motion is measured (methods/creeping.py), and the chord has the
+    whole of the budget."""
     rate = error_rate(machine)
     found = []
     if machine.normal_acceleration is not None:
         found.append(("normal_acceleration", bounds.normal_acceleration(kappa, machine.normal_acceleration)))
-    tol_chord = budget * (machine.dt**2 / 8.0 / rate)
+    tol_chord = np.where(programmed, budget * (machine.dt**2 / 8.0 / rate), budget)
     found.append(("chord_error", bounds.chord_error(kappa, tol_chord, machine.dt)))
     if machine.fir is not None:
         filters = machine.fir.time_constants
-        found.append(("filter_error", bounds.filter_error(kappa, budget - tol_chord, filters)))
+        found.append(
+            (
+                "filter_error",
+                np.where(programmed, bounds.filter_error(kappa, budget - tol_chord, filters), np.inf),
+            )
+        )
         if machine.fir.phase_lag_max is not None:
             angle = machine.fir.phase_lag_max * RAD_PER_DEG
             found.append(("phase_lag", bounds.phase_lag(kappa, angle, filters)))

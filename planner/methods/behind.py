@@ -25,7 +25,7 @@ from planner.arrays import Array, FloatArray
 from planner.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.methods.pacing import Runs, Timed, paced, runs_of
+from planner.methods.pacing import Runs, Timed, TimedT, paced, runs_of
 from planner.verify.filtered import look_behind, motion_asked
 from planner.verify.pieces import Pieces, pieces_of
 
@@ -70,6 +70,7 @@ class Behind:
         assert machine.fir is not None
         self.toolpath, self.machine = toolpath, machine
         self.filters = Filters(machine.fir.time_constants)
+        self.tolerance = float(toolpath.tolerance.min())
         self.pieces = pieces_of(toolpath)
         self._wide = _widened(self.pieces)
         weights = self.filters.step(self.filters.delay * np.arange(CELLS + 1) / CELLS)
@@ -170,7 +171,14 @@ def _widened(pieces: Pieces) -> Pieces:
     return pieces._replace(joint=joint, piece=piece)
 
 
-def kept(motion: Timed, toolpath: Toolpath, machine: Machine) -> Timed:
+def rested(behind: Behind, motion: TimedT) -> TimedT:
+    """The motion with the shortest rests at its full stops, no run slowed down."""
+    runs = runs_of(motion)
+    gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
+    return paced(motion, runs, np.ones(len(runs)), np.maximum(behind.rests(motion, runs) - gap, 0.0))
+
+
+def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance; the motion itself for a
     machine without filters."""
     if machine.fir is None:

@@ -17,7 +17,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.behind import kept
 from planner.methods.closed_form import CornerTable
-from planner.methods.pacing import Timed
+from planner.methods.pacing import TimedT
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
@@ -52,7 +52,7 @@ class Job:
         times = rest_to_rest_times(self.toolpath.length, *block_limits(self.toolpath, self.machine))
         return float(times.sum() + np.sum(self.toolpath.dwell))
 
-    def behind_filters(self, motion: Timed) -> Timed:
+    def behind_filters(self, motion: TimedT) -> TimedT:
         """The motion, slower where the machine's own filters would otherwise leave the tolerance (methods/behind.py)."""
         with self.stage("filters"):
             return kept(motion, self.toolpath, self.machine)

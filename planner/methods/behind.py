@@ -50,11 +50,16 @@ class Places:
     time  : (n,) behind the filters [s]
     ratio : (n,) error over budget [-]
     path  : (n,) what of the ratio is there without filters [-]
+    vertex : (n,) index of the vertex that is missed, -1 for places off the contour
+    near, near_time : (N+1,) of every vertex: error over budget [-], and when the filtered motion is nearest [s]
     """
 
     time: FloatArray
     ratio: FloatArray
     path: FloatArray
+    vertex: Array
+    near: FloatArray
+    near_time: FloatArray
 
     @property
     def less(self) -> FloatArray:
@@ -110,6 +115,9 @@ class Behind:
             time=np.concatenate([t, near_time[missed]]),
             ratio=np.concatenate([ratio, near[missed]]),
             path=np.concatenate([path[0][piece], path[1][missed]]),
+            vertex=np.concatenate([np.full(len(t), -1), missed]),
+            near=near,
+            near_time=near_time,
         )
 
     def rests(self, motion: Timed, runs: Runs) -> FloatArray:

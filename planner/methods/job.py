@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -35,12 +36,36 @@ class Job:
 
     toolpath : the program's exact path, with its tolerances
     stages   : the clock
+    judged   : machine and toolpath that the motion is kept to and judged by where it is planned with others (`with_share`), else None
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
+    judged: tuple[Machine, Toolpath] | None = None
+
+    @property
+    def real(self) -> tuple[Machine, Toolpath]:
+        """Machine and toolpath that the motion is kept to and judged by."""
+        return self.judged or (self.machine, self.toolpath)
+
+    def with_share(self, share: float, seen: float) -> Job:
+        """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
+        of `seen` of their lengths [-]."""
+        machine, toolpath = self.real
+        assert machine.fir is not None
+        lengths = tuple(
+            seen * np.sqrt(share) * T for T in machine.fir.time_constants
+        )  # T^2 over tolerance stays
+        return dataclasses.replace(
+            self,
+            machine=machine.model_copy(
+                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
+            ),
+            toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
+            judged=(machine, toolpath),
+        )
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
@@ -55,18 +80,20 @@ class Job:
     def behind_filters(self, motion: TimedT) -> TimedT:
         """The motion, slower where the machine's own filters would otherwise leave the tolerance (methods/behind.py)."""
         with self.stage("filters"):
-            return kept(motion, self.toolpath, self.machine)
+            machine, toolpath = self.real
+            return kept(motion, toolpath, machine)
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too."""
+        machine, toolpath = self.real
         with self.stage("sample"):
-            trajectory = sample_motion(motion, self.machine.dt)
+            trajectory = sample_motion(motion, machine.dt)
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
-                self.toolpath,
-                self.machine,
-                dense=dense_motion(motion, self.machine.dt),
+                toolpath,
+                machine,
+                dense=dense_motion(motion, machine.dt),
                 motion=motion,
                 not_limited=not_limited,
                 progress=progress,
@@ -94,8 +121,8 @@ class Job:
             corner=corner,
             solver=solver,
             program=self.program,
-            machine=self.machine,
-            toolpath=self.toolpath,
+            machine=self.real[0],
+            toolpath=self.real[1],
             status=status,
             sentence=sentence,
             trajectory=trajectory,

@@ -69,7 +69,7 @@ class OptimalMethod(Method):
             with job.stage("solve"):
                 best, motion = within_limits(best, self.solver.solve, job.toolpath, machine)
             with job.stage("filters"):
-                best, motion = within_filters(best, motion, self._again(job), job.toolpath, machine)
+                best, motion = within_filters(best, motion, self._again(job), job.real)
             made = job.deliver(motion)
             for again in range(SEEN_ROUNDS):
                 gentler = without_seen_excess(motion, made[1], again)

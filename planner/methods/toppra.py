@@ -65,6 +65,6 @@ class ToppraMethod(Method):
                 )
 
             with job.stage("filters"):
-                best, motion = within_filters(best, motion, again, job.toolpath, machine)
+                best, motion = within_filters(best, motion, again, job.real)
             made = job.deliver(motion, not_limited=("jerk",))
         return plan_of_solution(job, best, motion, made, method="toppra", corner=self.corner)

@@ -120,6 +120,17 @@ class Behind:
             near_time=near_time,
         )
 
+    def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
+        """(n,) True for times at which the filters hold what two runs did: there longer rests help, and nothing else has to."""
+        early, late = self.runs_within(runs_of(motion), time)
+        return early < late
+
+    def runs_within(self, runs: Runs, time: FloatArray) -> tuple[Array, Array]:
+        """First and last of the runs (n,) that the filters hold something of at the times (n,) [s]."""
+        early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
+        late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
+        return np.minimum(early, late), late
+
     def rests(self, motion: Timed, runs: Runs) -> FloatArray:
         """(G,) the shortest rest [s] behind each run with which the filtered motion comes near enough; 0 behind the last."""
         found = np.zeros(len(runs))
@@ -206,10 +217,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         places = behind.places(made, path)
         if not len(places.time):
             break
-        now = runs_of(made)
-        early = np.searchsorted(now.end, places.time - delay, side="right")
-        late = np.maximum(np.searchsorted(now.begin, places.time) - 1, 0)
-        early = np.minimum(early, late)
+        early, late = behind.runs_within(runs_of(made), places.time)
         own = early == late
         more = np.clip(1.0 / np.sqrt(places.less[own]), FACTOR_LEAST, FACTOR_MOST)
         worst = np.ones(len(runs))

@@ -58,11 +58,11 @@ def within_filters(
         places = behind.places(waiting, path)
         if not len(places.time) and (best is None or waiting.end < best[1].end):
             best = planned, waiting
-        change = _change(places, path[1])
+        zone = _zones(plain, waiting, behind, places.near_time)
+        now = np.array([waiting.law.feed[a:b].min() ** 2 for a, b in zone])
+        change = np.where(now > 0.0, _change(places, path[1]), 1.0)  # a full stop is not made slower
         if not len(places.time) and not (np.isfinite(corner) & (change > 1.0 + WORTH)).any():
             break
-        zone = _zones(plain, waiting, behind, places.near_time)
-        now = np.array([waiting.law.feed[a:b].min(initial=1e9) ** 2 for a, b in zone])
         corner = np.where(change < 1.0, np.minimum(corner, now), corner) * np.where(
             np.isfinite(corner) | (change < 1.0), change, 1.0
         )
@@ -91,7 +91,8 @@ def _zones(
     tau = np.clip(middle - law.t[at], 0.0, np.append(np.diff(law.t), 0.0)[at])
     s = law.s[at] + tau * (law.feed[at] + tau * (law.acc_s[at] / 2 + tau * law.jerk_s[at] / 6))
     reach = REACH * behind.tolerance
-    first, last = np.searchsorted(problem.s, s - reach), np.searchsorted(problem.s, s + reach, side="right")
+    first = np.maximum(np.searchsorted(problem.s, s - reach, side="right") - 1, 0)
+    last = np.searchsorted(problem.s, s + reach) + 1
     return list(zip(first.tolist(), last.tolist(), strict=True))
 
 
@@ -100,7 +101,7 @@ def _elsewhere(
 ) -> FloatArray:
     """The bound (P,), smaller where the filtered motion leaves the contour."""
     bound, now = bound.copy(), np.square(motion.law.feed)
-    contour = places.vertex < 0
+    contour = (places.vertex < 0) & ~behind.beside_stop(motion, places.time)
     less = np.ones(len(bound))
     for (a, b), by in zip(
         _zones(problem, motion, behind, places.time[contour]), places.less[contour], strict=True

@@ -91,8 +91,11 @@ def _zones(
     tau = np.clip(middle - law.t[at], 0.0, np.append(np.diff(law.t), 0.0)[at])
     s = law.s[at] + tau * (law.feed[at] + tau * (law.acc_s[at] / 2 + tau * law.jerk_s[at] / 6))
     reach = REACH * behind.tolerance
-    first = np.maximum(np.searchsorted(problem.s, s - reach, side="right") - 1, 0)
-    last = np.searchsorted(problem.s, s + reach) + 1
+    first, last = np.searchsorted(problem.s, s - reach), np.searchsorted(problem.s, s + reach, side="right")
+    near = np.clip(np.searchsorted(problem.s, s), 1, len(problem) - 1)
+    near -= s - problem.s[near - 1] < problem.s[near] - s
+    none = first == last  # then the nearest point
+    first, last = np.where(none, near, first), np.where(none, near + 1, last)
     return list(zip(first.tolist(), last.tolist(), strict=True))
 
 

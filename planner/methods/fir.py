@@ -43,6 +43,8 @@ class FirMethod(Method):
     plain: bool = False
     profile_filters: tuple[float, float] | None = None
 
+    ways = ((0.5, 1.0), (0.25, 1.0), (0.1, 1.0), (0.03, 1.0))
+
     def __post_init__(self) -> None:
         check_profile_filters(self.profile_filters)
 
@@ -55,8 +57,9 @@ class FirMethod(Method):
             else:
                 course, schedule = fastest(course, job.machine)
             pieces = make(course, job.machine, schedule).pieces
+            motion = motion_of(course, pieces)
         return job.plan(
-            job.deliver(job.behind_filters(motion_of(course, pieces))),
+            job.deliver(motion if self.plain else job.behind_filters(motion)),
             method="fir-plain" if self.plain else "fir",
             corner="fir",
             solver="pulses",

@@ -63,6 +63,8 @@ class FirSplineMethod(Method):
     profile_filters: tuple[float, float] | None = None
     phase_lag: float = PHASE_LAG
 
+    ways = ((0.5, 1.0), (0.25, 1.0), (0.1, 1.0), (0.03, 1.0))
+
     def __post_init__(self) -> None:
         check_profile_filters(self.profile_filters)
         if not 0 < self.phase_lag < np.inf:
@@ -109,7 +111,7 @@ class FirSplineMethod(Method):
             motion = _motion(guide, held, job.toolpath)
         delay = 1e3 * (held.T1 + held.T2)
         return job.plan(
-            job.deliver(job.behind_filters(motion)),
+            job.deliver(motion if self.plain else job.behind_filters(motion)),
             method="fir-spline-plain" if self.plain else "fir-spline",
             corner=corner,
             solver="filters",

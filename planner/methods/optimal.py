@@ -51,6 +51,8 @@ class OptimalMethod(Method):
     solver: JerkLimited = field(default_factory=JerkLimited)
     rounds: int | None = None
 
+    ways = ((0.5, 1.0), (0.1, 1.0))
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):
@@ -77,7 +79,9 @@ class OptimalMethod(Method):
                     break
                 motion = gentler
                 made = job.deliver(motion)
-            if best.solution.multipliers:
+            if (
+                best.solution.multipliers and machine.fir is None
+            ):  # behind filters what a limit costs is not the problem's to say
                 with job.stage("report"):
                     by_site = (
                         (best.shape.laid.place, tube_prices(best, best.shape))
@@ -106,7 +110,7 @@ class OptimalMethod(Method):
             )
         with stages.stage("solve") as report:
             samples = refine_for_jerk(samples, machine)
-            problem = feedrate_problem(samples, machine)
+            problem = feedrate_problem(samples, machine, measured=True)
             return OnPath(
                 path=path, samples=samples, problem=problem, solution=self.solver.solve(problem, report)
             )

@@ -38,6 +38,8 @@ class ToppraMethod(Method):
     corner: str | CornerShape = AUTO
     solver: str | FeedrateSolver = "reachability"
 
+    ways = ((0.5, 1.0), (0.1, 1.0))
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver

@@ -32,7 +32,7 @@ from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.methods.filtered import axes_of, check_profile_filters, reached
-from planner.methods.job import Job, Method
+from planner.methods.job import Job, Method, faster
 from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages
 from planner.path import sample_path
@@ -96,9 +96,17 @@ class FirSplineMethod(Method):
             toolpath = toolpath_from_program(program, machine, whole)
             ends = curve.stations(chords)
             back = ends[1:][toolpath.block[np.flatnonzero(toolpath.joint[1:-1] == Joint.STOP)]]
-            guide = guide_of_curve(curve, machine, feed, whole - chords, ends, back)
         job = Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
-        return self._finish(job, guide, None)
+
+        def within(share: float) -> Plan:
+            with job.stage("geometry"):
+                guide = guide_of_curve(curve, machine, feed, share * (whole - chords), ends, back)
+            return self._finish(job, guide, None)
+
+        best = within(1.0)
+        for share, _ in self.ways if machine.fir is not None else ():
+            best = faster(best, within(share))
+        return best
 
     def _finish(self, job: Job, guide: Guide, corner: str | None) -> Plan:
         with job.stage("solve"):

@@ -170,8 +170,7 @@ class Method(ABC):
         if job.machine.fir is None or not best.solved:
             return best
         for share, seen in self.ways:
-            other = self.plan_job(job.with_share(share, seen))
-            best = other if _better(other, best) else best
+            best = faster(best, self.plan_job(job.with_share(share, seen)))
         return best
 
     @abstractmethod
@@ -179,10 +178,10 @@ class Method(ABC):
         """Plan a program whose path is laid out."""
 
 
-def _better(plan: Plan, best: Plan) -> bool:
-    """It passed where the best so far did not, or is faster."""
-    if plan.trajectory is None or plan.verdict is None or best.trajectory is None or best.verdict is None:
-        return False
-    if plan.verdict.passed != best.verdict.passed:
-        return plan.verdict.passed
-    return plan.trajectory.cycle_time < best.trajectory.cycle_time
+def faster(plan: Plan, other: Plan) -> Plan:
+    """Of two plans the one that passed or, if both did, the faster one; the first if there is no difference."""
+    if plan.trajectory is None or plan.verdict is None or other.trajectory is None or other.verdict is None:
+        return plan
+    if plan.verdict.passed != other.verdict.passed:
+        return plan if plan.verdict.passed else other
+    return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan

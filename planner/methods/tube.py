@@ -52,8 +52,6 @@ class TubeMethod(Method):
     start: OptimalMethod = field(default_factory=lambda: OptimalMethod(corner="bezier"))
     solver: TubeNLP = field(default_factory=TubeNLP)
 
-    ways = ((0.5, 1.0),)
-
     def plan_job(self, job: Job) -> Plan:
         toolpath = job.toolpath
         with job.stage("geometry"):

@@ -27,7 +27,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.pacing import Runs, Timed, TimedT, paced, runs_of
 from planner.verify.filtered import look_behind, motion_asked
-from planner.verify.pieces import Pieces, pieces_of
+from planner.verify.pieces import pieces_of, widened
 
 # Of the tolerance, what measuring at other times may find more [-].
 SPARE = 2e-3
@@ -78,7 +78,7 @@ class Behind:
         self.filters = Filters(machine.fir.time_constants)
         self.tolerance = float(toolpath.tolerance.min())
         self.pieces = pieces_of(toolpath)
-        self._wide = _widened(self.pieces)
+        self._wide = widened(self.pieces, WIDER)
         weights = self.filters.step(self.filters.delay * np.arange(CELLS + 1) / CELLS)
         self._weights = np.diff(weights)
 
@@ -182,13 +182,6 @@ class Behind:
         ends = np.stack([path.start[first], path.end[segment]])
         nearer = np.linalg.norm(ends - position, axis=2).argmin(axis=0)
         return np.where(nearer == 0, path.tolerance[first], path.tolerance[segment + 1])
-
-
-def _widened(pieces: Pieces) -> Pieces:
-    joint, piece = pieces.joint.copy(), pieces.piece.copy()
-    joint["budget"] *= WIDER
-    piece["budget"] *= WIDER
-    return pieces._replace(joint=joint, piece=piece)
 
 
 def rested(behind: Behind, motion: TimedT) -> TimedT:

@@ -7,9 +7,9 @@ parts and corners are cut at all ends of blocks, spans near changes of the feed.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.corners.blend import shape_at
+from planner.kernels import njit
 
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
 ARC_STEP = np.pi / 8

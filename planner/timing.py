@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
 from planner.errors import InputError
+from planner.kernels import njit
 from planner.path import PathSamples
 from planner.search import last_not_after
 from planner.time_law import TimeLaw

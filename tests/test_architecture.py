@@ -17,6 +17,7 @@ LAYERS = (
     "planner.units",
     "planner.errors",
     "planner.arrays",
+    "planner.kernels",
     "planner.search",
     "planner.filters",
     "planner.machine",
@@ -41,9 +42,19 @@ LAYERS = (
     "planner.report",
     "planner.commands",
     "planner.cli",
+    "planner.__main__",
 )
 # The judge sees the path, the machine and the samples, and no code of those it judges.
-VERIFY_MAY_IMPORT = {"units", "errors", "arrays", "machine", "geometry.toolpath", "trajectory", "verify"}
+VERIFY_MAY_IMPORT = {
+    "units",
+    "errors",
+    "arrays",
+    "kernels",
+    "machine",
+    "geometry.toolpath",
+    "trajectory",
+    "verify",
+}
 HEAVY = {"casadi", "matplotlib", "toppra", "numba", "scipy", "pyarrow", "ruckig"}
 
 

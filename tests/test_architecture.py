@@ -17,6 +17,7 @@ LAYERS = (
     "planner.units",
     "planner.errors",
     "planner.arrays",
+    "planner.files",
     "planner.kernels",
     "planner.search",
     "planner.filters",

@@ -57,7 +57,12 @@ def verify(
     recorded_tolerance = read.metadata.get("tolerance_mm")
     if tolerance is None and isinstance(recorded_tolerance, float):
         tolerance = recorded_tolerance
-    unjudged = tuple(read.metadata.get("not_limited", ()) if not_limited is None else not_limited)
+    recorded_free = read.metadata.get("not_limited")
+    unjudged = (
+        tuple(recorded_free if isinstance(recorded_free, list) else ())
+        if not_limited is None
+        else not_limited
+    )
     for name in unjudged:
         if name not in NOT_LIMITED_NAMES:
             raise InputError(

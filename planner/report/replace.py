@@ -54,9 +54,9 @@ _undo: list[Callable[[], object]] = []  # what removes the temporaries of this p
 
 def remove_temporaries() -> None:
     """Remove what is written only in part, before the process ends without unwinding."""
-    while _undo:
+    for step in reversed(_undo):
         with contextlib.suppress(OSError):
-            _undo.pop()()
+            step()
 
 
 @contextlib.contextmanager

@@ -61,8 +61,6 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     def run(*args: Any, **kwargs: Any) -> None:
         try:
             command(*args, **kwargs)
-            if sys.stdout is not None:
-                sys.stdout.flush()
         except InputError as fault:
             say(str(fault), err=True)
             raise typer.Exit(BAD_INPUT) from None
@@ -106,8 +104,12 @@ def say(text: str, *, err: bool = False) -> None:
 
 
 def _write(text: str, *, err: bool = False) -> None:
+    stream = sys.stderr if err else sys.stdout
+    if stream is None:  # closed by the caller: >&-
+        return
     try:
-        typer.echo(text, err=err)
+        stream.write(text + "\n")
+        stream.flush()
     except BrokenPipeError:
         raise
     except OSError as fault:
@@ -134,16 +136,17 @@ def show(*tables: RenderableType) -> None:
     from rich.segment import Segment, Segments
 
     terminal = sys.stdout is not None and sys.stdout.isatty()
-    console: Console = Console() if terminal else Console(width=PIPE_WIDTH)
-    with (
-        console.capture() as captured
-    ):  # rich's own writing ends the process on a broken pipe, with exit code 1
-        for table in tables:
-            rendered = [
-                Segment(printable(text), style, control) for text, style, control in console.render(table)
-            ]
-            console.print(Segments(rendered), end="")
-    lines = captured.get().splitlines()
+    # Into a string, since rich's own writing ends the process on a broken pipe, with exit code 1.
+    console: Console = Console(
+        file=io.StringIO(), force_terminal=terminal, width=None if terminal else PIPE_WIDTH
+    )
+    for table in tables:
+        rendered = [
+            Segment(printable(text), style, control) for text, style, control in console.render(table)
+        ]
+        console.print(Segments(rendered), end="")
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().removesuffix("\n").split("\n")
     _write("\n".join(lines if terminal else [line.rstrip() for line in lines]))
 
 

@@ -206,8 +206,6 @@ def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False)
     file that no comparison wrote, unless `force` is set."""
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
-    if path.parent.exists() and not path.parent.is_dir():
-        raise InputError(f"cannot be written: {path.parent} is no directory", source=str(path))
     check_file(path, inputs, _is_comparison, force=force)
 
 

@@ -153,6 +153,8 @@ def check_file(
     try:
         if path.is_dir():
             raise InputError("cannot be written: is a directory", source=str(path))
+        if path.parent.exists() and not path.parent.is_dir():
+            raise InputError(f"cannot be written: {path.parent} is no directory", source=str(path))
         refuse_inputs([path], inputs)
         if os.path.lexists(path) and not force and not (path.is_file() and written_by_us(path)):
             raise InputError(

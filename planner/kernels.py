@@ -55,7 +55,8 @@ class _Cache:
         try:
             found = self._numba_s.load_overload(signature, context)
         except (OSError, EOFError) as fault:
-            found = self._failed(fault)
+            self._failed(fault)
+            found = None
         if found is None and _told is not None:
             _told(self._kept)
         return found

@@ -58,11 +58,8 @@ def verify(
     if tolerance is None and isinstance(recorded_tolerance, float):
         tolerance = recorded_tolerance
     recorded_free = read.metadata.get("not_limited")
-    unjudged = (
-        tuple(recorded_free if isinstance(recorded_free, list) else ())
-        if not_limited is None
-        else not_limited
-    )
+    recorded_names = recorded_free if isinstance(recorded_free, list) else []
+    unjudged = tuple(recorded_names if not_limited is None else not_limited)
     for name in unjudged:
         if name not in NOT_LIMITED_NAMES:
             raise InputError(

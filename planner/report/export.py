@@ -49,7 +49,7 @@ def write_plan(
 
     force : replace files of these names that no run wrote, too
 
-    What is left out, and why, is among the `notes` of the summary.
+    What is left out, and why, is among the `notes` of the summary, behind those of the plan.
 
     Raises InputError if the directory cannot be written, or if a file stands in the way that no run wrote.
     """
@@ -70,7 +70,13 @@ def write_plan(
             write_figures(plan, new)
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])
-        said = {**summary(plan), "run_id": run_id, "files": names, "sha256": sums, "notes": notes}
+        said = {
+            **summary(plan),
+            "run_id": run_id,
+            "files": names,
+            "sha256": sums,
+            "notes": [*plan.notes, *notes],
+        }
         _write_json(new / SUMMARY, said)
     return names
 
@@ -114,6 +120,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             **optimum_summary(plan.grid, plan.prices),
             "blocks": len(plan.program),
             "grid_points": plan.grid_points,
+            "notes": plan.notes,
             "timings_s": plan.timings,
             "versions": versions(),
         }

@@ -118,6 +118,14 @@ def test_the_verifier_is_independent() -> None:
                 assert short in VERIFY_MAY_IMPORT or short.startswith("verify."), f"{module} imports {name}"
 
 
+def test_kernels_are_made_where_the_cache_may_fail() -> None:
+    for module, file in MODULES.items():
+        made = any(
+            line.startswith(("from numba", "import numba")) for line in file.read_text("utf-8").splitlines()
+        )
+        assert not made, f"{module}: from planner.kernels import njit"
+
+
 @pytest.mark.parametrize(
     "code",
     [

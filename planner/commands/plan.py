@@ -76,10 +76,10 @@ def plan(
     from planner import plan as plan_program
     from planner.report.export import SUMMARY, check_places, summary, write_plan
 
-    form = (file_format or Format.parquet).value
+    form = file_format or Format.parquet
     if output is not None:
         inputs = [job, Path(machine or DEFAULT_MACHINE)]
-        check_places(output, inputs, file_format=form, plots=plot, force=force)
+        check_places(output, inputs, file_format=form.value, plots=plot, force=force)
     with ProgressBar(quiet=quiet) as progress:
         result = plan_program(
             job,
@@ -94,7 +94,7 @@ def plan(
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)
-            written = write_plan(result, output, file_format=form, plots=plot, force=force)
+            written = write_plan(result, output, file_format=form.value, plots=plot, force=force)
 
     said = summary(result)
     if written and output is not None:  # with what was not written, and why

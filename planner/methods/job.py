@@ -25,7 +25,7 @@ from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
 from planner.nc.program import Program
-from planner.timing import MotionInTime, sample_motion
+from planner.timing import MotionInTime, require_samples, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
@@ -186,6 +186,8 @@ class Method(ABC):
         stages = Stages(progress)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
+        # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
+        require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
         return self._fastest(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
 
     def _fastest(self, job: Job) -> Plan:

@@ -116,7 +116,8 @@ class Thinned:
         )
         leg = ~element[meet - 1]
         free = path.legs.length[leg] - path.d_out[leg] - path.d_in[leg + 1]
-        return float((np.maximum(free, 0.0) / np.sqrt(self.solution.feed_sq[meet])).sum())
+        v = np.sqrt(self.solution.feed_sq[meet])
+        return float(np.divide(np.maximum(free, 0.0), v, out=np.zeros(len(v)), where=v > 0.0).sum())
 
 
 def thinned(

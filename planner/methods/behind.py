@@ -25,9 +25,9 @@ from planner.arrays import Array, FloatArray
 from planner.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.methods.pacing import Runs, Timed, paced, runs_of
+from planner.methods.pacing import Runs, Timed, TimedT, paced, runs_of
 from planner.verify.filtered import look_behind, motion_asked
-from planner.verify.pieces import Pieces, pieces_of
+from planner.verify.pieces import pieces_of, widened
 
 # Of the tolerance, what measuring at other times may find more [-].
 SPARE = 2e-3
@@ -36,7 +36,8 @@ WIDER = 16.0
 # The kernel is taken in so many cells where rests are sought [-]; a rest is found to 2^-HALVINGS of Td.
 CELLS, HALVINGS = 128, 10
 STOPS_AT_ONCE = 500  # 5 MB an array
-# At most so many rounds of slowing down; each at least by the first of these factors and at most by the second [-].
+# At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
+# together by up to 240, which leaves 1/57,600 of any filter's error.
 ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5
 FLOOR_STEP = 1.0 / 32.0  # of Td: by so much a rest grows that was too short, twice as much each time again
 # What the path leaves of the tolerance for filters counts as this share at least [-], or the first step would be too large.
@@ -50,11 +51,16 @@ class Places:
     time  : (n,) behind the filters [s]
     ratio : (n,) error over budget [-]
     path  : (n,) what of the ratio is there without filters [-]
+    vertex : (n,) index of the vertex that is missed, -1 for places off the contour
+    near, near_time : (N+1,) of every vertex: error over budget [-], and when the filtered motion is nearest [s]
     """
 
     time: FloatArray
     ratio: FloatArray
     path: FloatArray
+    vertex: Array
+    near: FloatArray
+    near_time: FloatArray
 
     @property
     def less(self) -> FloatArray:
@@ -67,12 +73,12 @@ class Behind:
     """The measuring of motions along one path behind one machine's filters."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine):
+        assert machine.fir is not None
         self.toolpath, self.machine = toolpath, machine
-        self.pieces = pieces_of(toolpath)
-        self._wide = _widened(self.pieces)
-        if machine.fir is None:
-            return  # `errors` of the motion itself can be asked for
         self.filters = Filters(machine.fir.time_constants)
+        self.tolerance = float(toolpath.tolerance.min())
+        self.pieces = pieces_of(toolpath)
+        self._wide = widened(self.pieces, WIDER)
         weights = self.filters.step(self.filters.delay * np.arange(CELLS + 1) / CELLS)
         self._weights = np.diff(weights)
 
@@ -110,10 +116,24 @@ class Behind:
             time=np.concatenate([t, near_time[missed]]),
             ratio=np.concatenate([ratio, near[missed]]),
             path=np.concatenate([path[0][piece], path[1][missed]]),
+            vertex=np.concatenate([np.full(len(t), -1), missed]),
+            near=near,
+            near_time=near_time,
         )
 
+    def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
+        """(n,) True for times at which the filters hold what two runs did: there longer rests help, and nothing else has to."""
+        early, late = self.runs_within(runs_of(motion), time)
+        return early < late
+
+    def runs_within(self, runs: Runs, time: FloatArray) -> tuple[Array, Array]:
+        """First and last of the runs (n,) that the filters hold something of at the times (n,) [s]."""
+        early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
+        late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
+        return np.minimum(early, late), late
+
     def rests(self, motion: Timed, runs: Runs) -> FloatArray:
-        """(G,) the shortest rest behind each run [s] with which the filtered motion comes near enough to the stop; 0 behind the last."""
+        """(G,) the shortest rest [s] behind each run with which the filtered motion comes near enough; 0 behind the last."""
         found = np.zeros(len(runs))
         for low in range(0, len(runs) - 1, STOPS_AT_ONCE):
             stop = np.arange(low, min(low + STOPS_AT_ONCE, len(runs) - 1))
@@ -164,14 +184,14 @@ class Behind:
         return np.where(nearer == 0, path.tolerance[first], path.tolerance[segment + 1])
 
 
-def _widened(pieces: Pieces) -> Pieces:
-    joint, piece = pieces.joint.copy(), pieces.piece.copy()
-    joint["budget"] *= WIDER
-    piece["budget"] *= WIDER
-    return pieces._replace(joint=joint, piece=piece)
+def rested(behind: Behind, motion: TimedT) -> TimedT:
+    """The motion with the shortest rests at its full stops, no run slowed down."""
+    runs = runs_of(motion)
+    gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
+    return paced(motion, runs, np.ones(len(runs)), np.maximum(behind.rests(motion, runs) - gap, 0.0))
 
 
-def kept(motion: Timed, toolpath: Toolpath, machine: Machine) -> Timed:
+def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance; the motion itself for a
     machine without filters."""
     if machine.fir is None:
@@ -184,19 +204,18 @@ def kept(motion: Timed, toolpath: Toolpath, machine: Machine) -> Timed:
     factor, again = np.ones(len(runs)), np.zeros(len(runs))
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
     made = motion
-    for _ in range(ROUNDS):
+    for n in range(ROUNDS):
         slower = paced(motion, runs, factor, np.zeros(len(runs)))
         rest = np.maximum(behind.rests(slower, runs_of(slower)), least)
         made = paced(motion, runs, factor, np.maximum(rest - gap, 0.0))
         places = behind.places(made, path)
         if not len(places.time):
             break
-        now = runs_of(made)
-        early = np.searchsorted(now.end, places.time - delay, side="right")
-        late = np.maximum(np.searchsorted(now.begin, places.time) - 1, 0)
-        early = np.minimum(early, late)
+        early, late = behind.runs_within(runs_of(made), places.time)
         own = early == late
-        more = np.clip(1.0 / np.sqrt(places.less[own]), FACTOR_LEAST, FACTOR_MOST)
+        more = np.clip(
+            1.0 / np.sqrt(places.less[own]), min(FACTOR_LEAST ** (n + 1), FACTOR_MOST), FACTOR_MOST
+        )
         worst = np.ones(len(runs))
         np.maximum.at(worst, late[own], more)
         factor = factor * worst

@@ -60,6 +60,8 @@ class KinematicMethod(Method):
     start_stop: float = 0.0
     short_segment: float = 1.0
 
+    ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
+
     def __post_init__(self) -> None:
         if not 0 <= self.start_stop < np.inf:
             raise InputError(f"start_stop = {self.start_stop} mm/s; it must be finite and not negative")

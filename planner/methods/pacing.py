@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from planner.timing import Motion
 STANDING = 1e-7
 
 Timed = Motion | AxisMotion
+TimedT = TypeVar("TimedT", Motion, AxisMotion)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,7 +74,7 @@ def _rests(motion: AxisMotion) -> Array:
     return still
 
 
-def paced(motion: Timed, runs: Runs, factor: FloatArray, pause: FloatArray) -> Timed:
+def paced(motion: TimedT, runs: Runs, factor: FloatArray, pause: FloatArray) -> TimedT:
     """The motion with every run slowed down by its factor (G,) and so much more rest behind it (G,) [s]; behind the last run none."""
     pause = np.append(pause[:-1], 0.0)
     by = np.ones(len(motion.t))

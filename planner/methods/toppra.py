@@ -5,20 +5,21 @@ The machine's jerk limits are not used: the acceleration steps at grid points. T
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
+from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
-from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
+from planner.methods.creeping import within_filters
 from planner.methods.geometry import AUTO
 from planner.methods.job import Job, Method
 from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.reshape import OnPath
 from planner.methods.second_order import second_order
-from planner.methods.shaped import shaped_plan
 from planner.path import RESOLUTION, sample_path
 from planner.time_law import law_of_solution
 from planner.timing import Motion
@@ -32,39 +33,16 @@ class ToppraMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
-    shaped : deliver set points that leave the machine's vibration modes at rest (methods/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: str | FeedrateSolver = "reachability"
-    shaped: bool = False
 
-    @property
-    def _solver(self) -> FeedrateSolver:
-        return SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
+    ways = ((0.5, 1.0), (0.1, 1.0))
 
     def plan_job(self, job: Job) -> Plan:
-        if self.shaped:
-            return shaped_plan(
-                job,
-                self._best,
-                self._solver.solve,
-                method="toppra",
-                corner=self.corner,
-                not_limited=("jerk",),
-            )
-        best = self._best(job)
-        motion = made = None
-        if best.solution.solved:
-            motion = job.behind_filters(
-                Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
-            )
-            made = job.deliver(motion, not_limited=("jerk",))
-        return plan_of_solution(job, best, motion, made, method="toppra", corner=self.corner)
-
-    def _best(self, job: Job) -> OnPath:
-        """The time-optimal motion of a job, and the path that it is on."""
         machine = job.machine
+        solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
         with job.stage("geometry"):
             shape = corner_shape(self.corner, machine, job.toolpath)
             path = round_corners(job.toolpath, machine, shape)
@@ -73,10 +51,22 @@ class ToppraMethod(Method):
             with job.stage("geometry"):
                 samples = sample_path(path, machine, None if finer == 1.0 else RESOLUTION * finer)
             with job.stage("solve"):
-                if (
-                    self.shaped
-                ):  # limits are tightened in places also on straight stretches, which one interval cannot say
-                    samples = refine_for_jerk(samples, machine)
-                return second_order(path, samples, machine, self._solver)
+                return second_order(path, samples, machine, solver)
 
-        return best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=0)
+        best = best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=0)
+        motion = made = None
+        if best.solution.solved:
+            motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
+
+            def again(planned: OnPath, problem: FeedrateProblem) -> tuple[OnPath, Motion] | None:
+                other = dataclasses.replace(planned, problem=problem, solution=solver.solve(problem))
+                if not other.solution.solved:
+                    return None
+                return other, Motion(
+                    samples=other.samples, law=law_of_solution(other.samples, other.solution)
+                )
+
+            with job.stage("filters"):
+                best, motion = within_filters(best, motion, again, job.real)
+            made = job.deliver(motion, not_limited=("jerk",))
+        return plan_of_solution(job, best, motion, made, method="toppra", corner=self.corner)

@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 
 CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table
 FAULTS_SHOWN = 8
+NOTES_SHOWN = 8
 
 
-def plan_table(plan: Plan) -> Group:
-    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage."""
+def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
+    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage, how it was solved;
+    then the notes (None: the plan's)."""
     corner = f" on {plan.corner} corners" if plan.corner else ""
     title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
     table = _pairs()
@@ -53,7 +55,9 @@ def plan_table(plan: Plan) -> Group:
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
-    return _titled(title, table)
+    table.add_row("solution", plan.sentence)
+    said = plan.notes if notes is None else notes
+    return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
 def verdict_table(verdict: Verdict, title: str) -> Group:
@@ -184,8 +188,8 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
     table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
     table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
     if (after := verdict.after_filters) is not None:
-        table.add_row("contour error after the filters", f"{after.contour_error_mm / MICROMETRE:.3f} µm")
-        table.add_row("corners missed after the filters by", f"{after.vertex_error_mm / MICROMETRE:.3f} µm")
+        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm))
+        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
     for mode in verdict.ringing:
         table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
@@ -251,3 +255,7 @@ def _pairs() -> Table:
 def _titled(title: str, *parts: RenderableType) -> Group:
     # not the table's own title, which is folded to the table's width
     return Group(Text(title, style="bold"), *parts)
+
+
+def _micrometres(error: float | None) -> str:
+    return "not known" if error is None else f"{error / MICROMETRE:.3f} µm"

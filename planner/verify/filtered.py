@@ -20,31 +20,25 @@ a mean never exceeds what it is the mean of. A full stop is a vertex like any ot
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol
 
 import numpy as np
 
 from planner.arrays import Array, FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
 from planner.trajectory import Trajectory
+from planner.verify import contour, findings
 from planner.verify import limits as rows
 from planner.verify.findings import Look
 from planner.verify.matching import follow, new_match
 from planner.verify.pieces import Pieces, kernel, reach
 from planner.verify.stream import Seen
+from planner.verify.times import Motion
+from planner.verify.verdict import AfterFilters
 
 NOTE = "after the filters"
 STEPS_PER_PERIOD, STEPS_PER_FILTER = 4, 8  # of the times at which filters are evaluated (module text)
 CHUNK = 50_000  # times evaluated at once: 5 MB with three axes
-
-
-class Asked(Protocol):
-    """A motion that can be evaluated at ascending times (T,) within [0, end]; `dt` is the trajectory's period [s]."""
-
-    @property
-    def end(self) -> float: ...
-
-    def at(self, times: FloatArray, dt: float) -> Trajectory: ...
-
 
 At = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # times (T,) -> position, velocity (T, A)
 Each = Callable[[FloatArray, FloatArray, Array], None]
@@ -101,7 +95,7 @@ def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray,
     return mean + origin, (x[behind:] - value) / T
 
 
-def motion_asked(motion: Asked, dt: float) -> At:
+def motion_asked(motion: Motion, dt: float) -> At:
     """A motion that can be asked at any time."""
 
     def at(times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -163,7 +157,7 @@ def look_behind(
         if not skip:
             seen.first, seen.t_first = position[0].copy(), float(t[0])
         piece, feed_max = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-        follow(pieces, seen.match, t, position, skip, False, no_limit, piece, feed_max)
+        follow(pieces, seen.match, t, position, skip, False, no_limit, np.zeros(axes), piece, feed_max)
         if each is not None:
             ratio = np.empty(len(t))
             _ratios(pieces, piece, position, ratio)
@@ -172,6 +166,36 @@ def look_behind(
         seen.last, seen.t_last = position[-1].copy(), float(t[-1])
         carried_t, carried = t[-1:], position[-1:]
     return Look(seen, NOTE)
+
+
+def after_filters(
+    trajectory: Trajectory, motion: Motion | None, toolpath: Toolpath, machine: Machine, pieces: Pieces
+) -> AfterFilters | None:
+    """What the machine's filters leave of the tolerance; None for a machine without.
+
+    motion : what the samples were taken from; None for cubics through the samples
+    """
+    if machine.fir is None:
+        return None
+    at = motion_of_samples(trajectory) if motion is None else motion_asked(motion, machine.dt)
+    end, lengths = trajectory.cycle_time if motion is None else motion.end, machine.fir.time_constants
+
+    def read(pieces: Pieces) -> list[Look]:
+        return [look_behind(at, end, lengths, machine.dt, pieces)]
+
+    looks = read(pieces)
+    apart = contour.apart(looks, pieces, read)
+    check = apart.contour_check(toolpath)
+    faults = [check.sentence(toolpath.axes)] if check.broken else []
+    faults += apart.vertex_faults(toolpath)
+    faults += findings.order(looks, toolpath, pieces)[2]
+    return AfterFilters(
+        contour=check,
+        vertex=apart.vertex_check(toolpath),
+        contour_error_mm=apart.contour_error(),
+        vertex_error_mm=apart.vertex_error(),
+        faults=tuple(faults),
+    )
 
 
 @kernel()

@@ -55,9 +55,11 @@ def plan_table(plan: Plan) -> Group:
     return _titled(title, table)
 
 
-def verdict_table(verdict: Verdict, title: str) -> Group:
-    """A verdict by itself."""
+def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
+    """A verdict by itself; before it what was asked, name and text."""
     table = _pairs()
+    for name, text in (asked or {}).items():
+        table.add_row(name, text)
     _add_verdict(table, verdict)
     return _titled(title, table)
 
@@ -180,8 +182,8 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         )
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
-    table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
-    table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
+    table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
     if verdict.passed:
         table.add_row("verdict", Text("passed", style="green"))
@@ -189,6 +191,13 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
     table.add_row("verdict", Text("FAILED", style="bold red"))
     for fault in _first(verdict.faults, FAULTS_SHOWN):
         table.add_row("", Text(fault))
+
+
+def _micrometres(distance: float | None, verdict: Verdict) -> str:
+    """A distance [mm], or why it is not known."""
+    if distance is None:
+        return f"not known: lost after line {verdict.lost_after}" if verdict.lost_after else "not known"
+    return f"{distance / MICROMETRE:.3f} µm"
 
 
 def _by_quantity(verdict: Verdict) -> dict[str, list]:

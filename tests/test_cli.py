@@ -168,8 +168,20 @@ def test_verify_takes_the_recorded_machine(job: Path, tmp_path: Path) -> None:
     said = json.loads(result.stdout)
     assert said["machine"] == "router"
     assert said["contour_error_mm"] < 1e-9
-    assert said["notes"] == []
-    assert run("verify", path, job, "-m", "mill").exit_code == 0
+    assert said["tolerance_mm"] == 0.01
+    assert said["cycle_time_s"] == 6.0
+    assert said["notes"] == [
+        "the file says: machine router (taken)",
+        "the file says: tolerance 0.01 mm (taken)",
+    ]
+    other = run("verify", path, job, "-m", "mill")
+    assert other.exit_code == 0
+    assert "the file says: tolerance 0.01 mm (not taken, -m or --tolerance is given)" in other.stderr
+    assert ["tolerance", f"{load_machine('mill').tolerance:g}", "mm"] in [
+        row.split() for row in other.stdout.splitlines()
+    ]
+    assert ["cycle", "time", "6.0000", "s"] in [row.split() for row in other.stdout.splitlines()]
+    assert json.loads(run("verify", path, job, "--tolerance", "0.5", "--json").stdout)["tolerance_mm"] == 0.5
     unknown = run("verify", path, job, "--not-limited", "yerk")
     assert unknown.exit_code == 2
     assert "jerk" in unknown.stderr

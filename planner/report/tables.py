@@ -60,9 +60,11 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
-def verdict_table(verdict: Verdict, title: str) -> Group:
-    """A verdict by itself."""
+def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
+    """A verdict by itself; before it what was asked, name and text."""
     table = _pairs()
+    for name, text in (asked or {}).items():
+        table.add_row(name, text)
     _add_verdict(table, verdict)
     return _titled(title, table)
 
@@ -185,11 +187,11 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         )
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
-    table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
-    table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
+    table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
     if (after := verdict.after_filters) is not None:
-        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm))
-        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm))
+        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))
+        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm, verdict))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
     for mode in verdict.ringing:
         table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
@@ -211,6 +213,13 @@ def _ringing_text(mode: Ringing) -> str:
         )
 
     return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
+
+
+def _micrometres(distance: float | None, verdict: Verdict) -> str:
+    """A distance [mm], or why it is not known."""
+    if distance is None:
+        return f"not known: lost after line {verdict.lost_after}" if verdict.lost_after else "not known"
+    return f"{distance / MICROMETRE:.3f} µm"
 
 
 def _by_quantity(verdict: Verdict) -> dict[str, list]:
@@ -255,7 +264,3 @@ def _pairs() -> Table:
 def _titled(title: str, *parts: RenderableType) -> Group:
     # not the table's own title, which is folded to the table's width
     return Group(Text(title, style="bold"), *parts)
-
-
-def _micrometres(error: float | None) -> str:
-    return "not known" if error is None else f"{error / MICROMETRE:.3f} µm"

@@ -41,7 +41,7 @@ def verify(
     from planner.geometry.build import toolpath_from_program
     from planner.machine import load_machine, machine_from_dict
     from planner.nc.reader import read_program
-    from planner.report.export import verdict_summary
+    from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
     from planner.report.trajectory_file import read_trajectory
     from planner.verify import verify as judge
@@ -73,7 +73,15 @@ def verify(
         )
     if as_json:
         typer.echo(
-            json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2)
+            json.dumps(
+                {
+                    **verdict_summary(verdict),
+                    "corners": corner_summary(verdict.corners),
+                    "machine": limits.name,
+                    "notes": read.notes,
+                },
+                indent=2,
+            )
         )
     else:
         for note in read.notes:

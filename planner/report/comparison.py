@@ -44,6 +44,8 @@ class Row:
     worst         : by quantity: worst ratio to its limit and which of the limits that is ("jerk.y")
     free          : quantities that this method does not limit
     contour_error, vertex_error : [mm]
+    corner_ratio  : the largest of eq. 18-19 at the programmed corners, None without corners
+    gain          : median speed there over eq. 20 of the paper's corner, None where that says nothing
     planning_time : computing time without reading, sampling and verification [s]
     summary       : the plan's `summary.json`
     """
@@ -56,6 +58,8 @@ class Row:
     free: tuple[str, ...] = ()
     contour_error: float | None = None
     vertex_error: float | None = None
+    corner_ratio: float | None = None
+    gain: float | None = None
     planning_time: float | None = None
     summary: dict[str, Any] | None = None
 
@@ -85,6 +89,8 @@ def row_of_plan(method: str, plan: Plan) -> Row:
         free=tuple(verdict_summary(verdict)["not_limited"]),
         contour_error=verdict.contour_error_mm,
         vertex_error=verdict.vertex_error_mm,
+        corner_ratio=_known(verdict.corners.worst_ratio),
+        gain=_known(verdict.corners.gains()[0]),
         planning_time=planning,
         summary=summary(plan),
     )
@@ -114,7 +120,7 @@ def comparison_table(rows: list[Row], title: str) -> Group:
         *(f"{q.replace('_', chr(10), 1)}\n/ limit" for q in shown),
     ):
         table.add_column(name, justify="right", no_wrap=True)
-    for name in ("contour\nµm", "corners\nµm", "planning\ns"):
+    for name in ("contour\nµm", "corners\nµm", "eq. 18-19\nat most", "over\neq. 20", "planning\ns"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     said = []
@@ -126,6 +132,8 @@ def comparison_table(rows: list[Row], title: str) -> Group:
             *(_worst(row, quantity) for quantity in shown),
             _number(row.contour_error, ".4g", MICROMETRE),
             _number(row.vertex_error, ".4g", MICROMETRE),
+            "-" if row.corner_ratio is None else ratio_text(row.corner_ratio),
+            _number(row.gain, ".3f"),
             _number(row.planning_time, ".3f"),
             Text(row.outcome, style="green" if row.passed else "bold red"),
         )
@@ -156,6 +164,8 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
                 "not_limited": list(row.free),
                 "contour_error_mm": row.contour_error,
                 "vertex_error_mm": row.vertex_error,
+                "corner_ratio": row.corner_ratio,
+                "gain": row.gain,
                 "planning_time_s": row.planning_time,
                 "summary": row.summary,
             }
@@ -171,12 +181,14 @@ def comparison_csv(rows: list[Row]) -> str:
     write = csv.writer(out, lineterminator="\n")
     limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
     head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
-    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "planning_time_s", "sentence"]
+    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain"]
+    tail += ["planning_time_s", "sentence"]
     write.writerow([*head, *limits, *tail])
     for row in rows:
         worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
         first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
-        last = [" ".join(row.free), row.contour_error, row.vertex_error, row.planning_time, row.sentence]
+        last = [" ".join(row.free), row.contour_error, row.vertex_error, row.corner_ratio, row.gain]
+        last += [row.planning_time, row.sentence]
         write.writerow([*first, *worst, *last])
     return out.getvalue()
 
@@ -224,6 +236,10 @@ def _worst(row: Row, quantity: str) -> str:
     ratio, name = row.worst[quantity]
     text = f"{ratio_text(ratio)} {name.partition('.')[2]}".rstrip()
     return f"({text})" if quantity in row.free else text
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _number(value: float | None, form: str, unit: float = 1.0) -> str:

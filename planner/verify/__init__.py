@@ -7,13 +7,17 @@ path, no constraint, no solver. What it checks, and how sharp each check is:
                   delivered positions
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
     pieces.py     the programmed path, laid out for the matching
+    error_allocation.py
+                  eq. 18-20 at every programmed corner, on the motion's own curvature
+    corners.py    the record of that
     verdict.py    the records that come out
     judge.py      `verify` itself
 
 The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are never looked at.
 """
 
+from planner.verify.corners import CornerCheck
 from planner.verify.judge import verify
 from planner.verify.verdict import LimitCheck, Verdict
 
-__all__ = ["LimitCheck", "Verdict", "verify"]
+__all__ = ["CornerCheck", "LimitCheck", "Verdict", "verify"]

@@ -10,7 +10,7 @@ from planner.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
-from planner.verify import findings
+from planner.verify import error_allocation, findings
 from planner.verify.dense import PERIOD_ROUNDING, Comparison
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.pieces import pieces_of
@@ -73,11 +73,20 @@ def verify(
     faults += findings.vertex_faults(looks, toolpath, pieces)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    corners = error_allocation.check_corners(
+        trajectory,
+        looks[0].seen.match.passed[pieces.joint["real"]],
+        toolpath,
+        machine,
+        judged="acceleration" not in not_limited,
+    )
+    faults += error_allocation.faults(corners, toolpath.axes)
     return Verdict(
         passed=not faults,
         limits=checks,
         contour=contour,
         vertex=vertex,
+        corners=corners,
         contour_error_mm=findings.contour_error(looks),
         vertex_error_mm=findings.vertex_error(looks, pieces),
         end_error_mm=end_error,

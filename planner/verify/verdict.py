@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.arrays import FloatArray, freeze
+from planner.verify.corners import CornerCheck
 from planner.verify.pieces import RATIO_ROUNDING
 
 
@@ -59,6 +60,7 @@ class Verdict:
     limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
     contour          : the motion's worst distance from the path, against the budget of the segment there
     vertex           : the worst distance of a programmed vertex from the motion, against the joint's budget
+    corners          : eq. 18-20 at the programmed corners
     contour_error_mm : largest distance of the motion (samples, their chords, dense positions) from the path [mm]
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]
     end_error_mm     : distance of the first or last sample from the program's start or end, the larger [mm]
@@ -73,6 +75,7 @@ class Verdict:
     limits: dict[str, LimitCheck]
     contour: LimitCheck
     vertex: LimitCheck
+    corners: CornerCheck
     contour_error_mm: float
     vertex_error_mm: float
     end_error_mm: float

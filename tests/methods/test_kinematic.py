@@ -44,7 +44,7 @@ def test_it_is_verified_within_eps_and_faster_than_stopping(planned):
     assert verdict.contour_error_mm <= 0.05
     assert verdict.vertex_error_mm <= 0.05
     assert planned.trajectory.cycle_time < planned.stop_time
-    assert planned.corners.worst_ratio() <= 1 + 1e-9
+    assert planned.rounded.worst_ratio() <= 1 + 1e-9
 
 
 def test_some_limit_is_reached(planned):
@@ -271,7 +271,7 @@ def test_it_has_a_name_and_reports_its_corners():
     made = plan(JOBS["pentagon"], MACHINE, method="kinematic")
     assert made.method == "kinematic"
     assert made.corner == "kinematic"
-    corners = made.corners
+    corners = made.rounded
     assert len(corners) == 4
     np.testing.assert_allclose(np.rad2deg(corners.theta), 72.0)
     assert set(corners.limited_by) <= {"tolerance", "leg length", "look-ahead", "feed"}

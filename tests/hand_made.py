@@ -66,6 +66,7 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         vertex_error_mm=0.02,
         end_error_mm=0.0,
         corners=make_corners(turns=turns),
+        ringing=(),
         faults=()
         if passed
         else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),

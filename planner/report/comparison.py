@@ -19,6 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.errors import InputError
+from planner.machine import LINEAR_AXES
 from planner.report.export import summary, verdict_summary, versions
 from planner.report.replace import replacing_file
 from planner.report.tables import ratio_text
@@ -27,6 +28,7 @@ from planner.units import MICROMETRE
 if TYPE_CHECKING:
     from planner.machine import Machine
     from planner.methods.plan import Plan
+    from planner.verify import Verdict
 
 SUFFIXES = (".json", ".csv")
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
@@ -46,6 +48,7 @@ class Row:
     contour_error, vertex_error : [mm]
     corner_ratio  : the largest of eq. 18-19 at the programmed corners, None without corners
     gain          : median speed there over eq. 20 of the paper's corner, None where that says nothing
+    ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
     planning_time : computing time without reading, sampling and verification [s]
     summary       : the plan's `summary.json`
     """
@@ -60,6 +63,7 @@ class Row:
     vertex_error: float | None = None
     corner_ratio: float | None = None
     gain: float | None = None
+    ringing: float | None = None
     planning_time: float | None = None
     summary: dict[str, Any] | None = None
 
@@ -91,9 +95,20 @@ def row_of_plan(method: str, plan: Plan) -> Row:
         vertex_error=verdict.vertex_error_mm,
         corner_ratio=_known(verdict.corners.worst_ratio),
         gain=_known(verdict.corners.gains()[0]),
+        ringing=_ringing(verdict),
         planning_time=planning,
         summary=summary(plan),
     )
+
+
+def _ringing(verdict: Verdict) -> float | None:
+    after = [
+        amplitude
+        for mode in verdict.ringing
+        for axis, amplitude in zip(mode.axes, mode.after, strict=True)
+        if axis in LINEAR_AXES
+    ]
+    return float(max(after)) if after else None
 
 
 def refused(method: str, fault: Exception) -> Row:
@@ -120,7 +135,9 @@ def comparison_table(rows: list[Row], title: str) -> Group:
         *(f"{q.replace('_', chr(10), 1)}\n/ limit" for q in shown),
     ):
         table.add_column(name, justify="right", no_wrap=True)
-    for name in ("contour\nµm", "corners\nµm", "eq. 18-19\nat most", "over\neq. 20", "planning\ns"):
+    rings = any(row.ringing is not None for row in rows)
+    law = ("eq. 18-19\nat most", "over\neq. 20")
+    for name in ("contour\nµm", "corners\nµm", *law, *(["rings\nµm"] if rings else []), "planning\ns"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     said = []
@@ -134,6 +151,7 @@ def comparison_table(rows: list[Row], title: str) -> Group:
             _number(row.vertex_error, ".4g", MICROMETRE),
             "-" if row.corner_ratio is None else ratio_text(row.corner_ratio),
             _number(row.gain, ".3f"),
+            *([_number(row.ringing, ".4g", MICROMETRE)] if rings else []),
             _number(row.planning_time, ".3f"),
             Text(row.outcome, style="green" if row.passed else "bold red"),
         )
@@ -166,6 +184,7 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
                 "vertex_error_mm": row.vertex_error,
                 "corner_ratio": row.corner_ratio,
                 "gain": row.gain,
+                "ringing_mm": row.ringing,
                 "planning_time_s": row.planning_time,
                 "summary": row.summary,
             }
@@ -181,14 +200,14 @@ def comparison_csv(rows: list[Row]) -> str:
     write = csv.writer(out, lineterminator="\n")
     limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
     head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
-    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain"]
+    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain", "ringing_mm"]
     tail += ["planning_time_s", "sentence"]
     write.writerow([*head, *limits, *tail])
     for row in rows:
         worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
         first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
-        last = [" ".join(row.free), row.contour_error, row.vertex_error, row.corner_ratio, row.gain]
-        last += [row.planning_time, row.sentence]
+        errors = [row.contour_error, row.vertex_error, row.corner_ratio, row.gain, row.ringing]
+        last = [" ".join(row.free), *errors, row.planning_time, row.sentence]
         write.writerow([*first, *worst, *last])
     return out.getvalue()
 

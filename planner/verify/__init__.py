@@ -10,6 +10,7 @@ path, no constraint, no solver. What it checks, and how sharp each check is:
     error_allocation.py
                   eq. 18-20 at every programmed corner, on the motion's own curvature
     corners.py    the record of that
+    ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
     judge.py      `verify` itself
 
@@ -18,6 +19,7 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 
 from planner.verify.corners import CornerCheck
 from planner.verify.judge import verify
+from planner.verify.ringing import Ringing
 from planner.verify.verdict import LimitCheck, Verdict
 
-__all__ = ["CornerCheck", "LimitCheck", "Verdict", "verify"]
+__all__ = ["CornerCheck", "LimitCheck", "Ringing", "Verdict", "verify"]

@@ -20,7 +20,7 @@ from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
 from planner.nc.program import Program
-from planner.timing import MotionInTime, dense_motion, sample_motion
+from planner.timing import MotionInTime, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
@@ -50,8 +50,11 @@ class Job:
         times = rest_to_rest_times(self.toolpath.length, *block_limits(self.toolpath, self.machine))
         return float(times.sum() + np.sum(self.toolpath.dwell))
 
-    def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
-        """Sample a motion at the interpolation period and have it judged, between the samples too."""
+    def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
+        """Sample a motion at the interpolation period and have it judged, between the samples too.
+
+        seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
+        """
         with self.stage("sample"):
             trajectory = sample_motion(motion, self.machine.dt)
         with self.stage("verify") as progress:
@@ -59,7 +62,8 @@ class Job:
                 trajectory,
                 self.toolpath,
                 self.machine,
-                dense=dense_motion(motion, self.machine.dt),
+                motion=motion,
+                seed=seed,
                 not_limited=not_limited,
                 progress=progress,
             )

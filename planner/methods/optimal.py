@@ -69,7 +69,7 @@ class OptimalMethod(Method):
                 if gentler is None:
                     break
                 motion = gentler
-                made = job.deliver(motion)
+                made = job.deliver(motion, seed=again + 1)  # times from which nothing was fed back
             if best.solution.multipliers:
                 with job.stage("report"):
                     by_site = (

@@ -162,7 +162,7 @@ def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
 def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion | None:
     """The motion slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing: the verifier looks
     between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done; `again` counts
-    the times before."""
+    the times before. The slower motion needs a verdict at other times."""
     limited = [check for check in verdict.limits.values() if check.limited]
     over = [check for check in limited if check.broken]
     if not over or max(check.ratio for check in limited) > 1.0 + SEEN_EXCESS_MAX:

@@ -1,8 +1,10 @@
 """Judging a delivered motion by other code than that which made it.
 
-`verify` sees the programmed path, the machine and the delivered samples, and nothing else of the package: no sampling of the
-path, no constraint, no solver. What it checks, and how sharp each check is:
+`verify` sees the programmed path, the machine, the delivered samples and, between them, the motion they were taken from, at times
+that it chooses itself; and nothing else of the package: no sampling of the path, no constraint, no solver. What it checks, and how
+sharp each check is:
 
+    times.py      where it looks between the samples
     limits.py     velocity, acceleration, jerk per axis, feed, normal acceleration: on the columns and on differences of the
                   delivered positions
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from planner.verify.findings import QUANTITIES, Look
 from planner.verify.pieces import pieces_of
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
+from planner.verify.times import Motion, look
 from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
@@ -26,7 +27,8 @@ def verify(
     toolpath: Toolpath,
     machine: Machine,
     *,
-    dense: Iterable[Trajectory] | None = None,
+    motion: Motion | None = None,
+    seed: int = 0,
     not_limited: tuple[str, ...] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Verdict:
@@ -34,8 +36,9 @@ def verify(
 
     trajectory  : the delivered samples at dt; only its times, positions and their derivatives are looked at
     toolpath    : the programmed path (lines, arcs, helices) with feeds, budgets and stops
-    dense       : the same motion evaluated between the samples too: chunks in order, adjoining or overlapping; None to
-                  judge the samples alone
+    motion      : what the samples were taken from, to be looked at between them, at times that are chosen here (times.py); None
+                  to judge the samples alone
+    seed        : of those times; a motion that was changed by what one verdict saw needs a verdict with another seed
     not_limited : quantities that are reported but not part of passing, of `NOT_LIMITED_NAMES`
     progress    : called now and then with the share that is done, 0 to 1
 
@@ -45,7 +48,7 @@ def verify(
     _check_input(trajectory, toolpath, not_limited)
     pieces = pieces_of(toolpath)
     limits = _limits(machine, toolpath, not_limited)
-    share = 0.5 if dense is not None else 1.0
+    share = 0.5 if motion is not None else 1.0
 
     def delivered_done(samples: int) -> None:
         if progress:
@@ -53,9 +56,12 @@ def verify(
 
     looks = [Look(watch([trajectory], pieces, limits, middles=True, progress=delivered_done), "")]
     faults = _sampling_faults(trajectory)
-    if dense is not None:
-        comparison = Comparison(trajectory, lambda done: progress(0.5 + 0.5 * done) if progress else None)
-        seen = watch(comparison.pass_on(dense), pieces, limits, middles=False, progress=lambda samples: None)
+    if motion is not None:
+        comparison = Comparison(
+            trajectory, motion.end, lambda done: progress(0.5 + 0.5 * done) if progress else None
+        )
+        chunks = comparison.pass_on(look(motion, machine.dt, seed))
+        seen = watch(chunks, pieces, limits, middles=False, progress=lambda samples: None)
         if seen.samples:
             looks.append(Look(seen, "between the samples"))
         faults += comparison.faults(limits, looks)

@@ -151,17 +151,20 @@ class CornerCheck:
         said = f"eq. 18-20 hold at {self.held:,} of {len(self):,} corners"
         if self.count:
             said += f", at most {_ratio(self.worst_ratio)}"
-        said += f"; {self._gain_sentence()}" if self.count else ""
-        stops = int(self.stands.sum())
+        stops, compared = int(self.stands.sum()), int(self.compared.sum())
+        if compared:
+            of = (
+                ""
+                if compared == len(self)
+                else f" of the {compared:,} run through where it lies below the feed"
+            )
+            said += (
+                f"; passed {self.gains()[0]:.2f} times as fast as eq. 20 lets the paper's corner (median{of})"
+            )
+        elif stops < self.count:
+            said += "; eq. 20 lies above the programmed feed wherever one is run through"
         said += f"; {stops:,} stopped at" if stops else ""
         return said + (f"; {self.not_looked_at:,} could not be looked at" if self.not_looked_at else "")
-
-    def _gain_sentence(self) -> str:
-        compared = int(self.compared.sum())
-        if not compared:
-            return "none is run through where eq. 20 lies below the programmed feed"
-        of = "" if compared == len(self) else f" of the {compared:,} run through where it lies below the feed"
-        return f"passed {self.gains()[0]:.2f} times as fast as eq. 20 lets the paper's corner (median{of})"
 
 
 def _ratio(value: float) -> str:

@@ -36,8 +36,8 @@ it. It is no bound: other shapes within eps may be faster, and dense programs ne
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -47,8 +47,7 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
 from planner.verify.limits import FEED_AT_REST
-
-At = Callable[[FloatArray], Trajectory]  # the motion at ascending times [s]
+from planner.verify.times import Motion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
@@ -72,35 +71,34 @@ class _Reading:
 
 def check_corners(
     trajectory: Trajectory,
-    near: Array,
+    near: list[Array],
     toolpath: Toolpath,
     machine: Machine,
     *,
-    at: At | None = None,
-    near_dense: Array | None = None,
+    motion: Motion | None = None,
     judged: bool = True,
 ) -> CornerCheck:
     """Hold the motion against eq. (18)-(20) at every corner of the program.
 
-    near       : (M+1,) `matching.PASSED` of the delivered samples at the toolpath's joints: how near their chords come, and when
-    at         : the motion at any times; None to look at the samples alone
-    near_dense : the same as `near`, of the motion between the samples; None to start from `near`
-    judged     : False if the limit of acceleration is reported only
+    near   : (M+1,) `matching.PASSED` at the toolpath's joints, how near the motion comes and when: by the chords of the samples, and,
+             where there is a motion, by a look between them
+    motion : what the samples were taken from; None to look at the samples alone
+    judged : False if the limit of acceleration is reported only
 
     A corner is not looked at where the motion never came, and where there are samples alone so far apart that the axes could bow by
     more than eps between them.
     """
     corner = np.flatnonzero(toolpath.joint == Joint.CORNER)
     vertex, eps = toolpath.start[corner], toolpath.tolerance[corner]
-    seen = np.isfinite(near["near"][corner])
-    samples, period = _nearest_sample(trajectory, near["near_time"][corner], vertex, machine)
-    looked = seen & ((at is not None) | (_bow(machine, toolpath.axes, period) <= eps))
-    reading, speed_ratio = samples, samples.speed_ratio
-    miss, chord = near["near"][corner], np.zeros(len(corner))
-    budget_ratio = miss / eps
-    if at is not None and len(corner):
-        start = (near if near_dense is None else near_dense)["near_time"][corner]
-        reading = _nearest_point(at, start, trajectory.dt, vertex, machine)
+    miss, time = near[0]["near"][corner], near[0]["near_time"][corner]
+    reading, period = _nearest_sample(trajectory, time, vertex, machine)
+    chord, budget_ratio, speed_ratio = np.zeros(len(corner)), miss / eps, reading.speed_ratio
+    looked = np.isfinite(miss)
+    if motion is None or not len(corner):
+        looked &= _bow(machine, toolpath.axes, period) <= eps
+    else:
+        looked &= np.isfinite(near[1]["near"][corner])
+        reading = _nearest_point(motion, near[1]["near_time"][corner], trajectory.dt, vertex, machine)
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
         miss, chord = reading.distance, reading.normal * trajectory.dt**2 / 8.0
         budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
@@ -155,8 +153,8 @@ def _too_fast(check: CornerCheck, k: int) -> str:
 
 def _overdrawn(check: CornerCheck, k: int) -> str:
     return (
-        f"eq. 18: missed by {check.miss[k]:.6g} mm and {check.chord_error[k]:.3g} mm of chord error, "
-        f"{check.budget_ratio[k]:.7g} of the budget {check.budget[k]:.6g} mm"
+        f"eq. 18: missed by {check.budget_ratio[k] * check.budget[k]:.7g} mm with the chord error, {check.budget_ratio[k]:.7g} "
+        f"of the budget {check.budget[k]:.6g} mm"
     )
 
 
@@ -173,20 +171,20 @@ def _nearest_sample(
     return there, trajectory.t[after] - trajectory.t[before]
 
 
-def _nearest_point(at: At, start: FloatArray, reach: float, vertex: FloatArray, machine: Machine) -> _Reading:
-    """The motion's nearest point to each vertex, at most `reach` [s] from the time `start`: Newton's method on (p - P).p' = 0."""
-    time, best = start, None
+def _nearest_point(
+    motion: Motion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
+) -> _Reading:
+    """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method on (p - P).p' = 0."""
+    time, readings = start, []
     for _ in range(NEAREST_STEPS + 1):
-        unique, row = np.unique(time, return_inverse=True)
-        motion = at(unique)
-        off, velocity = motion.position[row] - vertex, motion.velocity[row]
-        here = _read(motion, row, np.linalg.norm(off, axis=1), machine)
-        best = here if best is None else _nearer(here, best)
-        slope = (velocity**2).sum(axis=1) + (off * motion.acceleration[row]).sum(axis=1)
-        step = np.divide((off * velocity).sum(axis=1), slope, out=np.zeros_like(time), where=slope > 0)
-        time = np.clip(time - step, start - reach, start + reach)
-    assert best is not None
-    return best
+        unique, row = np.unique(np.clip(time, 0.0, motion.end), return_inverse=True)
+        there = motion.at(unique, period)
+        off, velocity = there.position[row] - vertex, there.velocity[row]
+        readings.append(_read(there, row, np.linalg.norm(off, axis=1), machine))
+        slope = (velocity**2).sum(axis=1) + (off * there.acceleration[row]).sum(axis=1)
+        change = np.divide((off * velocity).sum(axis=1), slope, out=np.zeros_like(time), where=slope > 0)
+        time = np.clip(time - change, start - period, start + period)
+    return reduce(_nearer, readings)
 
 
 def _nearer(a: _Reading, b: _Reading) -> _Reading:

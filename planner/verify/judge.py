@@ -82,9 +82,10 @@ def verify(
     faults += findings.stop_faults(looks, toolpath, pieces)
     corners = error_allocation.check_corners(
         trajectory,
-        looks[0].seen.match.passed[pieces.joint["real"]],
+        [look.seen.match.passed[pieces.joint["real"]] for look in looks],
         toolpath,
         machine,
+        motion=motion if len(looks) > 1 else None,
         judged="acceleration" not in not_limited,
     )
     faults += error_allocation.faults(corners, toolpath.axes)

@@ -47,6 +47,7 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
 from planner.verify.limits import FEED_AT_REST
+from planner.verify.matching import NEAR_MISS
 from planner.verify.times import Motion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
@@ -85,19 +86,19 @@ def check_corners(
     motion : what the samples were taken from; None to look at the samples alone
     judged : False if the limit of acceleration is reported only
 
-    A corner is not looked at where the motion never came, and where there are samples alone so far apart that the axes could bow by
-    more than eps between them.
+    A corner is not looked at where the motion misses it by so much that its place on the path is not known (`NEAR_MISS`; then `order`
+    or `vertex` says so), and where there are samples alone so far apart that the axes could bow by more than eps between them.
     """
     corner = np.flatnonzero(toolpath.joint == Joint.CORNER)
     vertex, eps = toolpath.start[corner], toolpath.tolerance[corner]
     miss, time = near[0]["near"][corner], near[0]["near_time"][corner]
     reading, period = _nearest_sample(trajectory, time, vertex, machine)
     chord, budget_ratio, speed_ratio = np.zeros(len(corner)), miss / eps, reading.speed_ratio
-    looked = np.isfinite(miss)
+    looked = miss <= NEAR_MISS * eps
     if motion is None or not len(corner):
         looked &= _bow(machine, toolpath.axes, period) <= eps
     else:
-        looked &= np.isfinite(near[1]["near"][corner])
+        looked &= near[1]["near"][corner] <= NEAR_MISS * eps
         reading = _nearest_point(motion, near[1]["near_time"][corner], trajectory.dt, vertex, machine)
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
         miss, chord = reading.distance, reading.normal * trajectory.dt**2 / 8.0

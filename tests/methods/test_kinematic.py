@@ -283,6 +283,23 @@ def test_it_has_a_name_and_reports_its_corners():
         assert np.linalg.norm(t.velocity[near]) == pytest.approx(corners.feed_planned[k], rel=0.05)
 
 
+@pytest.mark.parametrize(("normal", "dt"), [(None, 1e-4), (1500.0, 1e-4), (None, 4e-3)])
+def test_the_closed_form_is_that_of_the_motion_s_own_curvature(normal, dt):
+    """sqrt(X/kappa), X = min(A, (eps - eps_ap)/(dt^2/8)), with kappa and eps_ap measured on the motion at its nearest point."""
+    machine = problems.machine(normal_acceleration=normal, dt=dt)
+    made = kinematic(JOBS["pentagon"], machine)
+    found, n = made.corners, made.toolpath.tangent_start[1:] - made.toolpath.tangent_end[:-1]
+    assert len(made.rounded) == len(found) == 4
+    most = np.minimum(
+        np.abs(n) @ machine.limits("acceleration", made.toolpath.axes) / np.linalg.norm(n, axis=1),
+        normal or np.inf,
+    )
+    kappa = found.chord_error / (dt**2 / 8) / found.feed_planned**2
+    expected = np.sqrt(np.minimum(most, (0.05 - found.miss) / (dt**2 / 8)) / kappa)
+    np.testing.assert_allclose(made.rounded.feed_closed_form, expected, rtol=1e-4)
+    np.testing.assert_allclose(made.rounded.feed_planned, found.feed_planned, rtol=1e-5)
+
+
 def test_samples_on_both_sides_of_a_stop_do_not_cut_its_vertex():
     """With a dt^2/8 = 8 um and a tolerance of 1 um accelerations are lowered, or it would depend on where the samples fall."""
     machine = problems.machine(dt=0.004, acceleration=4000.0, tolerance=1e-3)

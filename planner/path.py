@@ -43,8 +43,6 @@ MANY_CORNERS, COARSE_RESOLUTION = 50_000, 1e-2
 ARC_PERIOD = 0.5
 # ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
 REST_PERIOD = 0.25
-# Lower feeds hold along splines so many tolerances beyond their blocks [-].
-NEAR = 2.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -135,6 +133,7 @@ def sample_path(
         *table,
         path.legs.first,
         path.legs.place,
+        path.passed,
         path.d_in,
         path.d_out,
         path.d > 0.0,
@@ -143,7 +142,6 @@ def sample_path(
         path.run,
         path.spline.first,
         path.toolpath.feed,
-        NEAR * float(path.toolpath.tolerance.max()),
         velocity,
         acceleration,
         longest,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,9 +13,11 @@ import numpy as np
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.passing import segments_at
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.closed_form import CornerTable
+from planner.methods.notes import job_notes
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
@@ -33,16 +35,22 @@ class Job:
 
     toolpath : the program's exact path, with its tolerances
     stages   : the clock
+    noted    : what the method has said of what it gave up (`note`)
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
+    noted: list[str] = field(default_factory=list)
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
         return self.stages.stage(name)
+
+    def note(self, *sentences: str) -> None:
+        """Add to the notes of the plan: what was given up, with its first line and how often."""
+        self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
 
     @cached_property
     def stop_time(self) -> float:
@@ -56,7 +64,7 @@ class Job:
         seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
         """
         with self.stage("sample"):
-            trajectory = sample_motion(motion, self.machine.dt)
+            trajectory = self._named(sample_motion(motion, self.machine.dt))
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
@@ -68,6 +76,17 @@ class Job:
                 progress=progress,
             )
         return trajectory, verdict
+
+    def _named(self, trajectory: Trajectory) -> Trajectory:
+        """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
+        method's own blocks and a note."""
+        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
+        if segment is None:
+            self.note(
+                "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
+            )
+            return trajectory
+        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
 
     def plan(
         self,
@@ -101,6 +120,7 @@ class Job:
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=prices,
+            notes=(*job_notes(self.program, self.machine, self.toolpath), *self.noted),
             timings=self.stages.timings,
         )
 

@@ -108,7 +108,7 @@ def _often_sampled(job: Job) -> Job:
     acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
     period = max(START_PERIOD * float((acceleration / jerk).min()), job.stop_time / START_SAMPLES)
     machine = job.machine.model_copy(update={"dt": min(job.machine.dt, period)})
-    return dataclasses.replace(job, machine=machine, stages=Stages())
+    return dataclasses.replace(job, machine=machine, stages=Stages(), noted=[])
 
 
 def _passed(course: Course, start: Trajectory, toolpath: Toolpath) -> tuple[Trajectory, FloatArray]:

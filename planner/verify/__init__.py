@@ -8,6 +8,9 @@ sharp each check is:
     limits.py     velocity, acceleration, jerk per axis, feed, normal acceleration: on the columns and on differences of the
                   delivered positions
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
+    contour.py    how far motion and path are apart, also where a motion was lost
+    samples.py    periods, density and digits of the samples, their unit of time, rest at both ends
+    given.py      what of a trajectory was delivered, and how exactly
     pieces.py     the programmed path, laid out for the matching
     error_allocation.py
                   eq. 18-20 at every programmed corner, on the motion's own curvature
@@ -20,8 +23,9 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 """
 
 from planner.verify.corners import CornerCheck
+from planner.verify.given import Given
 from planner.verify.judge import verify
 from planner.verify.ringing import Ringing
 from planner.verify.verdict import LimitCheck, Verdict
 
-__all__ = ["CornerCheck", "LimitCheck", "Ringing", "Verdict", "verify"]
+__all__ = ["CornerCheck", "Given", "LimitCheck", "Ringing", "Verdict", "verify"]

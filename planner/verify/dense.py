@@ -9,10 +9,8 @@ import numpy as np
 from planner.trajectory import Trajectory
 from planner.verify.findings import Look, measured
 from planner.verify.limits import ACCELERATION
-from planner.verify.pieces import PLACE_ROUNDING, RATIO_ROUNDING
+from planner.verify.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING
 from planner.verify.stream import Limits
-
-PERIOD_ROUNDING = 1e-9  # [s] of a sample's time: the least digit that files print; float64 has it up to 1e6 s
 
 
 class Comparison:
@@ -21,18 +19,20 @@ class Comparison:
     Between two of its times h apart the motion is within a h^2 / 8 of the chord, where the delivered sample must be.
     """
 
-    def __init__(self, trajectory: Trajectory, end: float, progress: Callable[[float], None]):
-        self.trajectory, self.end, self.progress = trajectory, end, progress
+    def __init__(self, trajectory: Trajectory, end: float):
+        self.trajectory, self.end = trajectory, end
         axes = len(trajectory.axes)
         self.excess = np.zeros(axes)  # per axis: largest deviation from the chord over h^2 / 8
         self.time = np.zeros(axes)
-        self.last_t, self.last_position = np.empty(0), np.empty((0, axes))
 
-    def pass_on(self, chunks: Iterable[Trajectory]) -> Iterator[Trajectory]:
+    def pass_on(
+        self, chunks: Iterable[Trajectory], progress: Callable[[float], None]
+    ) -> Iterator[Trajectory]:
+        self.last_t, self.last_position = np.empty(0), np.empty((0, len(self.excess)))
         for chunk in chunks:
             self._compare(chunk)
             yield chunk
-            self.progress(min(1.0, float(chunk.t[-1]) / max(self.end, PERIOD_ROUNDING)))
+            progress(min(1.0, float(chunk.t[-1]) / max(self.end, PERIOD_ROUNDING)))
 
     def _compare(self, chunk: Trajectory) -> None:
         seen_t = np.concatenate([self.last_t, chunk.t])

@@ -36,7 +36,7 @@ it. It is no bound: other shapes within eps may be faster, and dense programs ne
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -46,13 +46,15 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
-from planner.verify.limits import FEED_AT_REST
+from planner.verify.findings import FAULTS_OF_A_KIND, Look
+from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS
 from planner.verify.matching import NEAR_MISS
+from planner.verify.pieces import Pieces
+from planner.verify.stream import Limits
 from planner.verify.times import Motion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
-FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,34 +74,38 @@ class _Reading:
 
 def check_corners(
     trajectory: Trajectory,
-    near: list[Array],
+    looks: list[Look],
+    pieces: Pieces,
     toolpath: Toolpath,
     machine: Machine,
     *,
-    motion: Motion | None = None,
-    judged: bool = True,
+    motion: Motion | None,
+    limits: Limits,
+    judged: bool,
 ) -> CornerCheck:
     """Hold the motion against eq. (18)-(20) at every corner of the program.
 
-    near   : (M+1,) `matching.PASSED` at the toolpath's joints, how near the motion comes and when: by the chords of the samples, and,
-             where there is a motion, by a look between them
+    looks  : the readings of the samples and, where there is a motion, of the motion between them; they know when each vertex is passed
     motion : what the samples were taken from; None to look at the samples alone
+    limits : what accelerations that were derived from positions can be off by
     judged : False if the limit of acceleration is reported only
 
     A corner is not looked at where the motion misses it by so much that its place on the path is not known (`NEAR_MISS`; then `order`
     or `vertex` says so), and where there are samples alone so far apart that the axes could bow by more than eps between them.
     """
     corner = np.flatnonzero(toolpath.joint == Joint.CORNER)
-    vertex, eps = toolpath.start[corner], toolpath.tolerance[corner]
-    miss, time = near[0]["near"][corner], near[0]["near_time"][corner]
-    reading, period = _nearest_sample(trajectory, time, vertex, machine)
+    at = np.flatnonzero(pieces.joint["real"])[corner]
+    vertex, eps = pieces.vertex[at], pieces.joint["budget"][at]
+    near = [look.seen.match.passed[at] for look in looks]
+    miss = near[0]["near"]
+    reading, period = _nearest_sample(trajectory, near[0]["near_time"], vertex, machine, limits)
     chord, budget_ratio, speed_ratio = np.zeros(len(corner)), miss / eps, reading.speed_ratio
     looked = miss <= NEAR_MISS * eps
     if motion is None or not len(corner):
         looked &= _bow(machine, toolpath.axes, period) <= eps
     else:
-        looked &= near[1]["near"][corner] <= NEAR_MISS * eps
-        reading = _nearest_point(motion, near[1]["near_time"][corner], trajectory.dt, vertex, machine)
+        looked &= near[1]["near"] <= NEAR_MISS * eps
+        reading = _nearest_point(motion, near[1]["near_time"], trajectory.dt, vertex, machine)
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
         miss, chord = reading.distance, reading.normal * trajectory.dt**2 / 8.0
         budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
@@ -160,16 +166,27 @@ def _overdrawn(check: CornerCheck, k: int) -> str:
 
 
 def _nearest_sample(
-    trajectory: Trajectory, near_time: FloatArray, vertex: FloatArray, machine: Machine
+    trajectory: Trajectory, near_time: FloatArray, vertex: FloatArray, machine: Machine, limits: Limits
 ) -> tuple[_Reading, FloatArray]:
-    """The nearer of the two samples around each vertex' nearest chord, which ends at near_time; and the period between them [s]."""
+    """The nearer of the two samples around each vertex' nearest chord, which ends at near_time; and the period between them [s].
+
+    Accelerations derived from the positions are means of the motion's, which keep its limits. What the positions' rounding r makes of
+    them over the period h, at most 4 r / h^2, is taken off.
+    """
     after = np.clip(np.searchsorted(trajectory.t, near_time), 1, max(len(trajectory) - 1, 1))
     after = np.minimum(after, len(trajectory) - 1)  # a single sample is both
     before = np.maximum(after - 1, 0)
     distance = [np.linalg.norm(trajectory.position[k] - vertex, axis=1) for k in (before, after)]
     k = np.where(distance[0] < distance[1], before, after)
-    there = _read(trajectory, k, np.minimum(*distance), machine)
-    return there, trajectory.t[after] - trajectory.t[before]
+    there, period = (
+        _read(trajectory, k, np.minimum(*distance), machine),
+        trajectory.t[after] - trajectory.t[before],
+    )
+    if not limits.judged[ACCELERATION]:
+        ulp = ROUNDING_ULPS * 2.0**-52 * np.abs(trajectory.position[k]).max(axis=1, initial=0.0)
+        rounding = np.linalg.norm(limits.rounding) + ulp + limits.time_rounding * there.feed
+        there = replace(there, normal=np.maximum(there.normal - 4.0 * rounding / period**2, 0.0))
+    return there, period
 
 
 def _nearest_point(

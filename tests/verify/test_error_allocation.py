@@ -141,7 +141,9 @@ def test_stops_of_the_program_and_joints_that_do_not_turn_are_no_corners():
     )  # fmt: skip
     found = verify(sample(motion, 0.001), toolpath, UNEQUAL).corners
     assert found.line.tolist() == [20]
-    assert "turns nowhere" in judged(polyline([(0, 0, 0), (9, 0, 0)]), [(0, 0, 0), (9, 0, 0)]).corners.sentence()
+    assert (
+        "turns nowhere" in judged(polyline([(0, 0, 0), (9, 0, 0)]), [(0, 0, 0), (9, 0, 0)]).corners.sentence()
+    )
 
 
 # --- what cannot be looked at -------------------------------------------------------------------------------------------------
@@ -185,7 +187,10 @@ def test_a_corner_taken_too_fast_is_a_fault_with_its_line():
     assert "1.1" in said[0]
     assert "line 10, x20 y0 z0" in said[0]
     reported = verify(
-        sample(rounded(points, 0.04, 1.1 * limit), 0.001), program(points), UNEQUAL, not_limited=("acceleration", "jerk")
+        sample(rounded(points, 0.04, 1.1 * limit), 0.001),
+        program(points),
+        UNEQUAL,
+        not_limited=("acceleration", "jerk"),
     )
     assert not laws_broken(reported)
     assert reported.corners.worst_speed_ratio > 1.09

@@ -258,7 +258,8 @@ def test_a_skipped_block_is_named():
     motion = polyline([SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[4]], jerk=2e5)
     verdict = judge(motion, square())
     assert "line 30" in fault(verdict, "vertex")
-    assert verdict.vertex_error_mm == pytest.approx(10 / np.sqrt(2), rel=0.01)
+    assert "lost after line 30" in fault(verdict, "order")
+    assert verdict.vertex_error_mm is None
 
 
 def test_swapped_blocks_are_found():
@@ -316,9 +317,12 @@ def test_a_turn_left_out_of_a_dense_spiral_is_found():
 def test_a_repeated_block_is_found():
     again = [SQUARE[0], SQUARE[1], SQUARE[0], *SQUARE[1:]]
     verdict = judge(polyline(again, jerk=2e5), square())
-    assert verdict.contour_error_mm == pytest.approx(10, rel=0.01)
     assert not verdict.order
-    fault(verdict, "contour")
+    assert "lost after line 10" in fault(verdict, "order")
+    assert verdict.lost_after == 10
+    assert (
+        verdict.contour_error_mm is None
+    )  # it is on the path all the time, and up to 10 mm from where it should be
 
 
 def test_a_missing_end_is_found():
@@ -329,12 +333,12 @@ def test_a_missing_end_is_found():
     assert not verdict.order
 
 
-def test_an_end_short_by_two_nanometres_is_found_and_by_half_a_nanometre_passes():
-    for short, passes in ((2e-6, False), (5e-7, True)):
+def test_an_end_short_by_twenty_picometres_is_found_and_by_five_passes():
+    for short, passes in ((2e-8, False), (5e-9, True)):
         points = [*SQUARE[:-1], (0, 20 - short, 0)]
         verdict = judge(polyline(points, jerk=2e5), square())
         assert verdict.passed is passes, verdict.faults
-        assert verdict.end_error_mm == pytest.approx(short, rel=1e-6)
+        assert verdict.end_error_mm == pytest.approx(short, rel=1e-5)
 
 
 def test_a_wrong_start_is_found():
@@ -346,8 +350,11 @@ def test_a_wrong_start_is_found():
 def test_a_motion_elsewhere_is_found_in_reasonable_time():
     far = [(x + 500.0, y, z) for x, y, z in SQUARE]
     verdict = judge(polyline(far, jerk=2e5), square())
-    assert verdict.contour_error_mm == pytest.approx(np.hypot(500, 10), rel=0.01)
+    assert verdict.contour_error_mm is None
+    assert verdict.vertex_error_mm is None
+    assert verdict.lost_after == 10
     assert not verdict.order
+    assert verdict.summary()["contour_error_mm"] is None
 
 
 # ---- stops and dwells ------------------------------------------------------------------------------------------------

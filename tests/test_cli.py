@@ -61,16 +61,16 @@ def test_plan_writes_and_exits_0(planned: Callable[..., None], job: Path, tmp_pa
     result = run("plan", job, "-o", tmp_path / "out", "--plot", "--corners")
     assert result.exit_code == 0, result.output
     assert "cycle time" in result.stdout
-    assert "normal_acceleration" in result.stdout  # the corner table
+    assert "feed / its own" in result.stdout  # the corner table
     files = {"profiles.png", "summary.json", "toolpath.png", "trajectory.parquet"}
     assert {file.name for file in (tmp_path / "out").iterdir()} == files
     assert all(str(tmp_path / "out" / name) in result.stdout for name in files)
 
 
 def test_that_there_are_no_corners_is_said(planned: Callable[..., None], job: Path) -> None:
-    planned(rounded=False)
-    assert "no rounded corners" in run("plan", job, "--corners").stdout
-    assert "no rounded corners" not in run("plan", job).stdout
+    planned(turns=False)
+    assert "no corners to list" in run("plan", job, "--corners").stdout
+    assert "no corners to list" not in run("plan", job).stdout
 
 
 def test_json_is_all_there_is_on_stdout(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:

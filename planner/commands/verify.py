@@ -52,7 +52,7 @@ def verify(
     """Judge a trajectory against its program and a machine; it may come from anywhere."""
     from planner.geometry.build import toolpath_from_program
     from planner.nc.reader import read_program
-    from planner.report.export import verdict_summary
+    from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
     from planner.report.trajectory_file import read_trajectory
     from planner.verify import verify as judge
@@ -88,6 +88,7 @@ def verify(
     budgets = toolpath.tolerance
     if as_json:
         about = {
+            "corners": corner_summary(verdict.corners),
             "machine": limits.name,
             "tolerance_mm": float(budgets[0]) if (budgets == budgets[0]).all() else None,
             "cycle_time_s": motion.cycle_time,

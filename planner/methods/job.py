@@ -134,7 +134,7 @@ class Job:
         status: Status,
         sentence: str,
         grid_points: int,
-        corners: CornerTable | None = None,
+        rounded: CornerTable | None = None,
         grid: GridHistory | None = None,
         prices: PriceList | None = None,
     ) -> Plan:
@@ -151,7 +151,7 @@ class Job:
             sentence=sentence,
             trajectory=trajectory,
             verdict=verdict,
-            corners=corners,
+            rounded=rounded,
             grid=grid,
             stop_time=self.stop_time,
             grid_points=grid_points,

@@ -51,6 +51,10 @@ class BezierMethod(Method):
     corner: BezierCorner = field(default_factory=BezierCorner)
     allocate: bool = True
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return self.allocate
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):

@@ -39,6 +39,10 @@ class FirMethod(Method):
 
     plain: bool = False
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return not self.plain
+
     def plan_job(self, job: Job) -> Plan:
         check_filters(job.machine, "fir")
         with job.stage("geometry"):

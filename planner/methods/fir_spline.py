@@ -59,6 +59,10 @@ class FirSplineMethod(Method):
 
     plain: bool = False
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return not self.plain
+
     def plan_job(self, job: Job) -> Plan:
         check_filters(job.machine, "fir-spline")
         with job.stage("geometry"):

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
-from planner.geometry.toolpath import Toolpath
+from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
+from planner.methods import periods
 from planner.methods.closed_form import CornerTable
+from planner.methods.periods import settled
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
@@ -25,20 +29,27 @@ from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
 Delivered = tuple[Trajectory, Verdict]
+# A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
+# elsewhere, but what one phase may do to a corner is known after the first.
+PERIOD_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
     """A program on its way to a plan.
 
-    toolpath : the program's exact path, with its tolerances
-    stages   : the clock
+    toolpath   : the path that is planned: the program's exact path, with its tolerances, or less of them (methods/periods.py)
+    stages     : the clock
+    programmed : the path by which the motion is judged; None for `toolpath`
+    motion_of  : the motions of the trajectories delivered so far, as long as these live
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
+    programmed: Toolpath | None = None
+    motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
@@ -47,23 +58,35 @@ class Job:
     @cached_property
     def stop_time(self) -> float:
         """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""
-        times = rest_to_rest_times(self.toolpath.length, *block_limits(self.toolpath, self.machine))
-        return float(times.sum() + np.sum(self.toolpath.dwell))
+        times = rest_to_rest_times(self.judged.length, *block_limits(self.judged, self.machine))
+        return float(times.sum() + np.sum(self.judged.dwell))
+
+    @property
+    def judged(self) -> Toolpath:
+        """The path by which the motion is judged."""
+        return self.toolpath if self.programmed is None else self.programmed
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
-        """Sample a motion at the interpolation period and have it judged, between the samples too."""
+        """Sample a motion at the interpolation period, with stops that its chords do not cut off (methods/periods.py), and have it
+        judged, between the samples too."""
         with self.stage("sample"):
+            motion = self.settled(motion, not_limited)
             trajectory = sample_motion(motion, self.machine.dt)
+        self.motion_of[trajectory] = motion
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
-                self.toolpath,
+                self.judged,
                 self.machine,
                 dense=dense_motion(motion, self.machine.dt),
                 not_limited=not_limited,
                 progress=progress,
             )
         return trajectory, verdict
+
+    def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
+        """The motion as it is delivered: with the standstills that its samples need."""
+        return settled(motion, self.judged, self.machine, "jerk" not in not_limited)
 
     def plan(
         self,
@@ -87,7 +110,7 @@ class Job:
             solver=solver,
             program=self.program,
             machine=self.machine,
-            toolpath=self.toolpath,
+            toolpath=self.judged,
             status=status,
             sentence=sentence,
             trajectory=trajectory,
@@ -103,6 +126,11 @@ class Job:
 
 class Method(ABC):
     """A way to plan a job; its repr is its row label in every table."""
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        return True
 
     def plan(
         self,
@@ -120,8 +148,45 @@ class Method(ABC):
         stages = Stages(progress)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
-        return self.plan_job(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+        return self.plan_within_periods(
+            Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
+        )
+
+    def plan_within_periods(self, job: Job) -> Plan:
+        """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""
+        made = self.plan_job(job)
+        given, planned = job, job.toolpath
+        for _ in range(PERIOD_ROUNDS):
+            if not self.keeps_tolerance or made.trajectory is None or _inside(made):
+                break
+            with job.stage("geometry"):
+                near, far = periods.missed(job.motion_of[made.trajectory], given.toolpath, job.machine.dt)
+                less = periods.with_less_tolerance(planned, given.toolpath, near, far)
+            if less is None:
+                break
+            planned = less
+            job = dataclasses.replace(given, toolpath=planned, programmed=given.toolpath)
+            made = self.plan_job(job)
+        return (
+            made if job is given else dataclasses.replace(made, sentence=_said(made, given.toolpath, planned))
+        )
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
         """Plan a program whose path is laid out."""
+
+
+def _inside(made: Plan) -> bool:
+    """True if the motion's samples and chords keep the tolerance."""
+    return made.verdict is None or not (made.verdict.vertex.broken or made.verdict.contour.broken)
+
+
+def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
+    """The plan's sentence with what its period took from the corners."""
+    stops = (planned.joint == Joint.STOP) & (programmed.joint != Joint.STOP)
+    less = (planned.tolerance < programmed.tolerance) & ~stops
+    at = np.flatnonzero(stops | less)
+    return (
+        f"{made.sentence}; samples {made.machine.dt * 1e3:g} ms apart leave {less.sum()} corners less of the tolerance and make "
+        f"{stops.sum()} full stops, the first at the end of line {programmed.line[at[0] - 1]}"
+    )

@@ -78,7 +78,7 @@ class OptimalMethod(Method):
                         else None
                     )
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
-        return plan_of_solution(job, best, motion, made, method="optimal", corner=self.corner, prices=prices)
+        return plan_of_solution(job, best, made, method="optimal", corner=self.corner, prices=prices)
 
     def _on_path(self, path: SmoothPath, machine: Machine, stages: Stages, finer: float = 1.0) -> OnPath:
         """The time-optimal motion on a path; `finer` divides the grid's resolution."""

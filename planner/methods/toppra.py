@@ -53,4 +53,4 @@ class ToppraMethod(Method):
         if best.solution.solved:
             motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
             made = job.deliver(motion, not_limited=("jerk",))
-        return plan_of_solution(job, best, motion, made, method="toppra", corner=self.corner)
+        return plan_of_solution(job, best, made, method="toppra", corner=self.corner)

@@ -13,12 +13,15 @@ import numpy as np
 from numba import njit
 
 from planner.arrays import FloatArray
-from planner.geometry.toolpath import Toolpath
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.search import nearest
 from planner.trajectory import Trajectory
 
 # By how much the way run between two vertices may differ from the block's length [tolerances]: 2 on either side, and as much again
 # for where the vertex before was found.
 SLACK = 8.0
+# A motion rests where it is slower than this share of its fastest [-]: rounding.
+STANDING = 1e-9
 
 
 def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
@@ -31,6 +34,19 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     eps = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
     _pass(motion.position, motion.s, motion.t, vertex, toolpath.length, SLACK * eps, times)
     return times
+
+
+def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """When the motion comes to rest at the full stops of a path, and when it leaves (G,) [s].
+
+    motion : sampled at the ends of its pieces too
+    times  : (N+1,) when it passes the joints, `passing_times`
+    """
+    still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
+    group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1
+    begin, end = still[np.searchsorted(group, group, side="left")], still[np.searchsorted(group, group, side="right") - 1]
+    at = nearest(motion.t[still], times[toolpath.joint == Joint.STOP])
+    return motion.t[begin[at]], motion.t[end[at]]
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,7 +18,7 @@ from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.constraints.assemble import feedrate_problem
-from planner.corners.allocation import error_rate
+from planner.corners.allocation import filter_rate
 from planner.corners.elements import element_point, to_arc_length
 from planner.feedrate.rest_to_rest import block_limits
 from planner.feedrate.stretches import Stretches
@@ -106,13 +106,12 @@ def stretches_of(
 
 
 def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """Limits v, a, j (3, M) along every segment.
-
-    Between samples dt apart a motion that turns at a vertex with the acceleration a bows by a dt^2/8: no more than the tolerance.
-    """
+    """Limits v, a, j (3, M) along every segment; a is at most the tolerance over the rate at which filters err: a full stop is rounded
+    by them."""
     v, a, j = block_limits(toolpath, machine)
-    resolved = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / error_rate(machine)
-    return np.stack([v, np.minimum(a, resolved), j])
+    if machine.fir is not None:
+        a = np.minimum(a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_rate(machine))
+    return np.stack([v, a, j])
 
 
 @njit(cache=True, error_model="numpy")

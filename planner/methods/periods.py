@@ -26,17 +26,15 @@ import numpy as np
 from planner.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
-from planner.passing import passing_times
+from planner.passing import STANDING, passing_times
 from planner.timing import CHUNK, MotionInTime, in_chunks
-from planner.trajectory import Trajectory
+from planner.trajectory import joined
 
 # Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
 # changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
 PHASES, PLACES = 16, 64
 # A motion is looked at so many times in a period to find its vertices.
 PER_PERIOD = 8
-# A motion rests where it is slower than this share of its fastest [-]: rounding.
-STANDING = 1e-9
 # Chords may miss a vertex by this share of its tolerance [-]; the rest is for what lies between the phases and places above.
 USED = 0.99
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
@@ -171,11 +169,3 @@ def with_less_tolerance(
     tolerance[hopeless] = planned.tolerance[hopeless]
     return dataclasses.replace(planned.with_joints(hopeless, Joint.STOP), tolerance=tolerance)
 
-
-def joined(chunks: list[Trajectory]) -> Trajectory:
-    """Chunks that share their ends as one trajectory."""
-    names = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
-    columns = {
-        name: np.concatenate([getattr(c, name)[k > 0 :] for k, c in enumerate(chunks)]) for name in names
-    }
-    return dataclasses.replace(chunks[0], **columns)

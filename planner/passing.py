@@ -44,7 +44,10 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     """
     still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
     group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1
-    begin, end = still[np.searchsorted(group, group, side="left")], still[np.searchsorted(group, group, side="right") - 1]
+    begin, end = (
+        still[np.searchsorted(group, group, side="left")],
+        still[np.searchsorted(group, group, side="right") - 1],
+    )
     at = nearest(motion.t[still], times[toolpath.joint == Joint.STOP])
     return motion.t[begin[at]], motion.t[end[at]]
 

@@ -155,17 +155,17 @@ class Method(ABC):
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""
         made = self.plan_job(job)
-        given, planned = job, job.toolpath
+        given, planned, programmed = job, job.toolpath, job.judged
         for _ in range(PERIOD_ROUNDS):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
                 break
             with job.stage("geometry"):
-                near, far = periods.missed(job.motion_of[made.trajectory], given.toolpath, job.machine.dt)
-                less = periods.with_less_tolerance(planned, given.toolpath, near, far)
+                near, far = periods.missed(job.motion_of[made.trajectory], programmed, job.machine.dt)
+                less = periods.with_less_tolerance(planned, programmed, near, far)
             if less is None:
                 break
             planned = less
-            job = dataclasses.replace(given, toolpath=planned, programmed=given.toolpath)
+            job = dataclasses.replace(given, toolpath=planned, programmed=programmed)
             made = self.plan_job(job)
         return (
             made if job is given else dataclasses.replace(made, sentence=_said(made, given.toolpath, planned))

@@ -168,4 +168,3 @@ def with_less_tolerance(
     )
     tolerance[hopeless] = planned.tolerance[hopeless]
     return dataclasses.replace(planned.with_joints(hopeless, Joint.STOP), tolerance=tolerance)
-

@@ -64,6 +64,7 @@ def make_verdict(*, passed: bool = True) -> Any:
         contour_error_mm=0.0123,
         vertex_error_mm=0.02,
         end_error_mm=0.0,
+        ringing=(),
         faults=()
         if passed
         else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),

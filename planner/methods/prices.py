@@ -307,7 +307,8 @@ def _corners(
     for own in turns:
         by = np.where(own, growth, 0.0)
         grown = dataclasses.replace(path, stretch=path.stretch * (1.0 + by)[:, None])
-        there = lagrangian(feedrate_problem(moved_grid(samples, grown), machine), solution)
+        moved = feedrate_problem(moved_grid(samples, grown), machine)
+        there = lagrangian(dataclasses.replace(moved, limit_scale=problem.limit_scale), solution)
         change = there.value - now.value
         total += _sums(~samples.element[corner], change[corner], len(joints))
         on_leg = _sums(leg[~corner], change[~corner], len(joints) - 1)

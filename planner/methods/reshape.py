@@ -176,11 +176,12 @@ def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> 
     assert solution.multipliers is not None
     axes = len(problem.axes)
     rows = np.abs(solution.multipliers.rows[on])
+    slower = [problem.limit_scale[point][:, None] for point in (on, on + 1)]  # squares of shares of limits
     price = np.zeros((len(on), 2, axes, 3))
-    price[:, 0, :, 1], price[:, 1, :, 1] = 0.5 * rows[:, :, 0], 0.5 * rows[:, :, 3]
-    price[:, 0, :, 2], price[:, 1, :, 2] = 0.5 * rows[:, :, 1], 0.5 * rows[:, :, 2]
+    price[:, 0, :, 1], price[:, 1, :, 1] = (0.5 * rows[:, :, k] * slower[k // 3] ** 4 for k in (0, 3))
+    price[:, 0, :, 2], price[:, 1, :, 2] = (0.5 * rows[:, :, k] * slower[k - 1] ** 6 for k in (1, 2))
     name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
-    feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_max[on]
+    feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_limit[on]
     price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
     for k, axis in enumerate(problem.axes):
         at = name == f"velocity.{axis}"

@@ -19,6 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.errors import InputError
+from planner.machine import LINEAR_AXES
 from planner.report.export import summary, verdict_summary, versions
 from planner.report.replace import replacing_file
 from planner.report.tables import ratio_text
@@ -27,6 +28,7 @@ from planner.units import MICROMETRE
 if TYPE_CHECKING:
     from planner.machine import Machine
     from planner.methods.plan import Plan
+    from planner.verify import Verdict
 
 SUFFIXES = (".json", ".csv")
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
@@ -44,6 +46,7 @@ class Row:
     worst         : by quantity: worst ratio to its limit and which of the limits that is ("jerk.y")
     free          : quantities that this method does not limit
     contour_error, vertex_error : [mm]
+    ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
     planning_time : computing time without reading, sampling and verification [s]
     summary       : the plan's `summary.json`
     """
@@ -56,6 +59,7 @@ class Row:
     free: tuple[str, ...] = ()
     contour_error: float | None = None
     vertex_error: float | None = None
+    ringing: float | None = None
     planning_time: float | None = None
     summary: dict[str, Any] | None = None
 
@@ -85,9 +89,20 @@ def row_of_plan(method: str, plan: Plan) -> Row:
         free=tuple(verdict_summary(verdict)["not_limited"]),
         contour_error=verdict.contour_error_mm,
         vertex_error=verdict.vertex_error_mm,
+        ringing=_ringing(verdict),
         planning_time=planning,
         summary=summary(plan),
     )
+
+
+def _ringing(verdict: Verdict) -> float | None:
+    after = [
+        amplitude
+        for mode in verdict.ringing
+        for axis, amplitude in zip(mode.axes, mode.after, strict=True)
+        if axis in LINEAR_AXES
+    ]
+    return float(max(after)) if after else None
 
 
 def refused(method: str, fault: Exception) -> Row:
@@ -114,7 +129,8 @@ def comparison_table(rows: list[Row], title: str) -> Group:
         *(f"{q.replace('_', chr(10), 1)}\n/ limit" for q in shown),
     ):
         table.add_column(name, justify="right", no_wrap=True)
-    for name in ("contour\nµm", "corners\nµm", "planning\ns"):
+    rings = any(row.ringing is not None for row in rows)
+    for name in ("contour\nµm", "corners\nµm", *(["rings\nµm"] if rings else []), "planning\ns"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     said = []
@@ -126,6 +142,7 @@ def comparison_table(rows: list[Row], title: str) -> Group:
             *(_worst(row, quantity) for quantity in shown),
             _number(row.contour_error, ".4g", MICROMETRE),
             _number(row.vertex_error, ".4g", MICROMETRE),
+            *([_number(row.ringing, ".4g", MICROMETRE)] if rings else []),
             _number(row.planning_time, ".3f"),
             Text(row.outcome, style="green" if row.passed else "bold red"),
         )
@@ -156,6 +173,7 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
                 "not_limited": list(row.free),
                 "contour_error_mm": row.contour_error,
                 "vertex_error_mm": row.vertex_error,
+                "ringing_mm": row.ringing,
                 "planning_time_s": row.planning_time,
                 "summary": row.summary,
             }
@@ -171,12 +189,13 @@ def comparison_csv(rows: list[Row]) -> str:
     write = csv.writer(out, lineterminator="\n")
     limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
     head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
-    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "planning_time_s", "sentence"]
+    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "ringing_mm", "planning_time_s", "sentence"]
     write.writerow([*head, *limits, *tail])
     for row in rows:
         worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
         first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
-        last = [" ".join(row.free), row.contour_error, row.vertex_error, row.planning_time, row.sentence]
+        errors = [row.contour_error, row.vertex_error, row.ringing]
+        last = [" ".join(row.free), *errors, row.planning_time, row.sentence]
         write.writerow([*first, *worst, *last])
     return out.getvalue()
 

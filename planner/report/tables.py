@@ -15,10 +15,11 @@ from planner.report.optimum import held_by_text, price_rows
 from planner.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
+    from planner.arrays import FloatArray
     from planner.methods.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
-    from planner.verify import Verdict
+    from planner.verify import Ringing, Verdict
 
 CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table
 FAULTS_SHOWN = 8
@@ -183,12 +184,26 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
     table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
     table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
+    for mode in verdict.ringing:
+        table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
     if verdict.passed:
         table.add_row("verdict", Text("passed", style="green"))
         return
     table.add_row("verdict", Text("FAILED", style="bold red"))
     for fault in _first(verdict.faults, FAULTS_SHOWN):
         table.add_row("", Text(fault))
+
+
+def _ringing_text(mode: Ringing) -> str:
+    """Amplitudes after the motion and peaks during it, axis by axis."""
+
+    def said(values: FloatArray) -> str:
+        return ", ".join(
+            f"{axis} {value / MICROMETRE:.4g} µm" if axis in LINEAR_AXES else f"{axis} {1e6 * value:.4g} µrad"
+            for axis, value in zip(mode.axes, values, strict=True)
+        )
+
+    return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
 
 
 def _by_quantity(verdict: Verdict) -> dict[str, list]:

@@ -7,6 +7,7 @@ path, no constraint, no solver. What it checks, and how sharp each check is:
                   delivered positions
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
     pieces.py     the programmed path, laid out for the matching
+    ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
     judge.py      `verify` itself
 
@@ -14,6 +15,7 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 """
 
 from planner.verify.judge import verify
+from planner.verify.ringing import Ringing
 from planner.verify.verdict import LimitCheck, Verdict
 
-__all__ = ["LimitCheck", "Verdict", "verify"]
+__all__ = ["LimitCheck", "Ringing", "Verdict", "verify"]

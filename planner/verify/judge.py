@@ -14,6 +14,7 @@ from planner.verify import findings
 from planner.verify.dense import PERIOD_ROUNDING, Comparison
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.pieces import pieces_of
+from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
 from planner.verify.verdict import Verdict
 
@@ -86,6 +87,7 @@ def verify(
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
         faults=tuple(faults),
+        ringing=ringing_of(trajectory, machine),
     )
 
 

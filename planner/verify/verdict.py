@@ -7,6 +7,7 @@ from typing import Any
 
 from planner.arrays import FloatArray, freeze
 from planner.verify.pieces import RATIO_ROUNDING
+from planner.verify.ringing import Ringing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,6 +68,7 @@ class Verdict:
     lost             : indices of the program's blocks that the motion never visits
     lost_lines       : their NC lines
     faults           : one sentence per failure: what, by how much, when, where, NC line
+    ringing          : what each vibration mode of the machine does; reported, not judged
     """
 
     passed: bool
@@ -81,6 +83,7 @@ class Verdict:
     lost: tuple[int, ...]
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
+    ringing: tuple[Ringing, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The part of `summary.json` that is called `verdict`."""
@@ -90,4 +93,5 @@ class Verdict:
             "contour_error_mm": self.contour_error_mm,
             "vertex_error_mm": self.vertex_error_mm,
             "end_error_mm": self.end_error_mm,
+            "ringing": [mode.summary() for mode in self.ringing],
         }

@@ -11,9 +11,9 @@ is stationary in u_i and x_i:
 
 Time-optimal profiles speed up or brake with one row at its limit, or keep to X. Where no row holds, pi is 0. Where the motion speeds
 up, pi <= 0, and what more speed is worth adds up towards the start of the stretch; where it brakes, pi >= 0 adds up towards its end.
-A
-stretch that ends at X or at a peak begins with what its last interval's own time says. Between the two, at a valley, the second equation gives mu, or, where X does not hold, the multiplier of the row that holds x alone
-(r' = 0, r'' x = c): on the grid that is the row with the largest |r'' x|/c there. All in one sweep to the left and one to the right.
+A stretch that ends at X or at a peak begins with what its last interval's own time says. Between the two, at a valley, the second
+equation gives mu, or, where X does not hold, the multiplier of the row that holds x alone (r' = 0, r'' x = c): on the grid that is the
+row with the largest |r'' x|/c there. All in one sweep to the left and one to the right.
 
 On the grid several rows may hold an interval and the profile is greedy (feedrate/reachability.py), so these multipliers are good to
 some percent, not to rounding (tested against the change of the time with the limits).

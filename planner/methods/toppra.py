@@ -1,6 +1,7 @@
 """Method `toppra`: smoothed path, all second-order constraints, time-optimal by reachability analysis.
 
-The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited.
+The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited. Splines
+are reshaped as in method `optimal`, by the multipliers of this motion (feedrate/costates.py).
 """
 
 from __future__ import annotations

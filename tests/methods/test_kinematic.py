@@ -284,7 +284,7 @@ def test_it_has_a_name_and_reports_its_corners():
 
 
 def test_samples_on_both_sides_of_a_stop_do_not_cut_its_vertex():
-    """With a dt^2/8 = 8 um and a tolerance of 1 um the motion waits for a sample at its stops, or it would depend on where they fall."""
+    """With a dt^2/8 = 8 um and a tolerance of 1 um it waits for a sample at its stops, or it would depend on where they fall."""
     machine = problems.machine(dt=0.004, acceleration=4000.0, tolerance=1e-3)
     rng = np.random.default_rng(0)
     made = kinematic(problems.random_polyline(rng, blocks=60, shortest=0.5, longest=5.0), machine)

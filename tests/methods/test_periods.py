@@ -39,7 +39,7 @@ def axis_motion(h, position, velocity, acceleration) -> AxisMotion:
 
 @pytest.mark.parametrize("degrees", [30, 90, 150])
 def test_chords_cut_a_kink_by_half_a_period_s_way(degrees):
-    """Both samples V dt/2 from the vertex: the chord passes it at V dt/2 times the cosine of half the inner angle; the motion hits it."""
+    """Both samples V dt/2 from the vertex: the chord passes it at V dt/2 cos(half the inner angle); the motion hits it."""
     theta, V, dt = np.deg2rad(degrees), 50.0, 0.01
     u = np.array([[1.0, 0.0], [np.cos(theta), np.sin(theta)]])
     motion = axis_motion([LEG / V] * 2, [[0, 0], [LEG, 0]], V * u, np.zeros((2, 2)))

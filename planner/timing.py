@@ -186,7 +186,7 @@ def _segment(samples: PathSamples, point: Array, parameter: FloatArray) -> Array
     if len(at):
         spans, of = samples.table.spans, span[at]
         place = spans["begin"][of] + spans["width"][of] * parameter[at]
-        ends = samples.path.legs.place
+        ends = samples.path.passed
         segment[at] = np.clip(np.searchsorted(ends, place, side="right") - 1, 0, len(ends) - 2)
     return segment
 

@@ -132,6 +132,7 @@ def make_plan(
         if solved
         else None,
         prices=prices,
+        notes=program.notes,
         timings={"read": 0.01, "solve": 0.02},
         solved=solved,
     )

@@ -24,6 +24,7 @@ LAYERS = (
     "planner.geometry",
     "planner.corners",
     "planner.smoothing",
+    "planner.path_calm",
     "planner.path_rows",
     "planner.path_grid",
     "planner.path",

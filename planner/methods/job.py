@@ -15,16 +15,18 @@ import numpy as np
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.passing import segments_at
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.methods import periods
 from planner.methods.closed_form import CornerTable
+from planner.methods.notes import job_notes
 from planner.methods.periods import settled
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
 from planner.nc.program import Program
-from planner.timing import MotionInTime, dense_motion, sample_motion
+from planner.timing import MotionInTime, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
@@ -41,6 +43,7 @@ class Job:
     toolpath   : the path that is planned: the program's exact path, with its tolerances, or less of them (methods/periods.py)
     stages     : the clock
     programmed : the path by which the motion is judged; None for `toolpath`
+    noted      : what the method has said of what it gave up (`note`)
     motion_of  : the motions of the trajectories delivered so far, as long as these live
     """
 
@@ -49,11 +52,16 @@ class Job:
     toolpath: Toolpath
     stages: Stages
     programmed: Toolpath | None = None
+    noted: list[str] = field(default_factory=list)
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
         return self.stages.stage(name)
+
+    def note(self, *sentences: str) -> None:
+        """Add to the notes of the plan: what was given up, with its first line and how often."""
+        self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
 
     @cached_property
     def stop_time(self) -> float:
@@ -66,19 +74,23 @@ class Job:
         """The path by which the motion is judged."""
         return self.toolpath if self.programmed is None else self.programmed
 
-    def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> Delivered:
+    def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
         """Sample a motion at the interpolation period, with stops that its chords do not cut off (methods/periods.py), and have it
-        judged, between the samples too."""
+        judged, between the samples too.
+
+        seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
+        """
         with self.stage("sample"):
             motion = self.settled(motion, not_limited)
-            trajectory = sample_motion(motion, self.machine.dt)
+            trajectory = self._named(sample_motion(motion, self.machine.dt))
         self.motion_of[trajectory] = motion
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
                 self.judged,
                 self.machine,
-                dense=dense_motion(motion, self.machine.dt),
+                motion=motion,
+                seed=seed,
                 not_limited=not_limited,
                 progress=progress,
             )
@@ -87,6 +99,17 @@ class Job:
     def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
         """The motion as it is delivered: with the standstills that its samples need."""
         return settled(motion, self.judged, self.machine, "jerk" not in not_limited)
+
+    def _named(self, trajectory: Trajectory) -> Trajectory:
+        """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
+        method's own blocks and a note."""
+        segment = segments_at(self.judged, trajectory.position, trajectory.feed)
+        if segment is None:
+            self.note(
+                "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
+            )
+            return trajectory
+        return dataclasses.replace(trajectory, block=self.judged.block[segment], line=self.judged.line[segment])
 
     def plan(
         self,
@@ -120,6 +143,7 @@ class Job:
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=prices,
+            notes=(*job_notes(self.program, self.machine, self.toolpath), *self.noted),
             timings=self.stages.timings,
         )
 
@@ -165,11 +189,11 @@ class Method(ABC):
             if less is None:
                 break
             planned = less
-            job = dataclasses.replace(given, toolpath=planned, programmed=programmed)
+            job = dataclasses.replace(given, toolpath=planned, programmed=programmed, noted=[])
             made = self.plan_job(job)
-        return (
-            made if job is given else dataclasses.replace(made, sentence=_said(made, given.toolpath, planned))
-        )
+        if job is given:
+            return made
+        return dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
@@ -182,11 +206,11 @@ def _inside(made: Plan) -> bool:
 
 
 def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
-    """The plan's sentence with what its period took from the corners."""
+    """What the period took from the corners, for the notes."""
     stops = (planned.joint == Joint.STOP) & (programmed.joint != Joint.STOP)
     less = (planned.tolerance < programmed.tolerance) & ~stops
-    at = np.flatnonzero(stops | less)
+    first = programmed.line[np.flatnonzero(stops | less)[0] - 1]
     return (
-        f"{made.sentence}; samples {made.machine.dt * 1e3:g} ms apart leave {less.sum()} corners less of the tolerance and make "
-        f"{stops.sum()} full stops, the first at the end of line {programmed.line[at[0] - 1]}"
+        f"samples {made.machine.dt * 1e3:g} ms apart: corners planned with less of the tolerance {less.sum()}, full stops instead of "
+        f"corners {stops.sum()}, the first at the end of line {first}"
     )

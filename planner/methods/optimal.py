@@ -5,6 +5,8 @@
 3. The jerk-limited problem is solved on that grid (feedrate/jerk.py).
 4. Where the densely sampled motion exceeds a limit between grid points the problem is tightened and solved again; what is left,
    less than 0.05 % as a rule, every run between full stops is slowed down by (methods/slowing.py).
+5. With corner "auto", full stops, other corner shapes and method `kinematic` take its place where they take less time, or pass
+   where it does not (methods/rivals.py).
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.prices import price_list
 from planner.methods.reshape import OnPath, tube_prices
+from planner.methods.rivals import fastest
 from planner.methods.slowing import within_limits, without_seen_excess
 from planner.methods.stages import Stages
 from planner.path import RESOLUTION, sample_path
@@ -47,14 +50,26 @@ class OptimalMethod(Method):
     rounds: int | None = None
 
     def plan_job(self, job: Job) -> Plan:
+        plan = self._on_corner(job, self.corner)
+        if self.corner != AUTO:
+            return plan
+        return fastest(
+            plan,
+            job,
+            lambda corner: self._on_corner(job, corner),
+            lambda path, coarser: self._on_path(path, job.machine, job.stages, finer=coarser),
+        )
+
+    def _on_corner(self, job: Job, corner: str | CornerShape) -> Plan:
+        """The plan with corners rounded like that, or splines."""
         machine = job.machine
         with job.stage("geometry"):
-            shape = corner_shape(self.corner, machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
+            shape = corner_shape(corner, machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
             path = round_corners(job.toolpath, machine, shape, blend_tangents=True)
         best = best_on_path(
             job,
             path,
-            self.corner,
+            corner,
             lambda path, finer: self._on_path(path, machine, job.stages, finer=finer),
             blend_tangents=True,
             rounds=self.rounds,
@@ -69,7 +84,7 @@ class OptimalMethod(Method):
                 if gentler is None:
                     break
                 motion = gentler
-                made = job.deliver(motion)
+                made = job.deliver(motion, seed=again + 1)  # times from which nothing was fed back
             if best.solution.multipliers:
                 with job.stage("report"):
                     by_site = (
@@ -78,10 +93,10 @@ class OptimalMethod(Method):
                         else None
                     )
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
-        return plan_of_solution(job, best, made, method="optimal", corner=self.corner, prices=prices)
+        return plan_of_solution(job, best, made, method="optimal", corner=corner, prices=prices)
 
     def _on_path(self, path: SmoothPath, machine: Machine, stages: Stages, finer: float = 1.0) -> OnPath:
-        """The time-optimal motion on a path; `finer` divides the grid's resolution."""
+        """The time-optimal motion on a path, on a grid of `finer` times the usual resolution."""
         with stages.stage("geometry"):
             samples = sample_path(
                 path, machine, None if finer == 1.0 else RESOLUTION * finer, third_order=True

@@ -57,6 +57,7 @@ class Plan:
     prices                 : what the limits cost, or None where the solver does not tell
     stop_time              : time if every block ran from rest to rest [s], dwells included
     grid_points            : size of the problem that was solved
+    notes                  : what was assumed and what was given up, each with its first line and how often
     timings                : computing time per stage [s]
     """
 
@@ -75,6 +76,7 @@ class Plan:
     stop_time: float
     grid_points: int
     prices: PriceList | None = None
+    notes: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
 
     @property

@@ -29,7 +29,7 @@ PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
 # the time it takes counts, by more than the second, once: it leaves less than half of the excess.
 TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 6, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
@@ -162,7 +162,7 @@ def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
 def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion | None:
     """The motion slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing: the verifier looks
     between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done; `again` counts
-    the times before."""
+    the times before. The slower motion needs a verdict at other times."""
     limited = [check for check in verdict.limits.values() if check.limited]
     over = [check for check in limited if check.broken]
     if not over or max(check.ratio for check in limited) > 1.0 + SEEN_EXCESS_MAX:

@@ -175,7 +175,7 @@ class _Starts:
     def __iter__(self) -> Iterator[_Start]:
         yield from list(self.made)
         while self._methods:
-            own_clock = dataclasses.replace(self._job, stages=Stages())
+            own_clock = dataclasses.replace(self._job, stages=Stages(), noted=[])
             plan = self._methods.pop(0).plan_within_periods(own_clock)
             if plan.trajectory is None:
                 self.failed.append(plan)

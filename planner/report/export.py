@@ -42,7 +42,7 @@ def write_plan(
 ) -> list[str]:
     """Write the files of a solved plan into `directory`, all or nothing; return their names.
 
-    What is left out, and why, is among the `notes` of the summary.
+    What is left out, and why, is among the `notes` of the summary, behind those of the plan.
 
     Raises InputError if the directory cannot be written.
     """
@@ -63,7 +63,10 @@ def write_plan(
 
                 write_figures(plan, new)
             names = sorted([SUMMARY, *(file.name for file in new.iterdir())])
-            _write_json(new / SUMMARY, {**summary(plan), "run_id": run_id, "files": names, "notes": notes})
+            _write_json(
+                new / SUMMARY,
+                {**summary(plan), "run_id": run_id, "files": names, "notes": [*plan.notes, *notes]},
+            )
     except OSError as fault:
         raise InputError(
             f"cannot be written: {fault.strerror or fault}; what was there stays", source=str(directory)
@@ -96,6 +99,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             **optimum_summary(plan.grid, plan.prices),
             "blocks": len(plan.program),
             "grid_points": plan.grid_points,
+            "notes": plan.notes,
             "timings_s": plan.timings,
             "versions": versions(),
         }

@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 
 CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table
 FAULTS_SHOWN = 8
+NOTES_SHOWN = 8
 
 
-def plan_table(plan: Plan) -> Group:
-    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage."""
+def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
+    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage, how it was solved;
+    then the notes (None: the plan's)."""
     corner = f" on {plan.corner} corners" if plan.corner else ""
     title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
     table = _pairs()
@@ -53,7 +55,9 @@ def plan_table(plan: Plan) -> Group:
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
-    return _titled(title, table)
+    table.add_row("solution", plan.sentence)
+    said = plan.notes if notes is None else notes
+    return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
 def verdict_table(verdict: Verdict, title: str) -> Group:

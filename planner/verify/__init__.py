@@ -1,11 +1,16 @@
 """Judging a delivered motion by other code than that which made it.
 
-`verify` sees the programmed path, the machine and the delivered samples, and nothing else of the package: no sampling of the
-path, no constraint, no solver. What it checks, and how sharp each check is:
+`verify` sees the programmed path, the machine, the delivered samples and, between them, the motion they were taken from, at times
+that it chooses itself; and nothing else of the package: no sampling of the path, no constraint, no solver. What it checks, and how
+sharp each check is:
 
+    times.py      where it looks between the samples
     limits.py     velocity, acceleration, jerk per axis, feed, normal acceleration: on the columns and on differences of the
                   delivered positions
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
+    contour.py    how far motion and path are apart, also where a motion was lost
+    samples.py    periods, density and digits of the samples, their unit of time, rest at both ends
+    given.py      what of a trajectory was delivered, and how exactly
     pieces.py     the programmed path, laid out for the matching
     ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
@@ -14,8 +19,9 @@ path, no constraint, no solver. What it checks, and how sharp each check is:
 The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are never looked at.
 """
 
+from planner.verify.given import Given
 from planner.verify.judge import verify
 from planner.verify.ringing import Ringing
 from planner.verify.verdict import LimitCheck, Verdict
 
-__all__ = ["LimitCheck", "Ringing", "Verdict", "verify"]
+__all__ = ["Given", "LimitCheck", "Ringing", "Verdict", "verify"]

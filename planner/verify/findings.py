@@ -10,8 +10,8 @@ from planner.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.verify import limits as rows
-from planner.verify.matching import HELD, JUMPS, LAST, WORST_AT
-from planner.verify.pieces import CONTOUR_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, Pieces
+from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER
+from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, Pieces
 from planner.verify.stream import Limits, Seen
 from planner.verify.verdict import LimitCheck
 
@@ -88,7 +88,7 @@ def _limit_check(
         limit=float(limit_there if ratio > 0 else limit),
         time=float(look.seen.time[row]),
         position=look.seen.at[row],
-        line=_line(toolpath, pieces, look.seen.piece[row]),
+        line=line_of(toolpath, pieces, look.seen.piece[row]),
         limited=name.split(".")[0] not in not_limited,
         note=look.noted(text) if ratio > 0 else "",
     )
@@ -108,7 +108,7 @@ def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces:
             for axis, letter in enumerate(toolpath.axes):
                 row = group * len(toolpath.axes) + axis
                 if look.seen.worst[row, 0] > bound[axis]:
-                    where = f"t = {look.seen.time[row]:.6g} s, line {_line(toolpath, pieces, look.seen.piece[row])}"
+                    where = f"t = {look.seen.time[row]:.6g} s, line {line_of(toolpath, pieces, look.seen.piece[row])}"
                     said.append(
                         f"columns: {column}.{letter} does not agree with {against} at {where}: "
                         + look.noted(f"{look.seen.worst[row, 0]:.6g} of the difference that the limits allow")
@@ -121,85 +121,16 @@ def chord_error(looks: list[Look]) -> float:
     return float(looks[0].seen.worst[rows.GROUPS * looks[0].seen.at.shape[1] + rows.CHORD, 1])
 
 
-# ---- contour ---------------------------------------------------------------------------------------------------------
+# ---- ends, order, stops -----------------------------------------------------------------------------------------------
 
 
-def contour_error(looks: list[Look]) -> float:
-    """Largest distance of the motion from the path [mm]."""
-    return max(float(look.seen.match.worst[5]) for look in looks)
+def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tuple[float, list[str]]:
+    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it.
 
-
-def contour_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> LimitCheck:
-    """The motion's worst distance from the path, against the budget there."""
-    look = max(looks, key=lambda each: each.seen.match.worst[0])
-    ratio, distance, budget, time, piece, _ = look.seen.match.worst
-    if distance <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
-        ratio = min(ratio, 1.0)  # within the rounding of the matching, which is absolute too
-    return LimitCheck(
-        name="contour",
-        unit="mm",
-        ratio=float(ratio),
-        value=float(distance),
-        limit=float(budget) if budget > 0 else float(pieces.piece["budget"].min()),
-        time=float(time),
-        position=look.seen.match.place[WORST_AT],
-        line=_line(toolpath, pieces, int(piece)),
-        note=look.note,
-    )
-
-
-def vertex_error(looks: list[Look], pieces: Pieces) -> float:
-    """Largest distance of a programmed vertex from the motion [mm]."""
-    return max(float(_near(look, pieces)[pieces.joint["real"]].max()) for look in looks)
-
-
-def vertex_check(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> LimitCheck:
-    """The vertex that the motion misses by most, against its budget."""
-    look = max(looks, key=lambda each: (_near(each, pieces) / pieces.joint["budget"]).max())
-    near = _near(look, pieces)
-    i = int((near / pieces.joint["budget"]).argmax())
-    budget = float(pieces.joint["budget"][i])
-    ratio = near[i] / budget
-    if near[i] <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
-        ratio = min(ratio, 1.0)
-    return LimitCheck(
-        name="vertex",
-        unit="mm",
-        ratio=float(ratio),
-        value=float(near[i]),
-        limit=budget,
-        time=float(look.seen.match.passed["near_time"][i]),
-        position=pieces.vertex[i],
-        line=_line(toolpath, pieces, i - 1),
-        note=look.note,
-    )
-
-
-def vertex_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[str]:
-    """Vertices that the motion misses by more than their budget, and arcs cut short."""
-    said = []
-    for look in looks:
-        near = _near(look, pieces)
-        missed = np.flatnonzero(near > pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING)
-        for i in missed[:FAULTS_OF_A_KIND]:
-            what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
-            where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, pieces.vertex[i], strict=True))
-            budget = pieces.joint["budget"][i]
-            said.append(
-                f"vertex: {what} of line {_line(toolpath, pieces, i - 1)} at {where}: "
-                + look.noted(
-                    f"missed by {near[i]:.7g} mm, {near[i] / budget:.6g} of the budget {budget:.6g} mm"
-                )
-                + f", t = {look.seen.match.passed['near_time'][i]:.6g} s"
-            )
-        if len(missed) > FAULTS_OF_A_KIND:
-            said.append(f"vertex: {len(missed)} vertices missed in all")
-    return said
-
-
-def end_error(looks: list[Look], toolpath: Toolpath) -> tuple[float, list[str]]:
-    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it."""
+    rounding : (A,) largest error of a position by its digits [mm]
+    """
     worst, said = 0.0, []
+    allowed = CONTOUR_ROUNDING + float(np.linalg.norm(rounding))
     for look in looks:
         for name, place, wanted, time, line in (
             ("start", look.seen.first, toolpath.start[0], look.seen.t_first, toolpath.line[0]),
@@ -207,9 +138,9 @@ def end_error(looks: list[Look], toolpath: Toolpath) -> tuple[float, list[str]]:
         ):
             distance = float(np.linalg.norm(place - wanted))
             worst = max(worst, distance)
-            if distance > PLACE_ROUNDING:
+            if distance > allowed:
                 text = f"{name}: the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
-                said.append(text + look.noted(f"{PLACE_ROUNDING:g} mm allowed, line {line}"))
+                said.append(text + look.noted(f"{allowed:.2g} mm allowed, line {line}"))
     return worst, said
 
 
@@ -234,9 +165,9 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array,
             )
             said.append("order: " + look.noted(f"{len(here)} blocks are not run to their end, line {shown}"))
         if match.tally[HELD]:
-            said.append(
-                "order: " + look.noted(f"{match.tally[HELD]} samples far from where the program should be")
-            )
+            line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
+            held = f"lost after line {line}: {match.tally[HELD]} samples far from where the program should be"
+            said.append("order: " + look.noted(held))
         in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
     return np.unique(pieces.piece["segment"][lost]), in_order, said
 
@@ -273,14 +204,6 @@ def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[s
     return said
 
 
-def _near(look: Look, pieces: Pieces) -> FloatArray:
-    """Distance of each vertex from the motion; from the motion's end where it never came that far [mm]."""
-    near = look.seen.match.passed["near"].copy()
-    unseen = np.isinf(near)
-    near[unseen] = np.linalg.norm(pieces.vertex[unseen] - look.seen.last, axis=1)
-    return near
-
-
 def _joint_name(toolpath: Toolpath, i: int) -> str:
     where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, _joint_point(toolpath, i), strict=True))
     return (
@@ -294,5 +217,5 @@ def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
     return toolpath.start[i] if i < len(toolpath) else toolpath.end[-1]
 
 
-def _line(toolpath: Toolpath, pieces: Pieces, piece: int) -> int:
+def line_of(toolpath: Toolpath, pieces: Pieces, piece: int) -> int:
     return int(toolpath.line[pieces.piece["segment"][max(piece, 0)]])

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 
+from planner.arrays import FloatArray
 from planner.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
-from planner.verify import findings
-from planner.verify.dense import PERIOD_ROUNDING, Comparison
+from planner.verify import contour, findings, samples
+from planner.verify.dense import Comparison
 from planner.verify.findings import QUANTITIES, Look
-from planner.verify.pieces import pieces_of
+from planner.verify.given import DERIVATIVES, Given
+from planner.verify.pieces import Pieces, pieces_of, widened
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
+from planner.verify.times import Motion, look
 from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
+WHOLE = Given()
 
 
 def verify(
@@ -26,7 +30,9 @@ def verify(
     toolpath: Toolpath,
     machine: Machine,
     *,
-    dense: Iterable[Trajectory] | None = None,
+    motion: Motion | None = None,
+    seed: int = 0,
+    given: Given = WHOLE,
     not_limited: tuple[str, ...] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Verdict:
@@ -34,60 +40,82 @@ def verify(
 
     trajectory  : the delivered samples at dt; only its times, positions and their derivatives are looked at
     toolpath    : the programmed path (lines, arcs, helices) with feeds, budgets and stops
-    dense       : the same motion evaluated between the samples too: chunks in order, adjoining or overlapping; None to
-                  judge the samples alone
+    motion      : what the samples were taken from, to be looked at between them, at times that are chosen here (times.py); None
+                  to judge the samples alone
+    seed        : of those times; a motion that was changed by what one verdict saw needs a verdict with another seed
+    given       : which columns of the trajectory were delivered, and to how many digits
     not_limited : quantities that are reported but not part of passing, of `NOT_LIMITED_NAMES`
     progress    : called now and then with the share that is done, 0 to 1
 
-    Raises InputError if the axes differ or the trajectory has no samples, ValueError for an unknown name in `not_limited` and
-    for a toolpath that contradicts itself.
+    Raises InputError if the axes differ, the trajectory has no samples or its times can only be milliseconds, ValueError for an
+    unknown name in `not_limited` and for a toolpath that contradicts itself.
     """
     _check_input(trajectory, toolpath, not_limited)
+    if motion is None:
+        samples.check_unit_of_time(trajectory, toolpath, machine)
     pieces = pieces_of(toolpath)
-    limits = _limits(machine, toolpath, not_limited)
-    share = 0.5 if dense is not None else 1.0
+    limits = _limits(machine, trajectory, given, not_limited)
+    if limits.rounding.any():
+        pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
+    comparison = None
+    if motion is not None:
+        comparison = Comparison(trajectory, motion.end)
 
-    def delivered_done(samples: int) -> None:
-        if progress:
-            progress(share * samples / len(trajectory))
+    def read(pieces: Pieces, progress: Callable[[float], None] = lambda done: None) -> list[Look]:
+        share = 0.5 if motion is not None else 1.0
+        seen = watch(
+            [trajectory],
+            pieces,
+            limits,
+            middles=True,
+            progress=lambda count: progress(share * count / len(trajectory)),
+        )
+        looks = [Look(seen, "")]
+        if motion is not None and comparison is not None:
+            chunks = comparison.pass_on(
+                look(motion, machine.dt, seed), lambda done: progress(share + (1.0 - share) * done)
+            )
+            between = watch(chunks, pieces, limits, middles=False, progress=lambda count: None)
+            looks += [Look(between, "between the samples")] if between.samples else []
+        return looks
 
-    looks = [Look(watch([trajectory], pieces, limits, middles=True, progress=delivered_done), "")]
-    faults = _sampling_faults(trajectory)
-    if dense is not None:
-        comparison = Comparison(trajectory, lambda done: progress(0.5 + 0.5 * done) if progress else None)
-        seen = watch(comparison.pass_on(dense), pieces, limits, middles=False, progress=lambda samples: None)
-        if seen.samples:
-            looks.append(Look(seen, "between the samples"))
-        faults += comparison.faults(limits, looks)
-
+    looks = read(pieces, progress or (lambda done: None))
+    apart = contour.apart(looks, pieces, read)
+    contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
     checks = findings.limit_checks(looks, toolpath, machine, pieces, not_limited)
-    contour, vertex = (
-        findings.contour_check(looks, toolpath, pieces),
-        findings.vertex_check(looks, toolpath, pieces),
-    )
-    end_error, end_faults = findings.end_error(looks, toolpath)
+    contour_check = apart.contour_check(toolpath)
+    end_error, end_faults = findings.end_error(looks, toolpath, limits.rounding)
     lost, order, order_faults = findings.order(looks, toolpath, pieces)
+    coarse, notes = samples.digits(trajectory, limits, given, not_limited)
+    if motion is None:
+        seen = max(contour_error or 0.0, vertex_error or 0.0)
+        sparse = samples.density(trajectory, machine, limits, float(toolpath.tolerance.min()), seen)
+        coarse, notes = sparse[0] + coarse, sparse[1] + notes
+    faults = coarse + samples.period_faults(trajectory, given)
+    faults += comparison.faults(limits, looks) if comparison is not None else []
     faults += [check.sentence(toolpath.axes) for check in checks.values() if check.broken]
     faults += findings.column_faults(looks, limits, toolpath, pieces)
-    faults += end_faults
-    faults += [contour.sentence(toolpath.axes)] if contour.broken else []
-    faults += findings.vertex_faults(looks, toolpath, pieces)
+    faults += end_faults + samples.rest_faults(trajectory, looks, limits, given)
+    faults += [contour_check.sentence(toolpath.axes)] if contour_check.broken else []
+    faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
     return Verdict(
         passed=not faults,
         limits=checks,
-        contour=contour,
-        vertex=vertex,
-        contour_error_mm=findings.contour_error(looks),
-        vertex_error_mm=findings.vertex_error(looks, pieces),
+        contour=contour_check,
+        vertex=apart.vertex_check(toolpath),
+        contour_error_mm=contour_error,
+        vertex_error_mm=vertex_error,
         end_error_mm=end_error,
         chord_error_mm=findings.chord_error(looks),
         order=order,
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
+        lost_after=contour.lost_after(looks, toolpath, pieces, complete=not len(lost)),
         faults=tuple(faults),
         ringing=ringing_of(trajectory, machine),
+        notes=tuple(notes),
     )
 
 
@@ -106,32 +134,27 @@ def _check_input(trajectory: Trajectory, toolpath: Toolpath, not_limited: tuple[
             )
 
 
-def _limits(machine: Machine, toolpath: Toolpath, not_limited: tuple[str, ...]) -> Limits:
-    per_axis = np.array(
-        [
-            machine.limits("velocity", toolpath.axes),
-            machine.limits("acceleration", toolpath.axes),
-            machine.limits("jerk", toolpath.axes),
-        ]
-    )
+def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
+    per_axis = np.array([machine.limits(name, trajectory.axes) for name in DERIVATIVES])  # type: ignore[arg-type]
     return Limits(
         per_axis=per_axis,
-        linear=np.array([letter in LINEAR_AXES for letter in toolpath.axes]),
+        linear=np.array([letter in LINEAR_AXES for letter in trajectory.axes]),
+        judged=np.array([name in given.columns for name in DERIVATIVES]),
+        rounding=_rounding(trajectory, given, per_axis[1]),
+        time_rounding=given.time_rounding,
         normal_acceleration=machine.normal_acceleration or np.inf,
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
     )
 
 
-def _sampling_faults(trajectory: Trajectory) -> list[str]:
-    periods = np.diff(trajectory.t)
-    wrong = np.abs(periods - trajectory.dt) > PERIOD_ROUNDING
-    if len(wrong):
-        wrong[-1] = periods[-1] > trajectory.dt + PERIOD_ROUNDING  # the last one may be shorter
-    if not wrong.any():
-        return []
-    k = int(wrong.argmax())
-    return [
-        f"period: {periods[k]:.9g} s between the samples at t = {trajectory.t[k]:.6g} s and the next, dt is "
-        f"{trajectory.dt:.9g} s ({int(wrong.sum())} such periods)"
-    ]
+def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) -> FloatArray:
+    """(A,) largest error of a position by its digits and by those of the last time, at the speed the motion can have there [mm]."""
+    rounding = np.zeros(len(acceleration))
+    if len(given.position_rounding):
+        rounding = rounding + given.position_rounding
+    if given.end_rounding and len(trajectory) > 1:
+        h = float(trajectory.t[-1] - trajectory.t[-2])
+        speed = np.abs(trajectory.position[-1] - trajectory.position[-2]) / h + acceleration * h
+        rounding = rounding + given.end_rounding * speed
+    return rounding

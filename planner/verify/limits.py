@@ -9,6 +9,7 @@ spacing of the samples:
 No slack is needed but for rounding. A position carries an error of `ROUNDING_ULPS` units in the last place of what it is
 computed from: the coordinate, the path length run so far and (limit times) the time. It is carried through the same
 recursion and taken off: at 1 m of coordinates, 100 m of path and 1 ms it is worth 2e-10 mm, 1e-7 mm/s, 4e-4 mm/s2, 2 mm/s3.
+To it come the digits that a file was written with: those of the position, and those of the time at the speed there.
 
 The columns must belong to the positions. With |acceleration| <= A over a period h, and |jerk| <= J where jerk is limited,
 
@@ -20,7 +21,15 @@ Without a limit on jerk acceleration may jump within every period, and the accel
 jerk column, which may jump anyhow.
 
 Normal acceleration is |a - (a.t) t| with t = v/|v| over the linear axes; its share of the chord error over a period is
-|normal acceleration| h^2 / 8.
+|normal acceleration| h^2 / 8. Where velocity or acceleration was not delivered it is taken from the second difference, a mean of
+a(t) over w = t2 - t0, across the chord's direction u. With normal acceleration <= N, |a| <= A and speed >= v the motion's direction
+turns by at most N w / v in that time, and u lies within its turn, so that of the mean
+
+    |a - (a.u) u| <= N + A sin(min(N w / v, pi/2)),      v = chord / w - A w,
+
+where the second term is taken off.
+
+Only columns that were delivered are judged as columns, and compared with the positions.
 """
 
 from __future__ import annotations
@@ -52,6 +61,8 @@ def scan(
     limits: FloatArray,
     linear: Array,
     normal_max: float,
+    judged: Array,
+    digits: FloatArray,
     feed_max: FloatArray,
     travelled: float,
     worst: FloatArray,
@@ -63,6 +74,8 @@ def scan(
     limits           : (3, A) velocity, acceleration, jerk
     linear           : (A,) True on linear axes, which make up the feed
     normal_max       : [mm/s2], or inf
+    judged           : (3,) True if velocity, acceleration, jerk were delivered
+    digits           : (A+1,) largest error of a position [mm], last of a time [s], by the digits they were written with
     feed_max         : (n,) programmed feed at each sample [mm/s]
     travelled        : path length run before [mm]
     worst, sample    : (GROUPS A + ROWS_ALONE, 4) ratio, value, limit, `COLUMN` or `DIFFERENCE`, and the sample's index;
@@ -77,6 +90,10 @@ def scan(
     difference, error, before, error_before = work[0, 0], work[1, 0], work[2], work[3]
     ulp, resolution = ROUNDING_ULPS * 2.0**-52, RATIO_ROUNDING
     first = max(skip - 3, 0)
+    most_sq = 0.0
+    for axis in range(axes):
+        most_sq += limits[1, axis] ** 2 if linear[axis] else 0.0
+    most = math.sqrt(most_sq)
     for k in range(first, n):
         period = t[k] - t[k - 1] if k > first else math.inf
         step_sq = 0.0
@@ -88,7 +105,12 @@ def scan(
             travelled += step
         for axis in range(axes):
             difference[0] = position[k, axis]
-            error[0] = ulp * (abs(position[k, axis]) + travelled + limits[0, axis] * t[k])
+            error[0] = ulp * (abs(position[k, axis]) + travelled + limits[0, axis] * t[k]) + digits[axis]
+            if digits[axes] > 0.0 and n > first + 1:
+                to = max(k, first + 1)
+                lasting = t[to] - t[to - 1]
+                speed = abs(position[to, axis] - position[to - 1, axis]) / lasting + limits[1, axis] * lasting
+                error[0] += digits[axes] * speed
             for order in range(1, min(3, k - first) + 1):
                 over = order / (t[k] - t[k - order])
                 difference[order] = over * (difference[order - 1] - before[axis, order - 1])
@@ -108,23 +130,22 @@ def scan(
                 before[axis, order], error_before[axis, order] = difference[order], error[order]
             if k < skip:
                 continue
-            _keep(worst, sample, VELOCITY * axes + axis, abs(velocity[k, axis]), limits[0, axis], k, COLUMN)
-            _keep(
-                worst,
-                sample,
-                ACCELERATION * axes + axis,
-                abs(acceleration[k, axis]),
-                limits[1, axis],
-                k,
-                COLUMN,
-            )
-            _keep(worst, sample, JERK * axes + axis, abs(jerk[k, axis]), limits[2, axis], k, COLUMN)
-            if k == first:
+            if judged[0]:
+                value = abs(velocity[k, axis])
+                _keep(worst, sample, VELOCITY * axes + axis, value, limits[0, axis], k, COLUMN)
+            if judged[1]:
+                value = abs(acceleration[k, axis])
+                _keep(worst, sample, ACCELERATION * axes + axis, value, limits[1, axis], k, COLUMN)
+            if judged[2]:
+                _keep(worst, sample, JERK * axes + axis, abs(jerk[k, axis]), limits[2, axis], k, COLUMN)
+            if k == first or not judged[0]:
                 continue
             mean = 0.5 * (velocity[k, axis] + velocity[k - 1, axis])
             gap = max(abs(difference[1] - mean) - error[1] - resolution * limits[0, axis], 0.0) / period
             _keep(worst, sample, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
             _keep(worst, sample, GAP_BY_JERK * axes + axis, gap / period, limits[2, axis] / 12.0, k, COLUMN)
+            if not judged[1]:
+                continue
             mean = 0.5 * (acceleration[k, axis] + acceleration[k - 1, axis])
             change = (velocity[k, axis] - velocity[k - 1, axis]) / period
             noise = resolution * (limits[0, axis] / period + limits[1, axis])
@@ -132,14 +153,23 @@ def scan(
             _keep(worst, sample, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
         if k < skip:
             continue
-        feed, normal = _feed_and_normal(velocity, acceleration, k, linear)
-        _keep(worst, sample, alone + FEED, feed, feed_max[k], k, COLUMN)
-        _keep(worst, sample, alone + NORMAL, normal, normal_max, k, COLUMN)
+        how = COLUMN if judged[0] and judged[1] else DIFFERENCE
+        if how == COLUMN:
+            feed, normal = _feed_and_normal(velocity, acceleration, k, linear)
+            _keep(worst, sample, alone + FEED, feed, feed_max[k], k, COLUMN)
+            _keep(worst, sample, alone + NORMAL, normal, normal_max, k, COLUMN)
+        else:
+            normal = 0.0
+            if k - first >= 2:
+                normal, taken_off = _mean_normal(
+                    t, position, before, error_before, k, linear, normal_max, most
+                )
+                _keep(worst, sample, alone + NORMAL, normal - taken_off, normal_max, k, DIFFERENCE)
         if k > first:
             allowed = max(feed_max[k], feed_max[k - 1])
             rounding = math.sqrt(float(axes)) * error[1]
             _keep(worst, sample, alone + FEED, max(step / period - rounding, 0.0), allowed, k, DIFFERENCE)
-            _keep(worst, sample, alone + CHORD, normal * period * period / 8.0, 1.0, k, COLUMN)
+            _keep(worst, sample, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
     return travelled
 
 
@@ -160,6 +190,44 @@ def _feed_and_normal(
         if linear[axis]:
             normal_sq += (acceleration[k, axis] - along * velocity[k, axis] / feed_sq) ** 2
     return feed, math.sqrt(normal_sq)
+
+
+@kernel()
+def _mean_normal(
+    t: FloatArray,
+    position: FloatArray,
+    difference: FloatArray,
+    error: FloatArray,
+    k: int,
+    linear: Array,
+    normal_max: float,
+    most: float,
+) -> tuple[float, float]:
+    """Second difference at samples k-2 .. k across their chord [mm/s2], and what of it may be other than normal acceleration.
+
+    difference, error : (A, 4) differences at sample k by order, and their rounding
+    most              : largest norm of the acceleration of the linear axes [mm/s2]
+    """
+    chord_sq, along, rounding_sq = 0.0, 0.0, 0.0
+    for axis in range(len(linear)):
+        if linear[axis]:
+            step = position[k, axis] - position[k - 2, axis]
+            chord_sq += step * step
+            along += step * difference[axis, 2]
+            rounding_sq += error[axis, 2] ** 2
+    lasting = t[k] - t[k - 2]
+    if math.sqrt(chord_sq) <= FEED_AT_REST * lasting:
+        return 0.0, 0.0
+    normal_sq = 0.0
+    for axis in range(len(linear)):
+        if linear[axis]:
+            step = position[k, axis] - position[k - 2, axis]
+            normal_sq += (difference[axis, 2] - along * step / chord_sq) ** 2
+    slowest = math.sqrt(chord_sq) / lasting - most * lasting
+    turn = 0.5 * math.pi
+    if slowest > 0.0:
+        turn = min(turn, normal_max * lasting / slowest)
+    return math.sqrt(normal_sq), most * math.sin(turn) + math.sqrt(rounding_sq)
 
 
 @kernel(inline=True)

@@ -23,7 +23,10 @@ Where nothing within eps is possible any more, the matching goes on as follows, 
   1. a vertex passed at up to twice its budget is taken as passed (a corner cut too deep; the motion itself is near the path);
   2. the budget is widened, up to twice, to the least that lets the motion go on (a contour error);
   3. the first piece ahead within eps is taken, what lies between is lost (a block left out);
-  4. the place on the path is held until one of these works.
+  4. the place on the path is held until one of these works: the motion is lost.
+
+A lost motion has no distance from the path: which part of the path it would have to be near is what is not known. Its samples enter
+no contour error, and a vertex on lost pieces that no chord was compared with keeps the distance inf.
 """
 
 from __future__ import annotations
@@ -39,7 +42,6 @@ from planner.verify.pieces import (
     PLACE_ROUNDING,
     RATIO_ROUNDING,
     Pieces,
-    distance_from,
     kernel,
     reach,
     reach_chord,
@@ -54,7 +56,8 @@ STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding
 
 TRACK = np.dtype([("low", "f8"), ("new", "f8"), ("lost", "?")])
 PASSED = np.dtype([("near", "f8"), ("near_time", "f8"), ("rest", "f8"), ("stop_ratio", "f8")])
-FIRST, LAST, JUMPS, SEARCHED, HELD = range(5)  # in Match.tally
+FIRST, LAST, JUMPS, SEARCHED, HELD, LOST_AFTER, ASTRAY = range(7)  # in Match.tally
+NOT_LOST = -1  # in tally[LOST_AFTER]
 BEFORE, POINT, WORST_AT = range(3)  # in Match.place
 
 
@@ -64,9 +67,11 @@ class Match(NamedTuple):
     track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
     passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to
              stop: rest = standstill there [s], stop_ratio = how well it stops, <= 1 if within what samples can show
-    tally  : (5,) first and last possible piece; jumps over lost pieces; pieces searched; samples held
+    tally  : (7,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the last piece that was
+             possible when the motion was lost first, or NOT_LOST; 1 while it is lost
     place  : (3, A) the sample before, the present one, the worst one [mm]
-    worst  : (6,) of the worst sample: ratio, distance [mm], budget [mm], time [s], piece; largest distance of any [mm]
+    worst  : (6,) of the worst sample that is not lost: ratio, distance [mm], budget [mm], time [s], piece; largest distance of
+             any [mm]
     """
 
     track: Array
@@ -81,10 +86,12 @@ def new_match(pieces: Pieces) -> Match:
     vertices, axes = pieces.vertex.shape
     track, passed = np.zeros(vertices - 1, dtype=TRACK), np.zeros(vertices, dtype=PASSED)
     track["low"] = passed["near"] = passed["stop_ratio"] = np.inf
+    tally = np.zeros(7, dtype=np.int64)
+    tally[LOST_AFTER] = NOT_LOST
     return Match(
         track=track,
         passed=passed,
-        tally=np.zeros(5, dtype=np.int64),
+        tally=tally,
         place=np.zeros((3, axes)),
         worst=np.zeros(6),
     )
@@ -99,6 +106,7 @@ def follow(
     skip: int,
     middles: bool,
     acceleration_max: FloatArray,
+    rounding: FloatArray,
     piece: Array,
     feed_max: FloatArray,
 ) -> None:
@@ -106,6 +114,7 @@ def follow(
 
     middles          : the middle of every chord is a sample too
     acceleration_max : (A,) [mm/s2]; how far and how fast a sample can be next to a stop
+    rounding         : (A,) largest error of a position by its digits [mm]
     piece, feed_max  : (n,) written: the piece each sample lies on, and the largest feed of those it can lie on [mm/s]
     """
     n, axes = position.shape
@@ -128,7 +137,7 @@ def follow(
             piece[k], feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
             for i in range(first, match.tally[LAST] + 2):
                 if k and pieces.joint[i]["stop"]:
-                    _watch_stop(pieces, match, i, before, point, period, parts, acceleration_max)
+                    _watch_stop(pieces, match, i, before, point, period, parts, acceleration_max, rounding)
             for axis in range(axes):
                 before[axis] = point[axis]
 
@@ -162,6 +171,8 @@ def _step(
         _commit(match, first, last)
     else:
         distance, i, feed = _stray(pieces, match, before, point, time)
+        if match.tally[ASTRAY]:
+            return i, feed
     match.worst[5] = max(match.worst[5], distance)
     budget = pieces.piece[i]["budget"]
     if distance > match.worst[0] * budget:
@@ -228,9 +239,9 @@ def _column(
 def _stray(
     pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[float, int, float]:
-    """Far from where the program should be: take the first piece ahead that fits, or hold the place on the path.
+    """Far from where the program should be: take the first piece ahead that fits, or hold the place on the path, lost.
 
-    -> distance [mm], piece, feed [mm/s]
+    -> distance [mm], inf if lost; piece, feed [mm/s]
     """
     track, passed, tally = match.track, match.passed, match.tally
     begin = tally[LAST] + 1
@@ -243,28 +254,31 @@ def _stray(
             continue
         tally[JUMPS] += 1
         for j in range(begin, ahead + 1):
+            track[j]["lost"] = j < ahead
+            if tally[ASTRAY] and j > begin:
+                continue  # earlier chords may have been nearer, and were not compared
             _, _, apart = reach_chord(before, point, pieces, j, 0.0)
             if apart < passed[j]["near"]:
                 passed[j]["near"], passed[j]["near_time"] = apart, time
-            track[j]["lost"] = j < ahead
         track[ahead]["new"] = 0.0
         _commit(match, ahead, ahead)
         return distance, ahead, pieces.piece[ahead]["feed"]
 
+    if tally[LOST_AFTER] == NOT_LOST:
+        tally[LOST_AFTER] = tally[LAST]
     tally[HELD] += 1
-    nearest, best, feed = np.inf, tally[FIRST], 0.0
+    tally[ASTRAY] = 1
+    feed = 0.0
     for i in range(tally[FIRST], begin):
         if track[i]["low"] < np.inf:
-            distance = distance_from(pieces, i, track[i]["low"], point)
             feed = max(feed, pieces.piece[i]["feed"])
-            if distance < nearest:
-                nearest, best = distance, i
-    return nearest, best, feed
+    return np.inf, tally[LAST], feed
 
 
 @kernel()
 def _commit(match: Match, first: int, last: int) -> None:
     """Make the possible pieces `first` to `last` of match.track.new the present ones."""
+    match.tally[ASTRAY] = 0
     for i in range(match.tally[FIRST], match.tally[LAST] + 1):
         match.track[i]["low"] = np.inf
     for i in range(first, last + 1):
@@ -282,6 +296,7 @@ def _watch_stop(
     period: float,
     parts: int,
     acceleration_max: FloatArray,
+    rounding: FloatArray,
 ) -> None:
     """What the chord from `before` to `point`, one of `parts` of a period, shows of the stop at vertex i.
 
@@ -292,8 +307,8 @@ def _watch_stop(
     for axis in range(len(point)):
         move = abs(point[axis] - before[axis])
         bow = acceleration_max[axis] * period * period / 8.0
-        slow = max(slow, max(move * parts - STILL, 0.0) / (4.0 * bow))
-        away_sq += bow * bow
+        slow = max(slow, max(move * parts - STILL - 2.0 * rounding[axis], 0.0) / (4.0 * bow))
+        away_sq += (bow + rounding[axis]) ** 2
         still = still and move <= STILL
     away = math.sqrt(away_sq) + PLACE_ROUNDING
     _, _, apart = reach_chord(before, point, pieces, i, 0.0)

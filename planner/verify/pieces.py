@@ -36,6 +36,7 @@ CONTOUR_ROUNDING = (
     1e-8  # [mm] allowance on distances: rounding of coordinates up to 1e3 mm after 1e6 mm of path is 1e-10
 )
 PLACE_ROUNDING = 1e-6  # [mm] what "exactly at the point" means: the least digit that NC programs and trajectory files carry
+PERIOD_ROUNDING = 1e-9  # [s] of a sample's time: the least digit that files print; float64 has it up to 1e6 s
 NEWTON_STEPS = 8  # quadratic from the polar angle; four suffice for a helix whose pitch equals its radius
 
 
@@ -120,6 +121,14 @@ def pieces_of(toolpath: Toolpath) -> Pieces:
     )
 
 
+def widened(pieces: Pieces, factor: float = 1.0, more: float = 0.0) -> Pieces:
+    """The same pieces and vertices with `factor` times their budgets and `more` [mm]."""
+    piece, joint = pieces.piece.copy(), pieces.joint.copy()
+    for table in (piece, joint):
+        table["budget"] = factor * table["budget"] + more
+    return pieces._replace(piece=piece, joint=joint)
+
+
 def _arc_points(toolpath: Toolpath, row: Array, x: FloatArray) -> FloatArray:
     arcs = toolpath.arcs
     angle = arcs.rate[row] * x
@@ -198,28 +207,6 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
     half = math.sqrt(max(radius * radius - off_sq, 0.0) / length_sq)
     # the nearest point belongs to the part whatever the rounding of `half`
     return min(max(x - half, 0.0), nearest), max(min(x + half, 1.0), nearest), distance
-
-
-@kernel()
-def distance_from(pieces: Pieces, i: int, low: float, q: FloatArray) -> float:
-    """Distance [mm] of q (A,) from the part of piece i that begins at the fraction `low`."""
-    _, _, distance = reach(pieces, i, q, 0.0)
-    apart_sq, ahead = 0.0, 0.0
-    piece = pieces.piece[i]
-    k, x, c, s = piece["arc"], piece["x0"] + low * (piece["x1"] - piece["x0"]), 1.0, 0.0
-    if k >= 0:
-        c, s = math.cos(pieces.turn[k, RATE] * x), math.sin(pieces.turn[k, RATE] * x)
-    for n in range(len(q)):
-        if k >= 0:
-            e1, e2, drift = pieces.frame[k, E1, n], pieces.frame[k, E2, n], pieces.frame[k, DRIFT, n]
-            place = pieces.frame[k, CENTER, n] + pieces.turn[k, RADIUS] * (c * e1 + s * e2) + drift * x
-            tangent = pieces.turn[k, RADIUS] * pieces.turn[k, RATE] * (c * e2 - s * e1) + drift
-        else:
-            tangent = pieces.vertex[i + 1, n] - pieces.vertex[i, n]
-            place = pieces.vertex[i, n] + low * tangent
-        apart_sq += (place - q[n]) ** 2
-        ahead += (place - q[n]) * tangent
-    return math.sqrt(apart_sq) if ahead > 0.0 else distance  # q lies behind: the part's beginning is nearest
 
 
 @kernel()

@@ -24,10 +24,18 @@ COLUMNS = ("t", "position", "velocity", "acceleration", "jerk")
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What the motion is measured against: (3, A) velocity, acceleration, jerk; and the rest."""
+    """What the motion is measured against: (3, A) velocity, acceleration, jerk; and the rest.
+
+    judged        : (3,) True for the columns velocity, acceleration, jerk that were delivered
+    rounding      : (A,) largest error of a position by its digits [mm]
+    time_rounding : the same of a time [s]
+    """
 
     per_axis: FloatArray
     linear: Array
+    judged: Array
+    rounding: FloatArray
+    time_rounding: float
     normal_acceleration: float
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
     jerk_limited: bool
@@ -106,10 +114,22 @@ def _block(
         seen.first, seen.t_first = position[0].copy(), float(t[0])
     seen.last, seen.t_last = position[-1].copy(), float(t[-1])
     seen.samples += len(t) - skip
+    rounding = np.append(limits.rounding, limits.time_rounding)
     periods = np.diff(t[max(skip - 1, 0) :])
     seen.gap_max = max(seen.gap_max, float(periods.max(initial=0.0)))
     piece = np.zeros(len(t), dtype=np.int64)
-    follow(pieces, seen.match, t, position, skip, middles, limits.acceleration_at_stop, piece, feed_max)
+    follow(
+        pieces,
+        seen.match,
+        t,
+        position,
+        skip,
+        middles,
+        limits.acceleration_at_stop,
+        limits.rounding,
+        piece,
+        feed_max,
+    )
     worst = np.zeros_like(seen.worst)
     worst[:, 0] = seen.worst[:, 0]
     sample = np.full(len(worst), -1, dtype=np.int64)
@@ -123,6 +143,8 @@ def _block(
         limits.per_axis,
         limits.linear,
         limits.normal_acceleration,
+        limits.judged,
+        rounding,
         feed_max,
         travelled,
         worst,

@@ -58,10 +58,12 @@ class Verdict:
 
     passed           : every check holds (those "not limited" aside)
     limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
-    contour          : the motion's worst distance from the path, against the budget of the segment there
-    vertex           : the worst distance of a programmed vertex from the motion, against the joint's budget
-    contour_error_mm : largest distance of the motion (samples, their chords, dense positions) from the path [mm]
-    vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]
+    contour          : the motion's worst distance from the path as far as it could be followed, against the budget there
+    vertex           : the worst distance of a programmed vertex from the motion, of those that are known, against the budget there
+    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if it
+                       could not be followed
+    vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
+    lost_after       : NC line of the last block along which the motion could be followed; None if it ran the whole program
     end_error_mm     : distance of the first or last sample from the program's start or end, the larger [mm]
     chord_error_mm   : largest bound |normal acceleration| dt^2 / 8 of the bow over one period [mm]; contained in the contour
     order            : the blocks are run in the program's order, none is lost
@@ -69,14 +71,15 @@ class Verdict:
     lost_lines       : their NC lines
     faults           : one sentence per failure: what, by how much, when, where, NC line
     ringing          : what each vibration mode of the machine does; reported, not judged
+    notes            : what could not be judged sharply, and why
     """
 
     passed: bool
     limits: dict[str, LimitCheck]
     contour: LimitCheck
     vertex: LimitCheck
-    contour_error_mm: float
-    vertex_error_mm: float
+    contour_error_mm: float | None
+    vertex_error_mm: float | None
     end_error_mm: float
     chord_error_mm: float
     order: bool
@@ -84,6 +87,8 @@ class Verdict:
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
     ringing: tuple[Ringing, ...] = ()
+    lost_after: int | None = None
+    notes: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The part of `summary.json` that is called `verdict`."""
@@ -94,4 +99,5 @@ class Verdict:
             "vertex_error_mm": self.vertex_error_mm,
             "end_error_mm": self.end_error_mm,
             "ringing": [mode.summary() for mode in self.ringing],
+            "lost_after_line": self.lost_after,
         }

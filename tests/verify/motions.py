@@ -209,18 +209,35 @@ def chain(*parts: tuple[float, Motion]) -> tuple[float, Motion]:
     return float(ends[-1]), motion
 
 
-def sample(motion: tuple[float, Motion], dt: float, *, fine: int = 1) -> Trajectory:
-    """The motion at dt / fine; the last period is shorter."""
-    duration, at = motion
-    t = np.arange(int(np.floor(duration / dt * fine - 1e-9)) + 1) * (dt / fine)
-    t = np.append(t, duration)
-    position, velocity, acceleration, jerk = at(t)
-    none = np.full(len(t), -1)
-    zero = np.zeros(len(t))
-    return Trajectory(
-        axes=("x", "y", "z"), dt=dt, t=t, position=position, velocity=velocity, acceleration=acceleration,
-        jerk=jerk, s=zero, feed=zero, block=none, line=none,
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Asked:
+    """A motion that can be asked at any time, with `fine` pieces per period."""
+
+    motion: tuple[float, Motion]
+    dt: float
+    fine: int = 4
+
+    @property
+    def end(self) -> float:
+        return self.motion[0]
+
+    @property
+    def t(self) -> np.ndarray:
+        return np.arange(0.0, self.end, self.dt / self.fine)
+
+    def at(self, times: np.ndarray, dt: float) -> Trajectory:
+        position, velocity, acceleration, jerk = self.motion[1](times)
+        none, zero = np.full(len(times), -1), np.zeros(len(times))
+        return Trajectory(
+            axes=("x", "y", "z"), dt=dt, t=times, position=position, velocity=velocity,
+            acceleration=acceleration, jerk=jerk, s=zero, feed=zero, block=none, line=none,
+        )  # fmt: skip
+
+
+def sample(motion: tuple[float, Motion], dt: float) -> Trajectory:
+    """The motion at dt; the last period is shorter."""
+    t = np.arange(int(np.floor(motion[0] / dt - 1e-9)) + 1) * dt
+    return Asked(motion, dt).at(np.append(t, motion[0]), dt)
 
 
 def changed(trajectory: Trajectory, **columns) -> Trajectory:

@@ -1,0 +1,173 @@
+"""What the samples themselves must be: at the machine's period, dense enough, with enough digits, in seconds, from rest to rest.
+
+Density. Where the motion cannot be asked, nothing is known of it between two samples h apart but that it keeps the machine's limits,
+if it does: per axis it is within a h^2 / 8 of the chord. At h <= dt that is the machine's own interpolation, and the chord is what it
+makes of the samples. At h > dt the contour is known up to
+
+    bow = (h^2 / 8) |a|,    |a| the norm of the axes' limits,
+
+and is judged only if what was seen and the bow together are within the tolerance.
+
+Digits. Positions good to r and times good to d (at the speed v) make the n-th difference at the period h good to
+
+    2^n (r + v d) / h^n,
+
+which `limits` takes off before it judges. Where that is as much as the limit, a motion at twice the limit would pass: the quantity
+cannot be judged by the positions.
+
+Rest. A motion that rests at its first and last sample has run, over the period h next to it, per axis at most a h^2 / 2, and
+j h^3 / 6 where jerk is limited; its velocity is zero there, and with limited jerk its acceleration too. A file whose last samples are
+missing shows that here, although its end may be as near to the program's as the tolerance asks.
+
+Seconds. No program takes 200 times as long as at its programmed feed, but for a column in milliseconds or less.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.errors import InputError
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.trajectory import Trajectory
+from planner.verify.findings import QUANTITIES, Look, measured
+from planner.verify.given import Given
+from planner.verify.limits import ACCELERATION, JERK, ROUNDING_ULPS
+from planner.verify.matching import STILL
+from planner.verify.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
+from planner.verify.stream import Limits
+
+# A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at samples so many of the
+# machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at least 1000 times.
+TOO_SLOW, TOO_SPARSE = 200.0, 10.0
+TIME_UNITS = ((1e5, 1e6, "microseconds"), (TOO_SLOW, 1e3, "milliseconds"))
+# The rounding of differences is mentioned if it is more than this share of a limit [-].
+WORTH_A_WORD = 1e-3
+
+
+def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Machine) -> None:
+    """Raise InputError if the times can only be milliseconds or microseconds."""
+    periods = np.diff(trajectory.t)
+    moving = (np.abs(np.diff(trajectory.position, axis=0)) > STILL).any(axis=1)
+    if not moving.any() or np.median(periods) < TOO_SPARSE * machine.dt:
+        return
+    fastest = float(np.linalg.norm(machine.limits("velocity", toolpath.axes)))
+    least = float((toolpath.length / np.minimum(toolpath.feed, fastest)).sum())
+    ratio = float(periods[moving].sum()) / least
+    for beyond, factor, unit in TIME_UNITS:
+        if ratio > beyond:
+            raise InputError(
+                f"the times look like {unit}: samples are {np.median(periods):.6g} s apart, and the motion takes {ratio:.3g} times as "
+                f"long as the program at its feed ({least:.4g} s); t must be in seconds: divide it by {factor:g}"
+            )
+
+
+def period_faults(trajectory: Trajectory, given: Given) -> list[str]:
+    """Periods that are not dt."""
+    periods = np.diff(trajectory.t)
+    allowed = PERIOD_ROUNDING + 2.0 * given.time_rounding
+    wrong = np.abs(periods - trajectory.dt) > allowed
+    if len(wrong):
+        wrong[-1] = periods[-1] > trajectory.dt + allowed + given.end_rounding  # the last one may be shorter
+    if not wrong.any():
+        return []
+    k = int(wrong.argmax())
+    return [
+        f"period: {periods[k]:.9g} s between the samples at t = {trajectory.t[k]:.6g} s and the next, dt is "
+        f"{trajectory.dt:.9g} s ({int(wrong.sum())} such periods)"
+    ]
+
+
+def density(
+    trajectory: Trajectory, machine: Machine, limits: Limits, budget: float, seen: float | None
+) -> tuple[list[str], list[str]]:
+    """Faults and notes about what is not known between samples that are further apart than the machine's period.
+
+    budget : smallest tolerance of the program [mm]
+    seen   : largest distance of samples and chords from the path, and of vertices from them [mm]; None if it is not known
+    """
+    h = float(np.diff(trajectory.t).max(initial=0.0))
+    if h <= machine.dt * (1.0 + RATIO_ROUNDING) + PERIOD_ROUNDING:
+        return [], []
+    most = float(np.linalg.norm(limits.per_axis[1]))
+    bow = most * h * h / 8.0
+    apart = (
+        f"samples {h:.6g} s apart, the machine's period is {machine.dt:g} s: between two of them a motion within "
+        f"the limits can leave their chord by {bow:.4g} mm"
+    )
+    if (seen or 0.0) + bow > budget:
+        dense = np.sqrt(8.0 * max(budget - (seen or 0.0), 0.0) / most)
+        remedy = f"sample every {dense:.3g} s" if dense > 0 else "sample every period"
+        with_seen = f", beside the {seen:.4g} mm seen" if seen else ""
+        return [
+            f"samples: too coarse to judge: {apart}{with_seen}; the tolerance is {budget:g} mm; {remedy}"
+        ], []
+    return [], [f"{apart}; velocity, acceleration and jerk are known as means over such periods only"]
+
+
+def digits(
+    trajectory: Trajectory, limits: Limits, given: Given, not_limited: tuple[str, ...]
+) -> tuple[list[str], list[str]]:
+    """Faults and notes about what the positions and times are too coarsely written to tell."""
+    if not (limits.rounding.any() or given.time_rounding):
+        return [], []
+    h, axes = trajectory.dt, trajectory.axes
+    speed = np.abs(np.diff(trajectory.position, axis=0) / np.diff(trajectory.t)[:, None]).max(
+        axis=0, initial=0.0
+    )
+    error = limits.rounding + speed * given.time_rounding
+    faults, shares = [], []
+    for order, quantity in enumerate(QUANTITIES, start=1):
+        share = 2.0**order * error / h**order / limits.per_axis[order - 1]
+        k = int(share.argmax())
+        shares.append(f"{quantity}.{axes[k]} to {100 * share[k]:.2g} % of its limit")
+        if share[k] >= 1.0 and quantity not in given.columns and quantity not in not_limited:
+            faults.append(
+                f"samples: too few digits to judge {quantity}.{axes[k]}: positions good to {error[k]:.2g} mm every {h:g} s leave it "
+                f"unknown to {share[k]:.3g} times its limit; write more digits, or report it unjudged: --not-limited {quantity}"
+            )
+        if share[k] < WORTH_A_WORD:
+            shares.pop()
+    if not shares:
+        return faults, []
+    said = f"positions are written to {error.max():.2g} mm"
+    return faults, [f"{said}: their differences know {', '.join(shares)}"]
+
+
+def rest_faults(trajectory: Trajectory, looks: list[Look], limits: Limits, given: Given) -> list[str]:
+    """A first or last sample that is not at rest."""
+    t, x = trajectory.t, trajectory.position
+    if len(t) < 2:
+        return []
+    acceleration = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION))
+    jerk = limits.per_axis[2] * np.maximum(1.0, measured(looks, JERK))
+    run = float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum())
+    said = []
+    for name, at, beside, advice in (
+        ("start", 0, 1, ""),
+        ("end", -1, -2, ": are the last samples missing?"),
+    ):
+        h = abs(float(t[at] - t[beside])) + given.end_rounding + 2.0 * given.time_rounding
+        furthest = acceleration * h * h / 2.0
+        if limits.jerk_limited:
+            furthest = np.minimum(furthest, jerk * h**3 / 6.0)
+        rounding = ROUNDING_ULPS * 2.0**-52 * (np.abs(x[at]) + run + limits.per_axis[0] * t[at])
+        over = (
+            np.abs(x[at] - x[beside]) - furthest * (1.0 + RATIO_ROUNDING) - 2.0 * (rounding + limits.rounding)
+        )
+        k = int(over.argmax())
+        if over[k] > 0:
+            said.append(
+                f"{name}: not at rest: {trajectory.axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
+                f"next to it, {furthest[k]:.4g} mm are possible{advice}"
+            )
+        for quantity, row in (("velocity", 0), ("acceleration", 1)):
+            value: FloatArray = np.abs(getattr(trajectory, quantity)[at])
+            k = int((value / limits.per_axis[row]).argmax())
+            judged = quantity in given.columns and (row == 0 or limits.jerk_limited)
+            if judged and value[k] > RATIO_ROUNDING * limits.per_axis[row, k]:
+                said.append(
+                    f"{name}: not at rest: {quantity}.{trajectory.axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
+                )
+    return said

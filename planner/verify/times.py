@@ -1,0 +1,66 @@
+"""Where the judge looks between the samples: at times of its own, which nobody can prepare for.
+
+A planned motion can be asked at any time. Its pieces, on which everything is smooth, and the periods of the machine are cut into
+cells, and every cell is looked at once, at a time drawn at random from a generator with a fixed seed:
+
+    every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
+    every period   at least `PER_PERIOD` cells, whatever the pieces are said to be
+
+so that a narrow peak cannot hide from all of them, two looks with one seed are the same, and with another seed they share no time
+but the motion's first and last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.trajectory import Trajectory
+
+PER_PIECE = 4  # cells; the planner's own places are three a piece
+PER_PERIOD = 2  # cells; two neighbouring times are then less than one period apart
+SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the rounding of a position in it
+CELLS = 100_000  # looked at together: 30 MB for three axes
+
+
+class Motion(Protocol):
+    """A motion that can be asked at any time."""
+
+    @property
+    def t(self) -> FloatArray:
+        """(L,) start of each piece on which everything is smooth [s], non-decreasing."""
+        ...
+
+    @property
+    def end(self) -> float:
+        """End of the motion [s]; it begins at 0."""
+        ...
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record that is returned."""
+        ...
+
+
+def look(motion: Motion, dt: float, seed: int) -> Iterator[Trajectory]:
+    """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's period [s]."""
+    draw = np.random.default_rng(seed)
+    edges = np.concatenate([[0.0], motion.t, [motion.end]])
+    begin, lasting = edges[:-1], np.diff(edges)
+    cells = np.maximum(PER_PIECE, np.ceil(PER_PERIOD * lasting / dt)).astype(np.int64)
+    cells[lasting <= SHORTEST_PIECE] = 0
+    last = np.cumsum(cells)  # the number of cells up to the end of each piece
+    seen = -np.inf
+    for first in range(0, int(last[-1]), CELLS):
+        cell = np.arange(first, min(first + CELLS, int(last[-1])))
+        piece = np.searchsorted(last, cell, side="right")
+        place = (cell - last[piece] + cells[piece] + draw.random(len(cell))) / cells[piece]
+        ends = [[0.0]] if not first else [], [[motion.end]] if cell[-1] + 1 == last[-1] else []
+        times = np.minimum(begin[piece] + lasting[piece] * place, motion.end)
+        times = np.unique(np.concatenate([*ends[0], times, *ends[1]]))
+        times = times[times > seen]
+        if len(times):
+            seen = times[-1]
+            yield motion.at(times, dt)

@@ -41,7 +41,15 @@ class Axis(_Record):
 
 
 class Fir(_Record):
-    """FIR filters behind the interpolator (papers 000, 001): time constants [s], largest phase lag [deg]."""
+    """Moving averages in series in the drive or the control, behind the delivered setpoints.
+
+    The same for every method: the motion behind them stays within the tolerance. Filters that a method makes its setpoints with are
+    settings of that method.
+
+    time_constants : their lengths [s], any number, in any order
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; methods `optimal` and `toppra`,
+                     and `bezier` at its corners, keep it, the others do not use it
+    """
 
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
     phase_lag_max: Positive | None = None

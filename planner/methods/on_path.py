@@ -74,10 +74,10 @@ def plan_of_solution(
     prices: PriceList | None = None,
 ) -> Plan:
     """The plan of a solution and the motion made of it, None for both unless solved."""
-    corners = grid = None
+    rounded = grid = None
     if motion is not None:
         with job.stage("report"):
-            corners = corner_table(best.samples, best.problem, best.solution)
+            rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, motion.law)
         job.note(*path_notes(job.toolpath, best))
     return job.plan(
@@ -88,7 +88,7 @@ def plan_of_solution(
         status=best.solution.status,
         sentence="; ".join((best.solution.sentence, *best.notes)),
         grid_points=len(best.samples),
-        corners=corners,
+        rounded=rounded,
         grid=grid,
         prices=prices,
     )

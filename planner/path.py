@@ -30,6 +30,7 @@ from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
+from planner.path_calm import Calm, calm, quiet_way
 from planner.path_grid import divide, evaluate, grade
 from planner.path_rows import cut_path
 
@@ -39,10 +40,13 @@ RESOLUTION = 2e-3
 # Jobs with more corners than the first number get the second resolution instead, or their grids would fill the memory (a relief of
 # 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the cycle time.
 MANY_CORNERS, COARSE_RESOLUTION = 50_000, 1e-2
-# For solvers of third order an interval on an arc lasts at most this share of a/j, the time an axis needs for its acceleration [-].
+# For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis needs for its
+# acceleration [-], where path_calm.py does not say that it may last longer.
 ARC_PERIOD = 0.5
 # ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
 REST_PERIOD = 0.25
+# A spline passes a change of the feed within so many tolerances of where the program has it [-].
+NEAR = 2.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -129,6 +133,9 @@ def sample_path(
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
     if machine.normal_acceleration is not None:
         acceleration = np.minimum(acceleration, machine.normal_acceleration)
+    where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
+    if third_order:
+        where_calm = calm(path, table, (velocity, acceleration, jerk))
     rows = cut_path(
         *table,
         path.legs.first,
@@ -145,6 +152,8 @@ def sample_path(
         velocity,
         acceleration,
         longest,
+        *where_calm,
+        quiet_way(path.toolpath.feed, acceleration, jerk),
     )
     rows = divide(*table, rows, path.toolpath.feed, velocity, acceleration, jerk, resolution, shortest)
     if third_order:

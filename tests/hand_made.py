@@ -67,6 +67,8 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         end_error_mm=0.0,
         corners=make_corners(turns=turns),
         ringing=(),
+        lost_after=None,
+        notes=(),
         faults=()
         if passed
         else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),

@@ -48,13 +48,15 @@ GAP = 1e-4  # of a round's convex problem, share of the run's time [-]: below wh
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OnPath:
-    """A smooth path, its grid, and the time-optimal motion on it; the shape of its splines, if it has some."""
+    """A smooth path, its grid, and the time-optimal motion on it; the shape of its splines, if it has some; sentences on what was
+    given up."""
 
     path: SmoothPath
     samples: PathSamples
     problem: FeedrateProblem
     solution: FeedrateSolution
     shape: SplineShape | None = None
+    notes: tuple[str, ...] = ()
 
 
 PlanOn = Callable[[SmoothPath], OnPath]
@@ -130,21 +132,23 @@ def _reshape(
     [s per mm of radius]."""
     laid, runs, chain = shape.laid, shape.runs, shape.guide
     control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
-    multiplier = np.zeros(len(used))
+    multiplier, good = np.zeros(len(used)), np.zeros(len(force), np.bool_)
     relax(
         chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
         laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
         runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned, shape), 0.0,
-        np.zeros(len(force), np.bool_), multiplier,
+        good, multiplier,
     )  # fmt: skip
     new = dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
-    return _chosen(shape, new, ~cusps(new.laid)), -multiplier / used
+    return _chosen(shape, new, good & ~cusps(new.laid)), -multiplier / used
 
 
-def tube_prices(planned: OnPath, shape: SplineShape) -> FloatArray:
-    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube in a round from the present shape."""
+def tube_prices(planned: OnPath, shape: SplineShape, more: float = 0.0) -> FloatArray:
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube, so much wider [mm], in a round from the present shape."""
     H, Q = price_bands(planned, shape)
-    _, prices = _reshape(planned, shape, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
+    guide = shape.guide._replace(tol=shape.guide.tol + more, tol_chord=shape.guide.tol_chord + more)
+    wider = dataclasses.replace(shape, guide=guide, used=shape.used + more, left=shape.left + more)
+    _, prices = _reshape(planned, wider, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
     return prices
 
 

@@ -29,7 +29,7 @@ PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
 # the time it takes counts, by more than the second, once: it leaves less than half of the excess.
 TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 6, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.

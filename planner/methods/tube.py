@@ -80,7 +80,7 @@ class TubeMethod(Method):
                 report((done + 1) / len(courses))
         made = None
         if start.trajectory is not None and len(steps) == len(courses):
-            made = job.deliver(_motion(courses, steps, places, toolpath))
+            made = job.deliver(job.behind_filters(_motion(courses, steps, places, toolpath)))
             sentence += f"; {start.method} with corner {start.corner}, its start, took {start.trajectory.cycle_time:.6g} s"
         return job.plan(
             made,

@@ -55,9 +55,11 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
-def verdict_table(verdict: Verdict, title: str) -> Group:
-    """A verdict by itself."""
+def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
+    """A verdict by itself; before it what was asked, name and text."""
     table = _pairs()
+    for name, text in (asked or {}).items():
+        table.add_row(name, text)
     _add_verdict(table, verdict)
     return _titled(title, table)
 
@@ -176,8 +178,11 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         )
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
-    table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
-    table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
+    table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
+    if (after := verdict.after_filters) is not None:
+        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))
+        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm, verdict))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
     table.add_row("corners", verdict.corners.sentence())
     for mode in verdict.ringing:
@@ -200,6 +205,13 @@ def _ringing_text(mode: Ringing) -> str:
         )
 
     return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
+
+
+def _micrometres(distance: float | None, verdict: Verdict) -> str:
+    """A distance [mm], or why it is not known."""
+    if distance is None:
+        return f"not known: lost after line {verdict.lost_after}" if verdict.lost_after else "not known"
+    return f"{distance / MICROMETRE:.3f} µm"
 
 
 def _by_quantity(verdict: Verdict) -> dict[str, list]:

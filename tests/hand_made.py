@@ -67,6 +67,7 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         end_error_mm=0.0,
         corners=make_corners(turns=turns),
         ringing=(),
+        after_filters=None,
         lost_after=None,
         notes=(),
         faults=()

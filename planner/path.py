@@ -30,6 +30,7 @@ from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
+from planner.path_calm import Calm, calm, quiet_way
 from planner.path_grid import divide, evaluate, grade
 from planner.path_rows import cut_path
 
@@ -39,11 +40,12 @@ RESOLUTION = 2e-3
 # Jobs with more corners than the first number get the second resolution instead, or their grids would fill the memory (a relief of
 # 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the cycle time.
 MANY_CORNERS, COARSE_RESOLUTION = 50_000, 1e-2
-# For solvers of third order an interval on an arc lasts at most this share of a/j, the time an axis needs for its acceleration [-].
+# For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis needs for its
+# acceleration [-], where path_calm.py does not say that it may last longer.
 ARC_PERIOD = 0.5
 # ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
 REST_PERIOD = 0.25
-# Lower feeds hold along splines so many tolerances beyond their blocks [-].
+# A spline passes a change of the feed within so many tolerances of where the program has it [-].
 NEAR = 2.0
 
 
@@ -131,10 +133,14 @@ def sample_path(
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
     if machine.normal_acceleration is not None:
         acceleration = np.minimum(acceleration, machine.normal_acceleration)
+    where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
+    if third_order:
+        where_calm = calm(path, table, (velocity, acceleration, jerk))
     rows = cut_path(
         *table,
         path.legs.first,
         path.legs.place,
+        path.passed,
         path.d_in,
         path.d_out,
         path.d > 0.0,
@@ -143,10 +149,11 @@ def sample_path(
         path.run,
         path.spline.first,
         path.toolpath.feed,
-        NEAR * float(path.toolpath.tolerance.max()),
         velocity,
         acceleration,
         longest,
+        *where_calm,
+        quiet_way(path.toolpath.feed, acceleration, jerk),
     )
     rows = divide(*table, rows, path.toolpath.feed, velocity, acceleration, jerk, resolution, shortest)
     if third_order:

@@ -1,15 +1,18 @@
 """The smooth path cut into rows, the stretches of one element and one block that the grid then divides (kernels of path.py).
 
 In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans that begins there. Free
-parts and corners are cut at all ends of blocks, spans near changes of the feed. Where a piece ends there is a closing row.
+parts and corners are cut at all ends of blocks, spans where the motion passes changes of the feed. Where a piece ends there is a
+closing row.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.corners.blend import shape_at
+from planner.kernels import njit
+from planner.path_calm import SWITCHING_WAY, interval_ends
+from planner.search import last_not_after
 
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
 ARC_STEP = np.pi / 8
@@ -76,14 +79,12 @@ def _arc_feed(leg, feed, velocity, acceleration):
 
 
 @njit(cache=True, error_model="numpy")
-def _cut_leg(rows, n, legs, leg, seg, wa, wb, place, parts):
-    """Rows of the free part of a leg from wa to wb; returns the rows and their number."""
-    rows = grown(rows, n + parts)
-    for part in range(parts):
-        left, right = wa + (wb - wa) * part / parts, wa + (wb - wa) * (part + 1) / parts
-        set_row(
-            rows[n], leg, seg, left, wb if part + 1 == parts else right, place + left, place + right, False
-        )
+def _cut_leg(rows, n, leg, seg, start, ends):
+    """Rows of the free part of a leg that starts at the place `start`, cut at `ends` on it; returns the rows and their number."""
+    rows = grown(rows, n + len(ends) - 1)
+    for part in range(len(ends) - 1):
+        left, right = ends[part], ends[part + 1]
+        set_row(rows[n], leg, seg, left, right, start + left, start + right, False)
         n += 1
     return rows, n
 
@@ -108,63 +109,60 @@ def _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks):
 
 
 @njit(cache=True, error_model="numpy")
-def _cut_span(rows, n, span, curve, seg, place, feed, changes, near, longest, speed):
-    """Rows of a span that begins in segment `seg`, each with the slowest segment within `near` of it; returns the rows, their number
-    and the segment in which the span ends.
+def _base(longest, feed, feed_sq, acceleration):
+    """Longest interval on a curve [mm] that switches of the acceleration allow (path_calm.py): `longest` [s] at the fastest feed, or by
+    the time to change the speed where feed^2 is at least `feed_sq` by its curvature."""
+    return max(longest * feed, SWITCHING_WAY * min(feed * feed, feed_sq) / acceleration)
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_span(
+    rows, n, span, curve, seg, passed, feed, changes, longest, speed, feed_sq, acceleration, quiet, busy
+):  # fmt: skip
+    """Rows of a span that begins in segment `seg`, cut where the feed changes; returns the rows, their number and the segment in
+    which the span ends.
 
     changes : segments at whose start the feed changes, ascending
     """
     begin, end = span.begin, span.begin + span.width
+    least = FREE_PART_MIN * span.width
+    c = last_not_after(changes, seg, 0, len(changes) - 1) if len(changes) else 0
     left = begin
-    first = 0
-    while first < len(changes) and place[changes[first]] <= begin - near:
-        first += 1
     while left < end:
-        right = end
-        c = first
-        while c < len(changes) and place[changes[c]] < end + near:
-            at = place[changes[c]]
-            for cut in (at - near, at + near):
-                if left + FREE_PART_MIN * span.width < cut < right - FREE_PART_MIN * span.width:
-                    right = cut
+        while c < len(changes) and passed[changes[c]] <= left + least:
             c += 1
-        middle = 0.5 * (left + right)
-        while seg + 1 < len(feed) and place[seg + 1] <= middle:
+        right = passed[changes[c]] if c < len(changes) and passed[changes[c]] < end - least else end
+        while seg + 1 < len(feed) and passed[seg + 1] <= 0.5 * (left + right):
             seg += 1
-        slowest = seg
-        c = first
-        while c < len(changes) and place[changes[c]] < middle + near:
-            if place[changes[c]] > middle - near:
-                for beside in (changes[c] - 1, changes[c]):
-                    if feed[beside] < feed[slowest]:
-                        slowest = beside
-            c += 1
-        parts = max(int(np.ceil((right - left) / (longest * min(feed[slowest], speed)))), 1)
-        rows = grown(rows, n + parts)
-        for part in range(parts):
-            a, b = left + (right - left) * part / parts, left + (right - left) * (part + 1) / parts
+        base = _base(longest, min(feed[seg], speed), feed_sq, acceleration)
+        ends = interval_ends(0.0, left, right, base, np.inf, quiet[seg], busy)
+        rows = grown(rows, n + len(ends) - 1)
+        for part in range(len(ends) - 1):
+            a, b = ends[part], ends[part + 1]
             w0 = 0.0 if a == begin else (a - begin) / span.width
-            w1 = 1.0 if part + 1 == parts and right == end else (b - begin) / span.width
-            set_row(rows[n], curve, slowest, w0, w1, a, b, False)
+            w1 = 1.0 if b == end else (b - begin) / span.width
+            set_row(rows[n], curve, seg, w0, w1, a, b, False)
             n += 1
         left = right
-    while seg + 1 < len(feed) and place[seg + 1] <= end:
+    while seg + 1 < len(feed) and passed[seg + 1] <= end:
         seg += 1
     return rows, n, seg
 
 
 @njit(cache=True, error_model="numpy")
 def cut_path(
-    legs, corners, spans, first, place, d_in, d_out, blended, is_stop, breaks, run, run_first, feed, near, velocity, acceleration,
-    longest,
+    legs, corners, spans, first, place, passed, d_in, d_out, blended, is_stop, breaks, run, run_first, feed, velocity, acceleration,
+    longest, busy, feed_sq, quiet,
 ):  # fmt: skip
     """Rows (n,) of the whole path in order (module text).
 
     place   : (M+1,) where each segment starts (geometry/legs.py) [mm]
+    passed  : (M+1,) where the path passes that start; the same but on spans (geometry/spline_passing.py) [mm]
     blended : (R+1,) True where there is a corner
     run     : (R+1,) run of spans that begins before each joint, or -1; run_first (Q+1,) its first span
-    near    : along splines lower feeds hold so far beyond their blocks [mm]: where a block ends there the tolerance leaves open
-    longest : duration of an interval on arcs and spans at the fastest feed [s]; inf for second-order solvers
+    longest : duration of an interval on arcs and spans at the fastest feed [s]; inf for second-order solvers, where the rest is not
+              looked at
+    busy, feed_sq : of path_calm.py, where intervals may last longer; quiet (M,) `quiet_way` at each segment's feed
     """
     rows = np.empty(8 * len(legs) + 4 * len(spans) + 64, ROW)
     n = 0
@@ -172,6 +170,7 @@ def cut_path(
     for k in range(len(velocity)):
         speed_sq += velocity[k] * velocity[k]
     speed = np.sqrt(speed_sq)
+    strong = np.linalg.norm(acceleration)
     changes = np.flatnonzero(feed[1:] != feed[:-1]) + 1
     for leg in range(len(legs)):
         length = legs[leg].length
@@ -183,18 +182,20 @@ def cut_path(
                 wa, wb = max(place[seg] - start, d_out[leg]), min(end, length - d_in[k])
                 if wb - wa <= FREE_PART_MIN * length:
                     continue
-                parts = 1
+                ends = np.array([wa, wb])
                 if legs[leg].round:
-                    reach = longest * _arc_feed(legs[leg], feed[seg], velocity, acceleration)
-                    least = max(abs(legs[leg].rate) * (wb - wa) / ARC_STEP, (wb - wa) / reach, ARC_PARTS_MIN)
-                    parts = int(np.ceil(least))
-                rows, n = _cut_leg(rows, n, legs, leg, seg, wa, wb, start, parts)
+                    fastest = _arc_feed(legs[leg], feed[seg], velocity, acceleration)
+                    base = _base(longest, fastest, feed_sq[leg], strong)
+                    most = min(ARC_STEP / abs(legs[leg].rate), (wb - wa) / ARC_PARTS_MIN)
+                    ends = interval_ends(start, wa, wb, base, most, quiet[seg], busy)
+                rows, n = _cut_leg(rows, n, leg, seg, start, ends)
         if run[k] >= 0:
             seg = first[leg]
             for i in range(run_first[run[k]], run_first[run[k] + 1]):
                 rows, n, seg = _cut_span(
-                    rows, n, spans[i], len(legs) + i, seg, place, feed, changes, near, longest, speed
-                )
+                    rows, n, spans[i], len(legs) + i, seg, passed, feed, changes, longest, speed, feed_sq[len(legs) + i],
+                    strong, quiet, busy,
+                )  # fmt: skip
         elif blended[k]:
             vertex = start + length
             for seg in range(first[leg], first[k]):

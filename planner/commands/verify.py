@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, ToleranceOption
-from planner.commands.terminal import FAILED, ProgressBar, guarded, show
+from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, QuietOption, ToleranceOption
+from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
 from planner.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,12 +46,13 @@ def verify(
             metavar="QUANTITY", help="report without judging: jerk for a plan that does not limit it"
         ),
     ] = None,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Judge a trajectory against its program and a machine; it may come from anywhere."""
     from planner.geometry.build import toolpath_from_program
     from planner.nc.reader import read_program
-    from planner.report.export import verdict_summary
+    from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
     from planner.report.trajectory_file import read_trajectory
     from planner.verify import verify as judge
@@ -72,7 +73,7 @@ def verify(
     if not len(toolpath):
         raise InputError("the program moves nothing: there is nothing to judge", source=str(job))
     motion, given, fitted = fit_axes(read.trajectory, read.given, toolpath)
-    with ProgressBar() as progress:
+    with ProgressBar(quiet=quiet) as progress:
         verdict = judge(
             motion,
             toolpath,
@@ -87,15 +88,16 @@ def verify(
     budgets = toolpath.tolerance
     if as_json:
         about = {
+            "corners": corner_summary(verdict.corners),
             "machine": limits.name,
             "tolerance_mm": float(budgets[0]) if (budgets == budgets[0]).all() else None,
             "cycle_time_s": motion.cycle_time,
             "notes": notes,
         }
-        typer.echo(json.dumps({**verdict_summary(verdict), **about}, indent=2))
+        say(json.dumps({**verdict_summary(verdict), **about}, indent=2))
     else:
         for note in notes:
-            typer.echo(f"note: {note}", err=True)
+            say(f"note: {note}", err=True)
         low, high = float(budgets.min()), float(budgets.max())
         asked = {
             "cycle time": f"{motion.cycle_time:.4f} s",

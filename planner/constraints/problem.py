@@ -11,11 +11,20 @@ In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), with constant u
 
 `margin` is the grid's interpolation error (path.py), so that the constraint holds in between as well. The jerk limits are carried
 along for solvers of third order; a second-order solver says that it does not use them.
+
+`limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask for (methods/slowing.py).
+Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk over lam^3, so that every row of the point has the limit
+
+    feed_sq_max / lam^2,     a_k / lam^2  (times 1 - margin),     j_k / lam^3
+
+and a motion that is slower by lam everywhere uses exactly the shares of them that the motion itself uses of the machine's limits. Path
+and machine stay what they are. (`margin` cannot say it: it is of the accelerations alone, and of intervals.)
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -36,6 +45,9 @@ class FeedrateProblem:
     bound_names           : names of the bounds on x ("feed", "velocity.x", "chord_error", ...)
     margin                : (P,) of the interval to the right, share of the acceleration limits [-]
     feed_sq_start, feed_sq_end : (G,) x at both ends of each piece; 0 = rest
+    limit_scale           : (P,) by what factor the motion has to be slower around each point (module text) [-]; 1 if not given
+
+    Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in them.
     """
 
     piece: Array
@@ -55,6 +67,7 @@ class FeedrateProblem:
     margin: FloatArray
     feed_sq_start: FloatArray
     feed_sq_end: FloatArray
+    limit_scale: FloatArray = field(default_factory=lambda: np.ones(()))
 
     def __post_init__(self) -> None:
         points, axes = np.shape(self.d1)
@@ -65,7 +78,9 @@ class FeedrateProblem:
             freeze(self, name, np.float64, (points, axes))
         for name in ("velocity", "acceleration", "jerk"):
             freeze(self, name, np.float64, (axes,))
-        for name in ("feed_sq_max", "margin"):
+        if np.ndim(self.limit_scale) == 0:
+            object.__setattr__(self, "limit_scale", np.full(points, float(self.limit_scale)))
+        for name in ("feed_sq_max", "margin", "limit_scale"):
             freeze(self, name, np.float64, (points,))
         freeze(self, "feed_sq_bound", np.int64, (points,))
         for name in ("feed_sq_start", "feed_sq_end"):
@@ -73,7 +88,7 @@ class FeedrateProblem:
         self._check()
 
     def _check(self) -> None:
-        for name in ("velocity", "acceleration", "jerk", "feed_sq_max"):
+        for name in ("velocity", "acceleration", "jerk", "feed_sq_max", "limit_scale"):
             if not (getattr(self, name) > 0).all():
                 raise ValueError(f"FeedrateProblem.{name}: every value must be positive")
         if not ((self.margin >= 0) & (self.margin < 1)).all():
@@ -91,6 +106,21 @@ class FeedrateProblem:
 
     def __len__(self) -> int:
         return len(self.s)
+
+    @cached_property
+    def feed_sq_limit(self) -> FloatArray:
+        """(P,) largest x at each point [mm2/s2]."""
+        return self.feed_sq_max / self.limit_scale**2
+
+    @cached_property
+    def acceleration_limit(self) -> FloatArray:
+        """(P, A) axis accelerations at each point, without the margin [mm/s2]."""
+        return self.acceleration / self.limit_scale[:, None] ** 2
+
+    @cached_property
+    def jerk_limit(self) -> FloatArray:
+        """(P, A) axis jerks at each point [mm/s3]."""
+        return self.jerk / self.limit_scale[:, None] ** 3
 
     @property
     def interval(self) -> Array:

@@ -7,6 +7,7 @@ the shape's parameters, the part of the budget it uses and the normal accelerati
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +23,7 @@ from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_fro
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.spline import Spline, no_spline
+from planner.geometry.spline_passing import passed_places
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
@@ -116,6 +118,11 @@ class SmoothPath:
         count = self.spline.joint_last - self.spline.joint_first
         first = np.repeat(self.spline.joint_first - (np.cumsum(count) - count), count)
         return first + np.arange(count.sum()) + 1
+
+    @cached_property
+    def passed(self) -> FloatArray:
+        """(M+1,) where the path passes the start of each segment, counted like `Legs.place` [mm]; it differs from that on splines."""
+        return passed_places(self.toolpath, self.legs, self.spline)
 
     @property
     def theta(self) -> FloatArray:

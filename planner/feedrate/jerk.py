@@ -214,7 +214,8 @@ class _Profile:
         room, and its multipliers say nothing.
         """
         problem = self.problem
-        a, j = problem.acceleration.min(), problem.jerk.min()
+        own = slice(begin, end + 1)
+        a, j = problem.acceleration_limit[own].min(), problem.jerk_limit[own].min()
         brake = found.x / (2.0 * a) + np.sqrt(found.x) * a / (2.0 * j)
         free = np.flatnonzero(problem.s[end] - problem.s[begin : end + 1] >= BRAKING_WAYS * brake)
         free = free[free <= KEPT_SHARE_MAX * (end - begin)]
@@ -240,7 +241,7 @@ class _Profile:
         inner = np.flatnonzero(problem.interval)
         factor = np.ones(len(problem))
         v, u, j = np.sqrt(self.x), self.u, self.jerk
-        factor = np.maximum(factor, np.sqrt(self.x / problem.feed_sq_max))
+        factor = np.maximum(factor, np.sqrt(self.x / problem.feed_sq_limit))
         for points, d2, d3 in (
             (inner, problem.d2_right, problem.d3_right),
             (inner + 1, problem.d2_left, problem.d3_left),
@@ -248,7 +249,8 @@ class _Profile:
             d1, d2, d3 = problem.d1[points], d2[points], d3[points]
             x_here, v_here, u_here = self.x[points, None], v[points, None], u[points, None]
             acceleration = np.abs(d1 * u_here + d2 * x_here) / self.acceleration[points]
-            jerk = np.abs(d1 * j[inner, None] + v_here * (3.0 * d2 * u_here + d3 * x_here)) / problem.jerk
+            jerk = np.abs(d1 * j[inner, None] + v_here * (3.0 * d2 * u_here + d3 * x_here))
+            jerk = jerk / problem.jerk_limit[points]
             worst = np.maximum(np.sqrt(acceleration), np.cbrt(jerk)).reshape(-1, axes).max(axis=1)
             factor[inner] = np.maximum(factor[inner], worst)
         largest = np.maximum.reduceat(factor, problem.piece[:-1])

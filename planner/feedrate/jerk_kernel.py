@@ -12,10 +12,10 @@ ramp of a nanometre beside millimetres at constant speed has no more than its pa
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.feedrate.jerk_riccati import offsets, riccati, slope
 from planner.feedrate.jerk_rows import empty_model, kinematics, linearise
+from planner.kernels import njit
 
 HESSIAN_MIN = 1e-12  # keeps the reduced Hessian positive where no row is near; far below any row's weight [-]
 SLACK_MIN = 0.3  # of the first slacks [-]; smaller ones block the way of a start that violates other rows
@@ -242,21 +242,21 @@ def track(grid, jerk, x, u, p, smoothing, rounds, defect_max):
 
 
 @njit(cache=True, error_model="numpy")
-def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
+def minimise(grid, x, u, p, jumps, tol, iterations):
     """Solve one window in place, from the profile x, u (N+1,), p (N,) to the optimal one; x_0, u_0, x_N = u_N = 0 are given.
 
     Returns iterations used, relative gap, residual of rows and of dynamics, multipliers (N, M) of the
     rows' upper sides, then their lower sides, and (N,) of the dynamics of x.
     """
     n = len(x) - 1
-    lower = len(per_jerk) * (3 + jumps)
+    lower = grid.d1.shape[1] * (3 + jumps)
     count = lower + 2
     h, pi, dpi = np.empty(n), np.zeros(n), np.zeros(n)
     model = empty_model(n, count)
     gains, dz = np.empty((n, 8)), np.zeros((n + 1, 3))
     slack, lam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
     dslack, dlam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
-    total, _ = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
+    total, _ = linearise(grid, x, u, p, h, lam, pi, model, jumps)
     mu = START_GAP
     for i in range(n):
         for r in range(count):
@@ -268,7 +268,7 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
     share, stalled = 1.0, 0
     gap, hold, residual, defect, done = mu * total * (count + lower), 0.0, np.inf, np.inf, iterations
     for it in range(iterations):
-        total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
+        total, defect = linearise(grid, x, u, p, h, lam, pi, model, jumps)
         residual = weigh(model, slack, lam)
         if gap <= tol * total and residual <= RESIDUAL and defect <= DEFECT:
             done = it
@@ -294,5 +294,5 @@ def minimise(grid, per_jerk, x, u, p, jumps, tol, iterations):
         if stalled == STALL_ROUNDS or not gap < np.inf:
             return it, gap / total, np.inf, np.inf, lam, pi
     if done == iterations:  # the last step has not been looked at yet
-        total, defect = linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps)
+        total, defect = linearise(grid, x, u, p, h, lam, pi, model, jumps)
     return done, gap / total, residual, defect, lam, pi

@@ -24,9 +24,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
+from planner.kernels import njit
 
 DOMAIN = 0.95  # share of the kinematics' domain p ds <= 3 vm^2 that an interval may use [-]; a start with constant jerk uses 8/9
 SLOPE_MIN = 1e-3  # of the mean feed: floor of vm - p h/6, which is 0 at the domain's edge [-]
@@ -42,7 +42,8 @@ class Grid(NamedTuple):
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
-    per_acceleration: FloatArray  # one over the limits
+    per_acceleration: FloatArray  # one over the limits, like the next
+    per_jerk: FloatArray
 
 
 class Model(NamedTuple):
@@ -130,19 +131,18 @@ def _reduce(out, i, q, e0, e1, e2):
 
 
 @njit(cache=True, error_model="numpy")
-def linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps):
+def linearise(grid, x, u, p, h, lam, pi, model, jumps):
     """Fill the model at the profile (x, u, p) with the multipliers of rows and dynamics.
 
     lam, pi  : (N, M), (N,) multipliers of the rows, upper sides first, and of the dynamics
-    per_jerk : (A,) one over the limits
     h        : (N,) out, durations
     jumps    : 1 if r'' jumps anywhere: a row for the acceleration left of each point
 
     Returns the total time and the largest defect of the dynamics, as a speed.
     """
-    ds, x_max, d1, d2_left, d2_right, d3_left, d3_right, per_acceleration = grid
+    ds, x_max, d1, d2_left, d2_right, d3_left, d3_right, per_acceleration, per_jerk = grid
     dynamics, gradient, rows, values, convex, curved, costate = model
-    n, axes, below = len(h), len(per_jerk), values.shape[1]
+    n, axes, below = len(h), d1.shape[1], values.shape[1]
     total, worst = 0.0, 0.0
     for i in range(n):
         step, last = ds[i], i == n - 1
@@ -177,7 +177,7 @@ def linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps):
             a = per_acceleration[i, k]
             value = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) * inner
             _put(rows, values, i, r, d2_right[i, k] * inner, d1[i, k] * inner, 0.0, value, a)
-            b = per_jerk[k]
+            b, b1 = per_jerk[i, k], per_jerk[i + 1, k]
             turn = 3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i]
             by_h = d1[i, k] * j_t
             cx = v0 * d3_right[i, k] + 0.5 * turn * per_v0
@@ -190,9 +190,9 @@ def linearise(grid, per_jerk, x, u, p, h, lam, pi, model, jumps):
             cu = 3.0 * v1 * d2_left[i + 1, k]
             value = d1[i + 1, k] * j + v1 * turn + by_h * h0 + cx * e3 * end
             cp = d1[i + 1, k] * per_t + by_h * hp + cx * e2 + cu
-            _put(rows, values, i, r + 2, cx * e0 + by_h * hx, cx * e1 + cu + by_h * hu, cp, value, b)
+            _put(rows, values, i, r + 2, cx * e0 + by_h * hx, cx * e1 + cu + by_h * hu, cp, value, b1)
             lam0 = (lam[i, r + 1] - lam[i, below + r + 1]) * b
-            lam1 = (lam[i, r + 2] - lam[i, below + r + 2]) * b
+            lam1 = (lam[i, r + 2] - lam[i, below + r + 2]) * b1
             lam_j += lam0 * d1[i, k] + lam1 * d1[i + 1, k]
             bend0 += lam0 * 3.0 * d2_right[i, k]
             twist0 += lam0 * d3_right[i, k]

@@ -15,10 +15,10 @@ constant jerk, so that the kinematics are exact, and slowed down enough it keeps
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
+from planner.kernels import njit
 
 ACCELERATION_SHARE = 0.4  # of the limits, for the second-order profile underneath [-]
 NORMAL_SHARE = 0.7  # of the acceleration limits, for the caps [-]
@@ -35,14 +35,15 @@ FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between t
 def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
     """Feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
     own = slice(begin, end + 1)
-    curve = np.maximum(np.abs(problem.d2_left[own]), np.abs(problem.d2_right[own])) / problem.acceleration
-    slope = np.maximum(np.abs(problem.d3_left[own]), np.abs(problem.d3_right[own])) / problem.jerk
+    acceleration, jerk_limit = problem.acceleration_limit[own], problem.jerk_limit[own]
+    curve = np.maximum(np.abs(problem.d2_left[own]), np.abs(problem.d2_right[own])) / acceleration
+    slope = np.maximum(np.abs(problem.d3_left[own]), np.abs(problem.d3_right[own])) / jerk_limit
     with np.errstate(divide="ignore"):
         by_acceleration = NORMAL_SHARE / curve.max(axis=1)
         by_jerk = (JERK_SHARE / slope.max(axis=1)) ** (2 / 3)
-        rate = ACCELERATION_SHARE / (np.abs(problem.d1[own]) / problem.acceleration).max(axis=1)
-        jerk = JERK_SHARE / (np.abs(problem.d1[own]) / problem.jerk).max(axis=1)
-    caps = np.minimum(CAP_SHARE * problem.feed_sq_max[own], np.minimum(by_acceleration, by_jerk))
+        rate = ACCELERATION_SHARE / (np.abs(problem.d1[own]) / acceleration).max(axis=1)
+        jerk = JERK_SHARE / (np.abs(problem.d1[own]) / jerk_limit).max(axis=1)
+    caps = np.minimum(CAP_SHARE * problem.feed_sq_limit[own], np.minimum(by_acceleration, by_jerk))
     caps[0] = caps[-1] = 0.0
     x = _growing(
         _growing(caps, rate, jerk, np.diff(problem.s[own]), 1), rate, jerk, np.diff(problem.s[own]), -1

@@ -63,7 +63,6 @@ class ScaledWindow:
     """A window's problem in units of its own: fastest feed 1, largest acceleration 1; `asked` is its envelope (jerk_start.py)."""
 
     grid: Grid
-    per_jerk: FloatArray
     jumps: int
     asked: FloatArray
     feed: float
@@ -73,22 +72,22 @@ class ScaledWindow:
     def of(cls, problem: FeedrateProblem, acceleration: FloatArray, begin: int, end: int) -> ScaledWindow:
         """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
         own = slice(begin, end + 1)
-        feed = float(np.sqrt(problem.feed_sq_max[own].max()))
+        feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
         t = float(feed / problem.acceleration.max())
         length = feed * t
         grid = Grid(
             ds=np.diff(problem.s[own]) / length,
-            x_max=problem.feed_sq_max[own] / feed**2,
+            x_max=problem.feed_sq_limit[own] / feed**2,
             d1=problem.d1[own],
             d2_left=problem.d2_left[own] * length,
             d2_right=problem.d2_right[own] * length,
             d3_left=problem.d3_left[own] * length**2,
             d3_right=problem.d3_right[own] * length**2,
             per_acceleration=feed / t / acceleration[own],
+            per_jerk=feed / (t * t) / problem.jerk_limit[own],
         )
         return cls(
             grid=grid,
-            per_jerk=feed / (t * t) / problem.jerk,
             jumps=_jumps(grid),
             asked=envelope(problem, begin, end) / feed**2,
             feed=feed,
@@ -101,7 +100,7 @@ class ScaledWindow:
         most = 0
         for x, u, p in self._starts(behind):
             done, gap, residual, defect, lam, pi = kernel.minimise(
-                self.grid, self.per_jerk, x, u, p, self.jumps, tol, iterations
+                self.grid, x, u, p, self.jumps, tol, iterations
             )
             most = max(most, done)
             if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
@@ -156,19 +155,19 @@ class ScaledWindow:
     @property
     def _jerk(self) -> float:
         """Of the slowest axis."""
-        return float(1.0 / self.per_jerk.max())
+        return float(1.0 / self.grid.per_jerk.max())
 
     @property
     def _rows(self) -> int:
         """Rows per interval."""
-        return (3 + self.jumps) * len(self.per_jerk) + 2
+        return (3 + self.jumps) * self.grid.d1.shape[1] + 2
 
     def _slowed(self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf) -> _Profile:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
-        n, axes = len(p), len(self.per_jerk)
+        n, axes = len(p), self.grid.d1.shape[1]
         model, h = empty_model(n, self._rows), np.empty(n)
         lam = np.zeros((n, 2 * self._rows - 2))
-        linearise(self.grid, self.per_jerk, x, u, p, h, lam, np.zeros(n), model, self.jumps)
+        linearise(self.grid, x, u, p, h, lam, np.zeros(n), model, self.jumps)
         worst = np.abs(model.values).max(axis=0)
         jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
         worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
@@ -180,7 +179,7 @@ class ScaledWindow:
         vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
         h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
         feed, t, lower = self.feed, self.time, self._rows - 2
-        rows = np.zeros((len(p), len(self.per_jerk), 4))
+        rows = np.zeros((len(p), self.grid.d1.shape[1], 4))
         rows[:, :, : 3 + self.jumps] = (lam[:, :lower] - lam[:, self._rows :]).reshape(
             len(p), -1, 3 + self.jumps
         )

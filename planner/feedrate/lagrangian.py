@@ -17,12 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk_rows import duration
 from planner.feedrate.solution import FeedrateSolution
+from planner.kernels import njit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,7 +48,7 @@ def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangi
     _lagrangian(
         np.diff(problem.s, append=problem.s[-1]), problem.interval, problem.d1,
         problem.d2_left, problem.d2_right, problem.d3_left, problem.d3_right,
-        acceleration_limits(problem), problem.jerk, problem.feed_sq_max,
+        acceleration_limits(problem), problem.jerk_limit, problem.feed_sq_limit,
         solution.feed_sq, solution.acc_s, solution.jerk_s * solution.duration,
         found.rows, found.feed, found.dynamics,
         value, of_acceleration, of_jerk, of_feed,
@@ -57,11 +57,11 @@ def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangi
 
 
 def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
-    """(P, A) axis accelerations less the larger margin of the intervals at both sides of each point [mm/s2]."""
+    """(P, A) axis accelerations at each point less the larger margin of the intervals at both sides of each point [mm/s2]."""
     margin = problem.margin.copy()
     margin[problem.piece[1:] - 1] = 0.0
     before = np.concatenate([[0.0], margin[:-1]])
-    return problem.acceleration * (1.0 - np.maximum(margin, before))[:, None]
+    return problem.acceleration_limit * (1.0 - np.maximum(margin, before))[:, None]
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,7 +76,7 @@ def _lagrangian(
         h = duration(v0, v1, p[i], ds[i])
         q, j = p[i] * (2.0 * u[i] + p[i]), p[i] / h
         total = h + pi[i] * (x[i] + (2.0 * u[i] + p[i]) * ds[i] + q * h * h / 12.0 - x[i + 1])
-        for k in range(len(jerk)):
+        for k in range(jerk.shape[1]):
             left = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) / acceleration[i, k]
             right = (d1[i + 1, k] * u1 + d2_left[i + 1, k] * x[i + 1]) / acceleration[i + 1, k]
             held = rows[i, k, 0] * left + rows[i, k, 3] * right
@@ -84,7 +84,7 @@ def _lagrangian(
             total += held
             left = d1[i, k] * j + v0 * (3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i])
             right = d1[i + 1, k] * j + v1 * (3.0 * d2_left[i + 1, k] * u1 + d3_left[i + 1, k] * x[i + 1])
-            held = (rows[i, k, 1] * left + rows[i, k, 2] * right) / jerk[k]
+            held = rows[i, k, 1] * left / jerk[i, k] + rows[i, k, 2] * right / jerk[i + 1, k]
             of_jerk[k] -= held
             total += held
         held = feed[i, 0] * x[i] / x_max[i]

@@ -6,7 +6,7 @@ The kinematics are exact cubics in time, so that a start or a stop (v = a = 0) n
     minimise   T = sum_i h_i
     subject to v_{i+1} = v_i + a_i h_i + j_i h_i^2/2,     a_{i+1} = a_i + j_i h_i
                ds_i = v_i h_i + a_i h_i^2/2 + j_i h_i^3/6
-               0 <= v_i <= c_i = sqrt(feed_sq_max_i),     v_i + a_i h_i/2 <= (c_i + c_{i+1})/2,     h_i >= 0
+               0 <= v_i <= c_i = sqrt(feed_sq_limit_i),     v_i + a_i h_i/2 <= (c_i + c_{i+1})/2,     h_i >= 0
     and at both ends of every interval (r', r'', r''' of that side; jerk of that interval), for every axis k
                | r'_k a + r''_k v^2 |                     <= a_k (1 - margin_i)
                | r'_k j + 3 r''_k v a + r'''_k v^3 |      <= j_k
@@ -112,7 +112,7 @@ class JerkLimitedNLP:
         v, acc, jerk, duration, *_ = found.columns.T
         prices = found.columns[:, 4:]
         axes = len(problem.axes)
-        relative = prices[:, 0] * problem.feed_sq_max  # dT / d(ln feed_sq_max)
+        relative = prices[:, 0] * problem.feed_sq_limit  # dT / d(ln feed_sq_max)
         return FeedrateSolution(
             status=found.status,
             sentence=found.sentence,
@@ -135,7 +135,7 @@ def _solve_piece(
 ) -> Found:
     """Transcribe and solve piece g; the whole formulation, from top to bottom.
 
-    The columns are v, a, j, h and dT/d(feed_sq_max), then dT/d(ln limit) of acceleration and jerk, one for each axis.
+    The columns are v, a, j, h and dT/d(feed_sq_limit), then dT/d(ln limit) of acceleration and jerk, one for each axis.
     """
     import casadi as ca
 
@@ -172,7 +172,7 @@ def _solve_piece(
     stage = ca.Function("stage", [ca.vertcat(v, a, j_left, j, h), numbers], [following, ca.vertcat(*rows)])
 
     # ---- constraints of all stages, in stage order; the last one has no interval ----------------------------------------------
-    feed_max = np.sqrt(problem.feed_sq_max[here])
+    feed_max = np.sqrt(problem.feed_sq_limit[here])
     cap = (feed_max[:-1] + feed_max[1:]) / 2  # of v + a h/2
     data = _stage_numbers(problem, here, ds / length, cap / speed, speed, acc, jerk)
     after, limited = stage.map(points)(stages, ca.DM(data.T))
@@ -250,19 +250,20 @@ def _stage_numbers(
     """(n, 2 + 10 A) what a stage needs to know: length and cap of its interval, then for the right and the left side the factors
     of a, v^2 (acceleration) and j, v a, v^3 (jerk), all rows as shares of their limits; 0 on the side where a piece ends."""
     d1 = problem.d1[here]
-    limit = problem.acceleration * (1.0 - problem.margin[here, None])
+    acceleration, jerk_limit = problem.acceleration_limit[here], problem.jerk_limit[here]
+    room = 1.0 - problem.margin[here, None]
     sides = []
     for d2, d3, of_interval, outside in (
-        (problem.d2_right[here], problem.d3_right[here], limit, -1),
-        (problem.d2_left[here], problem.d3_left[here], np.roll(limit, 1, axis=0), 0),
+        (problem.d2_right[here], problem.d3_right[here], acceleration * room, -1),
+        (problem.d2_left[here], problem.d3_left[here], acceleration * np.roll(room, 1, axis=0), 0),
     ):
         factors = np.stack(
             [
                 d1 * acc / of_interval,
                 d2 * speed**2 / of_interval,
-                d1 * jerk / problem.jerk,
-                3.0 * d2 * speed * acc / problem.jerk,
-                d3 * speed**3 / problem.jerk,
+                d1 * jerk / jerk_limit,
+                3.0 * d2 * speed * acc / jerk_limit,
+                d3 * speed**3 / jerk_limit,
             ],
             axis=1,
         )

@@ -25,10 +25,10 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
+from planner.kernels import njit
 
 # Newton steps at most; each step drops at least one of the 4A + 2 rows for good, so this is never reached with A <= 6.
 NEWTON_STEPS = 60
@@ -53,9 +53,9 @@ class Reachability:
             problem.d1,
             problem.d2_left,
             problem.d2_right,
-            problem.acceleration,
+            problem.acceleration_limit,
             problem.margin,
-            problem.feed_sq_max,
+            problem.feed_sq_limit,
             problem.feed_sq_start,
             problem.feed_sq_end,
         )
@@ -97,7 +97,7 @@ def _parallel(i, x_max, h, d1, d2_right, limit, scale, target):
     """Largest |a| per limit that is negligible on interval i (see `NEGLIGIBLE`)."""
     u = max(x_max, target) / (2.0 * h)  # x stays within [0, target]
     for k in range(d1.shape[1]):
-        a, size = abs(d1[i, k]), limit[k] * scale + abs(d2_right[i, k]) * x_max
+        a, size = abs(d1[i, k]), limit[i, k] * scale + abs(d2_right[i, k]) * x_max
         if a * u > size:
             u = size / a
     return NEGLIGIBLE / u
@@ -109,10 +109,11 @@ def _interval(i, x, h, d1, d2_left, d2_right, limit, scale, target, parallel):
     low, low_slope = -x / (2.0 * h), -0.5 / h  # x + 2 h u >= 0
     high, high_slope = (target - x) / (2.0 * h), -0.5 / h  # x + 2 h u <= K_{i+1}
     for k in range(d1.shape[1]):
-        c = limit[k] * scale
+        c = limit[i, k] * scale
         a, b = d1[i, k], d2_right[i, k]
         if abs(a) > parallel * c:
             low, low_slope, high, high_slope = _row(a, b, c, x, low, low_slope, high, high_slope)
+        c = limit[i + 1, k] * scale
         b = d2_left[i + 1, k]
         a = d1[i + 1, k] + 2.0 * h * b
         if abs(a) > parallel * c:
@@ -126,7 +127,7 @@ def _largest(i, x_max, h, d1, d2_left, d2_right, limit, scale, target):
     parallel = _parallel(i, x_max, h, d1, d2_right, limit, scale, target)
     x = x_max
     for k in range(d1.shape[1]):
-        c = limit[k] * scale
+        c = limit[i, k] * scale
         a, b = abs(d1[i, k]), abs(d2_right[i, k])
         if a <= parallel * c:  # rows without u bound x alone
             x = min(x, c / b)
@@ -134,6 +135,7 @@ def _largest(i, x_max, h, d1, d2_left, d2_right, limit, scale, target):
             # x <= target + 2 h |u| and a |u| <= c + b x. Newton would get there, but from an x_max far above, where the last digits of
             # x_max drown the result.
             x = min(x, (target * a + 2.0 * h * c) / (a - 2.0 * h * b))
+        c = limit[i + 1, k] * scale
         b = d2_left[i + 1, k]
         if abs(d1[i + 1, k] + 2.0 * h * b) <= parallel * c:
             x = min(x, c / abs(b))

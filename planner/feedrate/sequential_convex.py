@@ -5,7 +5,7 @@ the intervals. There u goes from one point to the next along a given shape, and 
 
     minimise   T = sum_i integral over interval i of ds / sqrt(x(s))
     subject to x_{i+1} = x_i + 2 ds_i (u_i + m_i (u_{i+1} - u_i))          m_i: mean of the shape, 1/2 where w is constant
-               0 <= x_i <= c_i = feed_sq_max_i,             x_i + u_i ds_i <= (c_i + c_{i+1})/2
+               0 <= x_i <= c_i = feed_sq_limit_i,            x_i + u_i ds_i <= (c_i + c_{i+1})/2
     and at both ends of every interval (r', r'', r''' of that side; w there, in that interval), for every axis k
                | r'_k u + r''_k x |                         <= a_k (1 - margin_i)
                | r'_k w + 3 r''_k u + r'''_k x | sqrt(x)    <= j_k          (the jerk along the path is w sqrt(x))
@@ -167,10 +167,10 @@ def _solve_piece(
     gap = x[1:] - x[:-1] - 2.0 * ds * (u[:-1] + shape.mean * gain)
 
     # ---- constraints: the feed between the points, then acceleration and tangents of the jerk at both ends of every interval --
-    cap = problem.feed_sq_max[here] / speed**2
+    cap = problem.feed_sq_limit[here] / speed**2
     rows = [(x[inner] + ds[inner] * u[inner]) / ((cap[inner] + cap[2:n]) / 2.0)]
     row_min, row_max = [np.full(n - 2, -np.inf)], [np.ones(n - 2)]
-    limit = problem.acceleration * (1.0 - problem.margin[here][:-1, None])
+    room = 1.0 - problem.margin[here][:-1, None]
     for to, slope, d2, d3 in (
         (0, shape.slope_start, problem.d2_right[here], problem.d3_right[here]),
         (1, shape.slope_end, problem.d2_left[here], problem.d3_left[here]),
@@ -178,11 +178,12 @@ def _solve_piece(
         w = (slope / ds)[inner] * gain[inner]
         end = slice(to, n + to)  # the points at this end of the intervals, all and inner ones
         own = slice(to + 1, n - 1 + to)
+        limit, jerk_limit = problem.acceleration_limit[here][end] * room, problem.jerk_limit[here][own]
         for k in range(axes):
             along, across = problem.d1[here][:, k], d2[:, k] * length
             rows.append((along[end] * u[end] + across[end] * x[end]) * (acc / limit[:, k]))
             turning = along[own] * w + 3.0 * across[own] * u[own] + d3[own, k] * length**2 * x[own]
-            share_of_jerk = turning * ca.sqrt(last[own]) * (acc / second / problem.jerk[k])
+            share_of_jerk = turning * ca.sqrt(last[own]) * (acc / second / jerk_limit[:, k])
             nearer = x[own] / (2.0 * last[own])
             rows += [share_of_jerk + nearer, share_of_jerk - nearer]
             row_min += [np.full(n, -1.0), np.full(n - 2, -np.inf), np.full(n - 2, -1.5)]
@@ -289,7 +290,8 @@ def _beside_rest(problem: FeedrateProblem, rest: int, step: int) -> float:
     jerk = 2.0 / (9.0 * d**2)  # of the motion, per x^(3/2)
     at_rest = np.abs(problem.d1[rest]) * jerk
     moving = np.abs(problem.d1[beside] * jerk + step * 2.0 / d * d2 + d3)
-    return float((np.maximum(at_rest, moving) / problem.jerk).max() ** (-2.0 / 3.0))
+    limit = problem.jerk_limit
+    return float(np.maximum(at_rest / limit[rest], moving / limit[beside]).max() ** (-2.0 / 3.0))
 
 
 def _violation(result: dict[str, FloatArray], bounds: dict[str, FloatArray]) -> float:

@@ -221,7 +221,7 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
     on feed^2 only the smallest at each point has a ratio there."""
     x, u = solution.require().feed_sq, solution.acc_s
     for bound in range(len(problem.bound_names)):
-        yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_max, 0.0)
+        yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_limit, 0.0)
     inner = np.flatnonzero(problem.interval)
     jerk = solution.jerk_s[inner]
     # Where there is no jerk, no duration is needed: it is infinite where a second-order profile rests at both ends.
@@ -236,11 +236,12 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
         for point, acc, d2, d3 in ends:
             d1, curve, feed = problem.d1[point, k], d2[point, k], np.sqrt(x[point])
             ratio = np.abs(d1 * acc + curve * x[point]) / (
-                problem.acceleration[k] * (1.0 - problem.margin[inner])
+                problem.acceleration_limit[point, k] * (1.0 - problem.margin[inner])
             )
             of_acceleration[inner] = np.maximum(of_acceleration[inner], ratio)
             turning = feed * (3.0 * curve * acc + d3[point, k] * x[point])
-            of_jerk[inner] = np.maximum(of_jerk[inner], np.abs(d1 * jerk + turning) / problem.jerk[k])
+            turned = np.abs(d1 * jerk + turning) / problem.jerk_limit[point, k]
+            of_jerk[inner] = np.maximum(of_jerk[inner], turned)
         yield first + k, of_acceleration
         if solution.jerk_limited:
             yield first + axes + k, of_jerk

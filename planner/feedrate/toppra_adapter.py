@@ -91,7 +91,7 @@ def _solve_piece(
     )
     x_start, x_end = problem.feed_sq_start[g], problem.feed_sq_end[g]
     last = problem.piece[g + 1] - 1
-    if x_end > problem.feed_sq_max[last] * (1.0 + ROUNDING):
+    if x_end > problem.feed_sq_limit[last] * (1.0 + ROUNDING):
         return unreachable
     length, time_unit = _units(problem, g)
     feed = length / time_unit
@@ -122,11 +122,11 @@ def _units(problem: FeedrateProblem, g: int) -> tuple[float, float]:
     """Units of length [mm] and time [s], powers of two, in which the largest u of piece g is about 1 and the largest x about
     `FEED_SQ_SCALE`."""
     first, last = problem.piece[g], problem.piece[g + 1] - 1
-    along = np.abs(problem.d1[first : last + 1]) / problem.acceleration
+    along = np.abs(problem.d1[first : last + 1]) / problem.acceleration_limit[first : last + 1]
     u_max = float((1.0 / along.max(axis=1)).max())
     ends = max(problem.feed_sq_start[g], problem.feed_sq_end[g])
     reachable = u_max * (problem.s[last] - problem.s[first]) + ends
-    x_max = float(min(problem.feed_sq_max[first : last + 1].max(), reachable))
+    x_max = float(min(problem.feed_sq_limit[first : last + 1].max(), reachable))
     length = x_max / (u_max * FEED_SQ_SCALE)
     return 2.0 ** round(math.log2(length)), 2.0 ** round(0.5 * math.log2(length / u_max))
 
@@ -139,12 +139,16 @@ def _rows(
     d1, d2_left, d2_right = problem.d1[points], problem.d2_left[points], problem.d2_right[points]
     size, axes = d1.shape
     step = np.diff(problem.s[points])[:, None]
-    limit = problem.acceleration * (1.0 - problem.margin[points][:-1, None])
+    room = 1.0 - problem.margin[points][:-1, None]
+    limit, limit_end = (
+        problem.acceleration_limit[points][:-1] * room,
+        problem.acceleration_limit[points][1:] * room,
+    )
     a, b = np.zeros((size, 2 * axes)), np.zeros((size, 2 * axes))  # no rows at the last point
     a[:-1, :axes], b[:-1, :axes] = d1[:-1] / limit, d2_right[:-1] / limit
-    a[:-1, axes:], b[:-1, axes:] = (d1[1:] + 2.0 * step * d2_left[1:]) / limit, d2_left[1:] / limit
+    a[:-1, axes:], b[:-1, axes:] = (d1[1:] + 2.0 * step * d2_left[1:]) / limit_end, d2_left[1:] / limit_end
     feed_sq, acc = (length / time_unit) ** 2, length / time_unit**2
-    x_max = problem.feed_sq_max[points] / feed_sq
+    x_max = problem.feed_sq_limit[points] / feed_sq
     a, b = a * (ROW_SCALE * acc), b * (ROW_SCALE * feed_sq)
     both = np.vstack([np.eye(2 * axes), -np.eye(2 * axes)])
     # Bounds of u that the rows imply, twice over: without them Seidel's walk along a row with a = 0 ends at its own "infinity".

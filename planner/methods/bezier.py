@@ -51,6 +51,8 @@ class BezierMethod(Method):
     corner: BezierCorner = field(default_factory=BezierCorner)
     allocate: bool = True
 
+    ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):
@@ -66,18 +68,19 @@ class BezierMethod(Method):
             samples = sample_path(path, shares) if stops.any() else samples
         with job.stage("solve"):
             motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
+        motion = job.behind_filters(motion)
         made = job.deliver(motion)
         with job.stage("report"):
-            corners = _corner_table(motion, limits)
+            rounded = _corner_table(motion, limits)
         return job.plan(
             made,
             method="bezier",
             corner=self.corner.name,
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=f"{len(corners)} corners are run through, {int(stops.sum())} are faster as full stops",
+            sentence=f"{len(rounded)} corners are run through, {int(stops.sum())} are faster as full stops",
             grid_points=len(samples),
-            corners=corners,
+            rounded=rounded,
         )
 
 

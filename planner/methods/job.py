@@ -5,22 +5,27 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.passing import segments_at
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.methods.behind import kept
 from planner.methods.closed_form import CornerTable
+from planner.methods.notes import job_notes
+from planner.methods.pacing import TimedT
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
 from planner.nc.program import Program
-from planner.timing import MotionInTime, sample_motion
+from planner.timing import MotionInTime, require_samples, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
@@ -33,41 +38,91 @@ class Job:
 
     toolpath : the program's exact path, with its tolerances
     stages   : the clock
+    judged   : machine and toolpath that the motion is kept to and judged by where it is planned with others (`with_share`), else None
+    noted    : what the method has said of what it gave up (`note`)
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
+    noted: list[str] = field(default_factory=list)
+    judged: tuple[Machine, Toolpath] | None = None
+
+    @property
+    def real(self) -> tuple[Machine, Toolpath]:
+        """Machine and toolpath that the motion is kept to and judged by."""
+        return self.judged or (self.machine, self.toolpath)
+
+    def with_share(self, share: float, seen: float) -> Job:
+        """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
+        of `seen` of their lengths [-]."""
+        machine, toolpath = self.real
+        assert machine.fir is not None
+        lengths = tuple(
+            seen * np.sqrt(share) * T for T in machine.fir.time_constants
+        )  # T^2 over tolerance stays
+        return replace(
+            self,
+            machine=machine.model_copy(
+                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
+            ),
+            toolpath=replace(toolpath, tolerance=share * toolpath.tolerance),
+            judged=(machine, toolpath),
+            noted=[],
+        )
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
         return self.stages.stage(name)
 
+    def note(self, *sentences: str) -> None:
+        """Add to the notes of the plan: what was given up, with its first line and how often."""
+        self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+
     @cached_property
     def stop_time(self) -> float:
         """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""
-        times = rest_to_rest_times(self.toolpath.length, *block_limits(self.toolpath, self.machine))
-        return float(times.sum() + np.sum(self.toolpath.dwell))
+        machine, toolpath = self.real
+        times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
+        return float(times.sum() + np.sum(toolpath.dwell))
+
+    def behind_filters(self, motion: TimedT) -> TimedT:
+        """The motion, slower where the machine's own filters would otherwise leave the tolerance (methods/behind.py)."""
+        with self.stage("filters"):
+            machine, toolpath = self.real
+            return kept(motion, toolpath, machine)
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too.
 
         seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
         """
+        machine, toolpath = self.real
         with self.stage("sample"):
-            trajectory = sample_motion(motion, self.machine.dt)
+            trajectory = self._named(sample_motion(motion, machine.dt))
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
-                self.toolpath,
-                self.machine,
+                toolpath,
+                machine,
                 motion=motion,
                 seed=seed,
                 not_limited=not_limited,
                 progress=progress,
             )
         return trajectory, verdict
+
+    def _named(self, trajectory: Trajectory) -> Trajectory:
+        """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
+        method's own blocks and a note."""
+        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
+        if segment is None:
+            self.note(
+                "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
+            )
+            return trajectory
+        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
 
     def plan(
         self,
@@ -79,7 +134,7 @@ class Job:
         status: Status,
         sentence: str,
         grid_points: int,
-        corners: CornerTable | None = None,
+        rounded: CornerTable | None = None,
         grid: GridHistory | None = None,
         prices: PriceList | None = None,
     ) -> Plan:
@@ -90,23 +145,30 @@ class Job:
             corner=corner,
             solver=solver,
             program=self.program,
-            machine=self.machine,
-            toolpath=self.toolpath,
+            machine=self.real[0],
+            toolpath=self.real[1],
             status=status,
             sentence=sentence,
             trajectory=trajectory,
             verdict=verdict,
-            corners=corners,
+            rounded=rounded,
             grid=grid,
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=prices,
+            notes=(*job_notes(self.program, *self.real), *self.noted),
             timings=self.stages.timings,
         )
 
 
 class Method(ABC):
-    """A way to plan a job; its repr is its row label in every table."""
+    """A way to plan a job; its repr is its row label in every table.
+
+    ways : for machines with filters behind the setpoints: shares of the tolerance, and of the filters' lengths that closed forms see
+           (`Job.with_share`), that are tried beside (1, 1); the fastest plan is taken
+    """
+
+    ways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
     def plan(
         self,
@@ -124,8 +186,28 @@ class Method(ABC):
         stages = Stages(progress)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
-        return self.plan_job(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+        # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
+        require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
+        return self._fastest(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+
+    def _fastest(self, job: Job) -> Plan:
+        """The plan; for a machine with filters the fastest of those that are tried (`ways`)."""
+        best = self.plan_job(job)
+        if job.machine.fir is None or not best.solved:
+            return best
+        for share, seen in self.ways:
+            best = faster(best, self.plan_job(job.with_share(share, seen)))
+        return best
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
         """Plan a program whose path is laid out."""
+
+
+def faster(plan: Plan, other: Plan) -> Plan:
+    """Of two plans the one that passed or, if both did, the faster one; the first if there is no difference."""
+    if plan.trajectory is None or plan.verdict is None or other.trajectory is None or other.verdict is None:
+        return plan
+    if plan.verdict.passed != other.verdict.passed:
+        return plan if plan.verdict.passed else other
+    return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan

@@ -10,6 +10,7 @@ from planner.machine import Machine, load_machine
 from planner.methods.bezier import BezierMethod
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
+from planner.methods.geometry import AUTO, SPLINE
 from planner.methods.job import Method
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
@@ -22,6 +23,9 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 
 DEFAULT_MACHINE = "mill"
+REACHABILITY = "reachability"
+# Which methods use which setting of `plan`.
+USED_BY = {"corner": ("optimal", "toppra"), "solver": ("toppra",), "rounds": ("optimal",)}
 METHODS = (
     "optimal",
     "toppra",
@@ -41,8 +45,8 @@ def plan(
     machine: Machine | str | Path | None = None,
     *,
     method: str | Method = "optimal",
-    corner: str = "auto",
-    solver: str = "reachability",
+    corner: str | None = None,
+    solver: str | None = None,
     rounds: int | None = None,
     tolerance: float | None = None,
     progress: Progress | None = None,
@@ -52,25 +56,48 @@ def plan(
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `METHODS`, or a method with settings of your own
-    corner    : "auto", "spline", "bezier", "fir" or "kinematic"; for "toppra" and "optimal"
-    solver    : "reachability" or "toppra"; for "toppra"
-    rounds    : in which "optimal" reshapes splines by what their motion pays for; None for as many as the size of the job lets pay
+    corner    : "auto", "spline", "bezier", "fir" or "kinematic", for "toppra" and "optimal" only; None for "auto"
+    solver    : "reachability" or "toppra", for "toppra" only; None for "reachability"
+    rounds    : in which "optimal" reshapes splines ("auto", "spline") by what their motion pays for; None for as many as the size of
+                the job lets pay
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
-    Raises InputError naming file, line and column. A problem that could not be solved is the plan's status; `Plan.require`
-    turns it into an exception.
+    Raises InputError naming file, line and column, and for a setting that the method does not use. A problem that could not be
+    solved is the plan's status; `Plan.require` turns it into an exception.
     """
-    chosen = _method(method, corner, solver, rounds) if isinstance(method, str) else method
+    _check_used(method, corner, solver, rounds)
+    if isinstance(method, str):
+        method = _method(
+            method, AUTO if corner is None else corner, REACHABILITY if solver is None else solver, rounds
+        )
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if isinstance(program, Program):
-        return chosen.plan(program, machine, tolerance, progress)
+        return method.plan(program, machine, tolerance, progress)
     reading = Stages(progress)
     with reading.stage("read"):
         program = read_program(program, machine)
-    made = chosen.plan(program, machine, tolerance, progress)
+    made = method.plan(program, machine, tolerance, progress)
     return dataclasses.replace(made, timings=reading.timings | made.timings)
+
+
+def _check_used(method: str | Method, corner: str | None, solver: str | None, rounds: int | None) -> None:
+    """Raise InputError for a setting that the method would ignore."""
+    given = {"corner": corner, "solver": solver, "rounds": rounds}
+    for setting, users in USED_BY.items():
+        if given[setting] is None or method in users:
+            continue
+        if isinstance(method, Method):
+            raise InputError(
+                f"{setting} = {given[setting]} beside a method with settings of its own: {method!r}; set it there"
+            )
+        if method in METHODS:
+            raise InputError(
+                f"{setting} = {given[setting]}: method {method} does not use it; it is for {' and '.join(users)}"
+            )
+    if rounds is not None and corner not in (None, AUTO, SPLINE):
+        raise InputError(f"rounds = {rounds}: they reshape splines, and corner {corner} has none")
 
 
 def _method(name: str, corner: str, solver: str, rounds: int | None) -> Method:

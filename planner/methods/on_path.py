@@ -15,6 +15,7 @@ from planner.methods.activity import history
 from planner.methods.closed_form import corner_table
 from planner.methods.geometry import AUTO, SPLINE, on_spline
 from planner.methods.job import Delivered, Job
+from planner.methods.notes import path_notes
 from planner.methods.plan import Plan
 from planner.methods.prices import PriceList
 from planner.methods.reshape import OnPath
@@ -73,20 +74,21 @@ def plan_of_solution(
     prices: PriceList | None = None,
 ) -> Plan:
     """The plan of a solution and the motion made of it, None for both unless solved."""
-    corners = grid = None
+    rounded = grid = None
     if motion is not None:
         with job.stage("report"):
-            corners = corner_table(best.samples, best.problem, best.solution)
+            rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, motion.law)
+        job.note(*path_notes(job.toolpath, best))
     return job.plan(
         made,
         method=method,
         corner=corner if isinstance(corner, str) else corner.name,
         solver=best.solution.solver,
         status=best.solution.status,
-        sentence=best.solution.sentence,
+        sentence="; ".join((best.solution.sentence, *best.notes)),
         grid_points=len(best.samples),
-        corners=corners,
+        rounded=rounded,
         grid=grid,
         prices=prices,
     )

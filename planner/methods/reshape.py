@@ -48,13 +48,15 @@ GAP = 1e-4  # of a round's convex problem, share of the run's time [-]: below wh
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OnPath:
-    """A smooth path, its grid, and the time-optimal motion on it; the shape of its splines, if it has some."""
+    """A smooth path, its grid, and the time-optimal motion on it; the shape of its splines, if it has some; sentences on what was
+    given up."""
 
     path: SmoothPath
     samples: PathSamples
     problem: FeedrateProblem
     solution: FeedrateSolution
     shape: SplineShape | None = None
+    notes: tuple[str, ...] = ()
 
 
 PlanOn = Callable[[SmoothPath], OnPath]
@@ -130,21 +132,23 @@ def _reshape(
     [s per mm of radius]."""
     laid, runs, chain = shape.laid, shape.runs, shape.guide
     control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
-    multiplier = np.zeros(len(used))
+    multiplier, good = np.zeros(len(used)), np.zeros(len(force), np.bool_)
     relax(
         chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
         laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
         runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned, shape), 0.0,
-        np.zeros(len(force), np.bool_), multiplier,
+        good, multiplier,
     )  # fmt: skip
     new = dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
-    return _chosen(shape, new, ~cusps(new.laid)), -multiplier / used
+    return _chosen(shape, new, good & ~cusps(new.laid)), -multiplier / used
 
 
-def tube_prices(planned: OnPath, shape: SplineShape) -> FloatArray:
-    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube in a round from the present shape."""
+def tube_prices(planned: OnPath, shape: SplineShape, more: float = 0.0) -> FloatArray:
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube, so much wider [mm], in a round from the present shape."""
     H, Q = price_bands(planned, shape)
-    _, prices = _reshape(planned, shape, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
+    guide = shape.guide._replace(tol=shape.guide.tol + more, tol_chord=shape.guide.tol_chord + more)
+    wider = dataclasses.replace(shape, guide=guide, used=shape.used + more, left=shape.left + more)
+    _, prices = _reshape(planned, wider, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
     return prices
 
 
@@ -176,11 +180,12 @@ def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> 
     assert solution.multipliers is not None
     axes = len(problem.axes)
     rows = np.abs(solution.multipliers.rows[on])
+    slower = [problem.limit_scale[point][:, None] for point in (on, on + 1)]  # squares of shares of limits
     price = np.zeros((len(on), 2, axes, 3))
-    price[:, 0, :, 1], price[:, 1, :, 1] = 0.5 * rows[:, :, 0], 0.5 * rows[:, :, 3]
-    price[:, 0, :, 2], price[:, 1, :, 2] = 0.5 * rows[:, :, 1], 0.5 * rows[:, :, 2]
+    price[:, 0, :, 1], price[:, 1, :, 1] = (0.5 * rows[:, :, k] * slower[k // 3] ** 4 for k in (0, 3))
+    price[:, 0, :, 2], price[:, 1, :, 2] = (0.5 * rows[:, :, k] * slower[k - 1] ** 6 for k in (1, 2))
     name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
-    feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_max[on]
+    feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_limit[on]
     price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
     for k, axis in enumerate(problem.axes):
         at = name == f"velocity.{axis}"

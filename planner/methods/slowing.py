@@ -3,8 +3,8 @@
 A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
 divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
 
-`tightened` asks for it where it is needed, by axis limits that are smaller by lam^3 and speeds that are smaller by lam around every
-excess: the solution is slower in these places only. What is left, whole runs between full stops are slowed down by; that always ends.
+`tightened` asks for it where it is needed, by the problem's `limit_scale` around every excess: the solution is slower in these places
+only. What is left, whole runs between full stops are slowed down by; that always ends.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
 # the time it takes counts, by more than the second, once: it leaves less than half of the excess.
 TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 6, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
@@ -99,20 +99,10 @@ def _fastest(law: TimeLaw) -> FloatArray:
 
 
 def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
-    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of each point: the path's
-    derivatives around it times factor^3, which is as good as smaller limits, and smaller bounds of the speed."""
+    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of each point."""
     lam = np.maximum(factor, 1.0)
     lam[1:] = np.maximum(lam[1:], lam[:-1])  # at both ends of an interval
-    by = lam[:, None] ** 3
-    return dataclasses.replace(
-        problem,
-        d1=problem.d1 * by,
-        d2_left=problem.d2_left * by,
-        d2_right=problem.d2_right * by,
-        d3_left=problem.d3_left * by,
-        d3_right=problem.d3_right * by,
-        feed_sq_max=problem.feed_sq_max / lam**2,
-    )
+    return dataclasses.replace(problem, limit_scale=problem.limit_scale * lam)
 
 
 def within_limits(

@@ -80,7 +80,7 @@ class TubeMethod(Method):
                 report((done + 1) / len(courses))
         made = None
         if start.trajectory is not None and len(steps) == len(courses):
-            made = job.deliver(_motion(courses, steps, places, toolpath))
+            made = job.deliver(job.behind_filters(_motion(courses, steps, places, toolpath)))
             sentence += f"; {start.method} with corner {start.corner}, its start, took {start.trajectory.cycle_time:.6g} s"
         return job.plan(
             made,
@@ -108,7 +108,7 @@ def _often_sampled(job: Job) -> Job:
     acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
     period = max(START_PERIOD * float((acceleration / jerk).min()), job.stop_time / START_SAMPLES)
     machine = job.machine.model_copy(update={"dt": min(job.machine.dt, period)})
-    return dataclasses.replace(job, machine=machine, stages=Stages())
+    return dataclasses.replace(job, machine=machine, stages=Stages(), noted=[])
 
 
 def _passed(course: Course, start: Trajectory, toolpath: Toolpath) -> tuple[Trajectory, FloatArray]:

@@ -45,10 +45,18 @@ class Interpreter:
         self.state = self.setup.start()
         self.store = Store(len(words.line), len(words.letter))
         self._reports: list[tuple[int, str]] = []
-        self.notes: dict[str, None] = {}  # ordered, each once
+        self._notes: dict[str, list[int]] = {}  # in their order: first line, times
 
     def program(self) -> Program:
-        return self.store.finish(self.source, tuple(self.notes))
+        return self.store.finish(self.source, self.notes)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed, each once, with its first line and how often."""
+        found = sorted(self._notes.items(), key=lambda note: note[1][0])
+        return tuple(
+            f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}" for text, (line, times) in found
+        )
 
     def run(self) -> None:
         row, rows, begun, ended = 0, len(self.words.line), False, False
@@ -67,7 +75,8 @@ class Interpreter:
             row = after
         if not (self.words.letter[self.words.first[row] :] == ord("%")).all():
             end, after = int(self.words.line[row - 1]), int(self.words.line[row])
-            self.note(f"the program ends on line {end}; what follows from line {after} on is not read")
+            self.note(f"the program ends; what follows from line {after} on is not read", end)
+        self._note_units()
 
     def report(self, word: int, message: str) -> None:
         self._reports.append((word, message))
@@ -79,8 +88,19 @@ class Interpreter:
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         return FaultList(self.words, sorted(found + self._reports))
 
-    def note(self, text: str) -> None:
-        self.notes[text] = None
+    def note(self, text: str, line: int) -> None:
+        self._notes.setdefault(text, [line, 0])[1] += 1
+
+    def _note_units(self) -> None:
+        """Say it if the first move comes before any G20 or G21."""
+        moves = np.flatnonzero(self.store.kind[: self.store.blocks] <= Kind.ARC)
+        if not len(moves):
+            return
+        line = int(self.store.line[moves[0]])
+        before = slice(0, self.words.first[np.searchsorted(self.words.line, line, side="right")])
+        code = np.rint(10.0 * self.words.value[before])
+        if not ((self.words.letter[before] == ord("G")) & ((code == 200.0) | (code == 210.0))).any():
+            self.note("no G20 or G21 before the first move: mm", line)
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -122,7 +142,8 @@ class Interpreter:
         if code is not None and (code == 200) != (self.state.unit != 1.0):
             unit = "mm" if self.state.unit == 1.0 else "inch"
             self.note(
-                f"line {block.line}: F{feed:g} is {unit} per minute: F acts before G{codes.number(code)} on the same line"
+                f"F{feed:g} is {unit} per minute: F acts before G{codes.number(code)} on the same line",
+                block.line,
             )
 
     def _events(self, block: Block) -> None:
@@ -139,6 +160,7 @@ class Interpreter:
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
             store.add(Kind.STOP, line, state)
+            self.note("a tool change is a full stop that takes no time", line)
         for group in ("spindle", "coolant", "override"):
             if group in block.m:
                 store.add_event("M", block.m[group] / 10, line)
@@ -166,7 +188,7 @@ class Interpreter:
         if "work offset" in g:
             state.system = g["work offset"]
             if state.system not in self.setup.systems and state.system != 540:
-                self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0")
+                self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0", block.line)
         if "path control" in g:
             self._path_control(block)
         if "distance mode" in g:
@@ -178,7 +200,7 @@ class Interpreter:
     def _tool_length(self, block: Block) -> float:
         tool = integer(block, "H", 0) if "H" in block.value else self.state.tool_loaded
         if tool not in self.setup.tools and tool != 0:
-            self.note(f"tool {tool} has no length in the machine file: 0")
+            self.note(f"tool {tool} has no length in the machine file: 0", block.line)
         return self.setup.tools.get(tool, 0.0)
 
     def _path_control(self, block: Block) -> None:
@@ -191,9 +213,9 @@ class Interpreter:
             if tolerance > 0:
                 state.tolerance = tolerance * state.unit
             else:
-                self.note(f"line {block.line}: G64 P0 gives no tolerance; the machine's holds")
+                self.note("G64 P0 gives no tolerance; the machine's holds", block.line)
         if "Q" in block.value:
-            self.note("G64 Q is not used: the tolerance of P bounds every deviation")
+            self.note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)
 
     # --- what moves ---------------------------------------------------------------------------------------------------------
 
@@ -217,7 +239,7 @@ class Interpreter:
         """G28, G30: through the intermediate point, if there is one, to the machine's position (of the axes given)."""
         state, name = self.state, f"G{codes.number(code)}"
         if code not in self.setup.positions:
-            self.note(f"{name} has no position in the machine file: machine zero")
+            self.note(f"{name} has no position in the machine file: machine zero", block.line)
         home = self.setup.positions.get(code, np.zeros(3))
         if block.has("XYZ"):
             state.position[:] = moves.target(self.state, block)

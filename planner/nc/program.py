@@ -61,7 +61,7 @@ class Program:
     arc_normal   : (K,) index of the axis normal to the arc's plane: 2 for G17, 1 for G18, 0 for G19
     arc_sweep    : (K,) signed angle [rad], counter-clockwise about the normal axis positive, full turns included
     events       : words without influence on the motion
-    notes        : what the reader assumed and a user should know ("tool 3 has no length in the machine file: 0")
+    notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
     """
 
     source: str

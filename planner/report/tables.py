@@ -15,17 +15,20 @@ from planner.report.optimum import held_by_text, price_rows
 from planner.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
+    from planner.arrays import FloatArray
     from planner.methods.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
-    from planner.verify import Verdict
+    from planner.verify import CornerCheck, Ringing, Verdict
 
-CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table
+CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.corners` has them all
 FAULTS_SHOWN = 8
+NOTES_SHOWN = 8
 
 
-def plan_table(plan: Plan) -> Group:
-    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage."""
+def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
+    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage, how it was solved;
+    then the notes (None: the plan's)."""
     corner = f" on {plan.corner} corners" if plan.corner else ""
     title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
     table = _pairs()
@@ -39,11 +42,6 @@ def plan_table(plan: Plan) -> Group:
             )
     if plan.verdict is not None:
         _add_verdict(table, plan.verdict)
-    if plan.corners is not None and len(plan.corners.line):
-        table.add_row(
-            "corners",
-            f"{len(plan.corners.line):,}; fastest {ratio_text(plan.corners.worst_ratio())} of eq. 19-20",
-        )
     if plan.grid is not None:
         table.add_row("held by", held_by_text(plan.grid))
     if plan.prices is not None and plan.trajectory is not None:
@@ -52,7 +50,9 @@ def plan_table(plan: Plan) -> Group:
     table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
-    return _titled(title, table)
+    table.add_row("solution", plan.sentence)
+    said = plan.notes if notes is None else notes
+    return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
 def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
@@ -64,39 +64,35 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
     return _titled(title, table)
 
 
-def corner_table(plan: Plan) -> Table | None:
-    """The corners that come closest to the speed of the closed form; None without corners."""
-    corners = plan.corners
-    if corners is None or not len(corners.line):
+def corner_table(corners: CornerCheck) -> Table | None:
+    """Eq. 18-20 at every programmed corner, of many those that come closest to them; None without corners."""
+    if not len(corners):
         return None
-    ratio = corners.feed_planned / corners.feed_closed_form
-    worst = np.argsort(-ratio, kind="stable")[:CORNERS_SHOWN]
-    shown = f"the {len(worst)} fastest of " if len(worst) < len(ratio) else ""
-    table = Table(title=f"{shown}{len(ratio):,} corners", title_justify="left", box=None, pad_edge=False)
+    closest = np.maximum(corners.speed_ratio, corners.budget_ratio)
+    worst = np.argsort(-closest, kind="stable")[:CORNERS_SHOWN]  # NaN, not looked at, comes last
+    shown = f"the {len(worst):,} closest to eq. 18-19 of " if len(worst) < len(corners) else ""
+    table = Table(title=f"{shown}{len(corners):,} corners", title_justify="left", box=None, pad_edge=False)
     for name in (
         "line",
-        "theta\ndeg",
-        "d in\nmm",
-        "d out\nmm",
-        "eps_ap\nµm",
-        "kappa\n1/mm",
-        "eq. 19-20\nmm/s",
-        "planned\nmm/s",
+        "angle\ndeg",
+        "feed\nmm/s",
+        "eq. 19\nfeed / its own",
+        "eq. 18\nerror / budget",
+        "eq. 20\nmm/s",
+        "feed /\neq. 20",
     ):
         table.add_column(name, justify="right")
-    table.add_column("limited by")
     for k in sorted(worst):
-        table.add_row(
-            str(corners.line[k]),
-            f"{np.rad2deg(corners.theta[k]):.2f}",
-            f"{corners.d_in[k]:.4f}",
-            f"{corners.d_out[k]:.4f}",
-            f"{corners.tol_ap[k] / MICROMETRE:.2f}",
-            f"{corners.kappa_max[k]:.4g}",
-            f"{corners.feed_closed_form[k]:.3f}",
+        known = (
             f"{corners.feed_planned[k]:.3f}",
-            str(corners.limited_by[k]),
+            ratio_text(corners.speed_ratio[k]),
+            ratio_text(corners.budget_ratio[k]),
+            f"{corners.feed_paper[k]:.3f}",
+            f"{corners.gain[k]:.3f}",
         )
+        angle = f"{np.rad2deg(corners.theta[k]):.2f}"
+        unknown = ("not looked at", "-", "-", known[3], "-")
+        table.add_row(str(corners.line[k]), angle, *(known if corners.looked[k] else unknown))
     return table
 
 
@@ -184,13 +180,31 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
     table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
     table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
+    if (after := verdict.after_filters) is not None:
+        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))
+        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm, verdict))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
+    table.add_row("corners", verdict.corners.sentence())
+    for mode in verdict.ringing:
+        table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
     if verdict.passed:
         table.add_row("verdict", Text("passed", style="green"))
         return
     table.add_row("verdict", Text("FAILED", style="bold red"))
     for fault in _first(verdict.faults, FAULTS_SHOWN):
         table.add_row("", Text(fault))
+
+
+def _ringing_text(mode: Ringing) -> str:
+    """Amplitudes after the motion and peaks during it, axis by axis."""
+
+    def said(values: FloatArray) -> str:
+        return ", ".join(
+            f"{axis} {value / MICROMETRE:.4g} µm" if axis in LINEAR_AXES else f"{axis} {1e6 * value:.4g} µrad"
+            for axis, value in zip(mode.axes, values, strict=True)
+        )
+
+    return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
 
 
 def _micrometres(distance: float | None, verdict: Verdict) -> str:

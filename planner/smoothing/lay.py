@@ -1,8 +1,10 @@
 """A first spline inside the tube of each run, with its knots and the sites at which the tube is watched.
 
 The control points of the first spline are the places of the guide at the spline's Greville abscissae: a smoothed guide that leaves it
-only at corners, and the less, the denser the knots are. Where it leaves the tube by more than `ROOM` of it, knots are added. So every
-run starts from a path that keeps the tolerance.
+only at corners, and the less, the denser the knots are. Where it uses more than `ROOM` of the tube, knots are added, which moves the
+knots of the whole run a little: on a run of 100,000 corners some site always ends a little beyond `ROOM`. That does no harm: what is
+within `INSIDE` of the tube is a start for the relaxation (relax.py). Only spans with sites outside of that are no spline, and the run
+is to be cut there (spline_path.py).
 
 Sites are all vertices, each with a ball around it, and between distant ones places on the chords `SITE_SPACING` of a span apart,
 around which the path may slide along the chord.
@@ -13,18 +15,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
+from planner.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.guide import Guide
 from planner.smoothing.interior import site_distance
 from planner.smoothing.knots import graded, spacing, spread
 from planner.smoothing.runs import Runs
 
-ROOM = 0.85  # of the tube that a first spline may use [-]
+ROOM = 0.85  # of the tube that a first spline should use [-]
 DENSER = 0.75  # factor on the distance of knots where it uses more [-]
 DENSER_MAX = 16  # so many times at most
+INSIDE = 0.99  # of the tube that it may use in the end [-]: the relaxation starts strictly inside of its own tube, relax.TUBE
 SPANS_MIN = 8  # of a run
 SITE_SPACING = 0.5  # of sites on chords [spans]
 SITE_EDGE = 0.1  # no site on a chord so close to its ends [spans]
@@ -42,7 +45,8 @@ class Laid(NamedTuple):
     place       : (J,) along the legs [mm]
     weights     : (J, 6) the basis functions there
     target, along, slide, radius : (J, ..) the site's tube (interior.py); radius is the whole tolerance [mm]
-    fits        : (Q,) True if the first spline is inside the tube
+    outside     : (S,) spans with a site that the first spline passes too far away
+    fits        : (Q,) True if it is inside the tube everywhere
     """
 
     span_first: Array
@@ -56,6 +60,7 @@ class Laid(NamedTuple):
     along: FloatArray
     slide: FloatArray
     radius: FloatArray
+    outside: Array
     fits: Array
 
 
@@ -142,6 +147,7 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
     breaks, control = np.empty(size), np.empty((size, axes))
     span, where, slide, radius = np.empty(size, np.int64), np.empty(size), np.empty(size), np.empty(size)
     weights, target, direction = np.empty((size, ORDER)), np.empty((size, axes)), np.empty((size, axes))
+    outside = np.zeros(size, np.bool_)
     for q in range(runs):
         a, b = first[q], first[q + 1]
         here, points, inner = place[a:b], point[a:b], place[a + 1 : b - 1]
@@ -159,6 +165,9 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
             span, slide, radius = _grown1(span, n), _grown1(slide, n), _grown1(radius, n)
             where = _grown1(where, n)
             weights, target, direction = _grown2(weights, n), _grown2(target, n), _grown2(direction, n)
+            outside = _grown1(outside, span_first[q] + spans)
+            for i in range(spans):
+                outside[span_first[q] + i] = False
             bad = 0
             i = 0
             for s in range(m):
@@ -188,7 +197,10 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
                             / (here[chord + 1] - here[chord])
                             * (points[chord + 1, k] - points[chord, k])
                         )
-                if site_distance(j, c, span, weights, target, direction, slide, e) > ROOM * radius[j]:
+                used = site_distance(j, c, span, weights, target, direction, slide, e) / radius[j]
+                if used > INSIDE:
+                    outside[span_first[q] + i] = True
+                if used > ROOM:
                     bad += 1
                     # knots nearer to each other at the vertices around
                     lo, hi = 0, len(inner)
@@ -204,7 +216,9 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
             if bad == 0 or attempt == DENSER_MAX:
                 break
             h = graded(inner, h)
-        fits[q] = bad == 0
+        for i in range(spans):
+            if outside[span_first[q] + i]:
+                fits[q] = False
         span_first[q + 1], site_first[q + 1] = span_first[q] + spans, site_first[q] + m
         breaks = _grown1(breaks, span_first[q + 1] + q + 1)
         control = _grown2(control, span_first[q + 1] + DEGREE * (q + 1))
@@ -216,5 +230,6 @@ def _lay(first, place, point, turn, along, tol, tol_chord, longest):
     m, n = site_first[runs], span_first[runs]
     return (
         span_first, breaks[: n + runs].copy(), control[: n + DEGREE * runs].copy(), site_first, span[:m].copy(), where[:m].copy(),
-        weights[:m].copy(), target[:m].copy(), direction[:m].copy(), slide[:m].copy(), radius[:m].copy(), fits,
+        weights[:m].copy(), target[:m].copy(), direction[:m].copy(), slide[:m].copy(), radius[:m].copy(),
+        outside[:n].copy(), fits,
     )  # fmt: skip

@@ -10,8 +10,8 @@ is too large, and relaxed again.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from planner.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.certificate import certify
 from planner.smoothing.forms import third_derivative_energy
@@ -160,7 +160,8 @@ def relax(
     a certificate stays as it is, and is not `good` (Q,).
 
     used         : (J,) radius that each site may use, smaller afterwards where the certificate asked for it
-    left         : (S,) what the certificate leaves of the tolerance
+    left         : (S,) what the certificate leaves of the tolerance; of a run that is not good, of its last try: negative where it
+                   fails
     multiplier   : (J,) of the sites' constraints (interior.py)
     H_all, Q_all : (A, n, 6) bands of all runs
     force        : (Q,) of each run
@@ -206,5 +207,5 @@ def relax(
                     old[i, k] = c[i, k]
             for j in range(j1 - j0):
                 used[j0 + j] = tube[j]
-            for i in range(s1 - s0):
-                left[s0 + i] = kept[i]
+        for i in range(s1 - s0):
+            left[s0 + i] = kept[i]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.allocation import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
+from planner.kernels import njit
 from planner.machine import Machine
 from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
 from planner.smoothing.forms import third_derivative_forms
@@ -31,7 +31,7 @@ class SplineShape:
     """The splines of a path with what is needed to change their shape within the tolerance.
 
     runs, guide, laid : what the splines replace and how they are made up
-    left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]
+    left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]; negative where a run has none
     reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
     used       : (J,) radius that each site may use [mm]
     """
@@ -60,7 +60,8 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     # the longest span of a run: of its slowest leg
     of_run = _smallest(longest, runs)
     laid = lay(chain, runs, of_run)
-    left, used, good = np.empty(laid.span_first[-1]), TUBE * laid.radius, np.zeros(len(of_run), np.bool_)
+    left, used = np.full(laid.span_first[-1], np.inf), TUBE * laid.radius
+    good = np.zeros(len(of_run), np.bool_)
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
     H = np.zeros((len(axes), len(laid.control), ORDER))
@@ -113,11 +114,13 @@ def _find_cusps(span_first, breaks, control, found):
                     found[span_first[q] + i] = True
 
 
-def cusp_joints(path: SmoothPath, shape: SplineShape) -> Array:
-    """Joints of the toolpath where runs that do not fit have their cusps: of those around each, the one that turns most."""
+def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Array:
+    """Joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the tube, without a
+    certificate or with a cusp, of the joints around it the one that turns most, or those on both sides of it (`fence`), which leave
+    a run of a few joints there."""
     laid, runs = shape.laid, shape.runs
     lost = np.repeat(~laid.fits, np.diff(laid.span_first))
-    spans = np.flatnonzero(lost & cusp_spans(laid))
+    spans = np.flatnonzero(lost & (laid.outside | (shape.left < 0.0) | cusp_spans(laid)))
     run = np.searchsorted(laid.span_first, spans, side="right") - 1
     begin, end = laid.breaks[spans + run], laid.breaks[spans + run + 1]
     place = path.legs.place[path.legs.first]
@@ -126,6 +129,12 @@ def cusp_joints(path: SmoothPath, shape: SplineShape) -> Array:
     # one at least, and inside the run
     first = np.clip(np.minimum(first, last), runs.joint_first[run], runs.joint_last[run])
     last = np.clip(last, first, runs.joint_last[run])
+    if fence:
+        before, after = (
+            np.maximum(first - 1, runs.joint_first[run]),
+            np.minimum(last + 1, runs.joint_last[run]),
+        )
+        return path.legs.first[np.unique(np.concatenate([before, after]))]
     theta = path.theta
     most = [a + int(np.argmax(theta[a : b + 1])) for a, b in zip(first, last, strict=True)]
     return path.legs.first[np.unique(np.array(most, dtype=np.int64))]

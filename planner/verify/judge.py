@@ -11,11 +11,13 @@ from planner.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
-from planner.verify import contour, findings, samples
+from planner.verify import contour, error_allocation, findings, samples
 from planner.verify.dense import Comparison
+from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.pieces import Pieces, pieces_of, widened
+from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
 from planner.verify.times import Motion, look
 from planner.verify.verdict import Verdict
@@ -99,10 +101,24 @@ def verify(
     faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    after = after_filters(trajectory, motion, toolpath, machine, pieces)
+    faults += after.faults if after is not None else ()
+    corners = error_allocation.check_corners(
+        trajectory,
+        looks,
+        pieces,
+        toolpath,
+        machine,
+        motion=motion if len(looks) > 1 else None,
+        limits=limits,
+        judged="acceleration" not in not_limited,
+    )
+    faults += error_allocation.faults(corners, toolpath.axes)
     return Verdict(
         passed=not faults,
         limits=checks,
         contour=contour_check,
+        corners=corners,
         vertex=apart.vertex_check(toolpath),
         contour_error_mm=contour_error,
         vertex_error_mm=vertex_error,
@@ -113,7 +129,9 @@ def verify(
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
         lost_after=contour.lost_after(looks, toolpath, pieces, complete=not len(lost)),
         faults=tuple(faults),
+        ringing=ringing_of(trajectory, machine),
         notes=tuple(notes),
+        after_filters=after,
     )
 
 

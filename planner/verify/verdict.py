@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.arrays import FloatArray, freeze
+from planner.verify.corners import CornerCheck
 from planner.verify.pieces import RATIO_ROUNDING
+from planner.verify.ringing import Ringing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,6 +54,17 @@ class LimitCheck:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class AfterFilters:
+    """What the machine's own filters leave of the tolerance (filtered.py); fields as in `Verdict`."""
+
+    contour: LimitCheck
+    vertex: LimitCheck
+    contour_error_mm: float | None
+    vertex_error_mm: float | None
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Verdict:
     """What `verify` found.
 
@@ -59,6 +72,7 @@ class Verdict:
     limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
     contour          : the motion's worst distance from the path as far as it could be followed, against the budget there
     vertex           : the worst distance of a programmed vertex from the motion, of those that are known, against the budget there
+    corners          : eq. 18-20 at the programmed corners
     contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if it
                        could not be followed
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
@@ -69,6 +83,8 @@ class Verdict:
     lost             : indices of the program's blocks that the motion never visits
     lost_lines       : their NC lines
     faults           : one sentence per failure: what, by how much, when, where, NC line
+    after_filters    : the motion behind the machine's filters, judged likewise; None for a machine without
+    ringing          : what each vibration mode of the machine does; reported, not judged
     notes            : what could not be judged sharply, and why
     """
 
@@ -76,6 +92,7 @@ class Verdict:
     limits: dict[str, LimitCheck]
     contour: LimitCheck
     vertex: LimitCheck
+    corners: CornerCheck
     contour_error_mm: float | None
     vertex_error_mm: float | None
     end_error_mm: float
@@ -84,16 +101,28 @@ class Verdict:
     lost: tuple[int, ...]
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
+    after_filters: AfterFilters | None = None
+    ringing: tuple[Ringing, ...] = ()
     lost_after: int | None = None
     notes: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The part of `summary.json` that is called `verdict`."""
-        return {
+        after = self.after_filters
+        behind = (
+            {}
+            if after is None
+            else {
+                "contour_error_after_filters_mm": after.contour_error_mm,
+                "vertex_error_after_filters_mm": after.vertex_error_mm,
+            }
+        )
+        return behind | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},
             "contour_error_mm": self.contour_error_mm,
             "vertex_error_mm": self.vertex_error_mm,
             "end_error_mm": self.end_error_mm,
+            "ringing": [mode.summary() for mode in self.ringing],
             "lost_after_line": self.lost_after,
         }

@@ -100,7 +100,7 @@ def test_controllable_sets_are_those_of_a_linear_programme(seed: int) -> None:
     for i in range(last - 1, -1, -1):
         expected = controllable_by_lp(problem, i, target)
         h, share = problem.s[i + 1] - problem.s[i], 1.0 - problem.margin[i]
-        args = (problem.d1, problem.d2_left, problem.d2_right, problem.acceleration, share, target)
+        args = (problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit, share, target)
         target = _largest(i, problem.feed_sq_max[i], h, *args)
         assert target == pytest.approx(expected, rel=1e-8)
 

@@ -143,9 +143,9 @@ def test_first_fault_is_named_and_the_others_counted() -> None:
 
 
 def test_faults_after_the_end_are_not_read() -> None:
-    program = parse_program("G0 X1\nM30\nG81 X1 A2 #3")
+    program = parse_program("G21 G0 X1\nM30\nG81 X1 A2 #3")
     assert len(program) == 1
-    assert program.notes == ("the program ends on line 2; what follows from line 3 on is not read",)
+    assert program.notes == ("line 2: the program ends; what follows from line 3 on is not read",)
 
 
 @pytest.mark.parametrize("read", [read_program, inspect_program])

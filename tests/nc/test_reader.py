@@ -174,23 +174,23 @@ def test_g92_3_brings_back_what_g92_2_took() -> None:
 
 def test_home_through_a_point() -> None:
     of = machine(positions={"g28": {"x": 100.0, "z": 50.0}})
-    program = parse_program("G0 X1 Y2 Z3\nG91 G28 Z4\nG28\nG90 G30 X5 Y5", of)
+    program = parse_program("G21 G0 X1 Y2 Z3\nG91 G28 Z4\nG28\nG90 G30 X5 Y5", of)
     assert program.end.tolist() == [[1, 2, 3], [1, 2, 7], [1, 2, 50], [100, 0, 50], [5, 5, 50], [0, 0, 50]]
     assert program.line.tolist() == [1, 2, 2, 3, 4, 4]
-    assert program.notes == ("G30 has no position in the machine file: machine zero",)
+    assert program.notes == ("line 4: G30 has no position in the machine file: machine zero",)
 
 
 # --- feeds, modes, events ------------------------------------------------------------------------------------------------
 
 
 def test_feed_is_read_before_units() -> None:
-    program = parse_program("G1 X1 F60\nG20 F120 G1 X1\nX2 F60")
+    program = parse_program("G21 G1 X1 F60\nG20 F120 G1 X1\nX2 F60")
     assert program.feed.tolist() == [1.0, 2.0, 25.4]
     assert program.notes == ("line 2: F120 is mm per minute: F acts before G20 on the same line",)
 
 
 def test_path_control_holds_from_its_line_on() -> None:
-    text = "G0 X1\nG61\nX2\nG61.1 X3\nG64 P0.1 X4\nG20 G64 P0.01\nX5\nG64 Q1 X6\nG64 P0 X7"
+    text = "G21 G0 X1\nG61\nX2\nG61.1 X3\nG64 P0.1 X4\nG20 G64 P0.01\nX5\nG64 Q1 X6\nG64 P0 X7"
     program = parse_program(text, machine(path_control="exact_stop"))
     B, P, S = PathControl
     assert program.path_control.tolist() == [S, P, S, B, B, B, B]
@@ -221,12 +221,31 @@ def test_a_motion_code_alone_moves_nothing() -> None:
 
 
 def test_notes_say_what_is_missing() -> None:
-    program = parse_program("T3 M6\nG43 H3\nG56\nG28\nG28", machine())
+    program = parse_program("T3 M6\nG43 H3\nG56\nG28\nG28\nG64 Q1 P1\nG64 Q1 P1\nG43 H3", machine())
     assert program.notes == (
-        "tool 3 has no length in the machine file: 0",
-        "G56 has no offset in the machine file: 0",
-        "G28 has no position in the machine file: machine zero",
+        "line 1: a tool change is a full stop that takes no time",
+        "line 2: tool 3 has no length in the machine file: 0 (2 times)",
+        "line 3: G56 has no offset in the machine file: 0",
+        "line 4: G28 has no position in the machine file: machine zero (2 times)",
+        "line 4: no G20 or G21 before the first move: mm",
+        "line 6: G64 Q is not used: the tolerance of P bounds every deviation (2 times)",
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("F9\nG1 X1", 2),
+        ("F9\nG1 X1\nG20 X2", 2),
+        ("G20\nF9 G1 X1", 0),
+        ("F9\nG21 G1 X1", 0),
+        ("F9", 0),
+        ("G4 P1\nG20\nG1 F9 X1", 0),
+    ],
+)
+def test_units_that_are_not_said_are_noted(text: str, line: int) -> None:
+    notes = parse_program(text).notes
+    assert notes == ((f"line {line}: no G20 or G21 before the first move: mm",) if line else ())
 
 
 # --- arcs ----------------------------------------------------------------------------------------------------------------

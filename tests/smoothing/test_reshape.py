@@ -15,7 +15,7 @@ from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.geometry.build import toolpath_from_program
-from planner.methods.geometry import _least_times, _piece_times, _with_corners
+from planner.methods.geometry import COMPARED_POINTS, CornerBounds, _piece_times, _with_corners, corner_bounds
 from planner.methods.optimal import OptimalMethod
 from planner.methods.reshape import OnPath, price_bands
 from planner.methods.second_order import second_order
@@ -98,7 +98,10 @@ def test_the_coarse_time_is_less_than_what_corners_take(program):
     """What `auto` does not even try could not have been faster."""
     rounded = round_corners(toolpath_from_program(program, MACHINE, None), MACHINE, BezierCorner())
     exact = second_order(rounded, sample_path(rounded, MACHINE), MACHINE, Reachability())
-    assert (_least_times(rounded, MACHINE) < _piece_times(exact)).all()
+    bounds = corner_bounds(rounded, MACHINE)
+    assert (bounds.time < _piece_times(exact)).all()
+    grid = sample_path(rounded, MACHINE, third_order=True)
+    assert 0.5 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
 
 
 def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_are():
@@ -114,9 +117,26 @@ def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_ar
         calls.append(path)
         return planned_on(path)
 
-    least = np.zeros(len(splines.samples.piece) - 1)
-    mixed, best = _with_corners(rounded, shape, slow, plan_on, least)
-    assert len(least) == 2
+    pieces = len(splines.samples.piece) - 1
+    assert pieces == 2
+    corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
+    mixed, best, left = _with_corners(rounded, shape, slow, plan_on, corners)
+    assert not len(left)
     assert len(calls) == 1
     assert not mixed.laid.fits.any()
     assert best.solution.cycle_time < slow.solution.cycle_time
+
+
+def test_corners_that_need_too_large_a_grid_are_left_and_named():
+    points = np.array([[k, 0.6 * (k % 2)] for k in range(8)] + [[7.0, 20.0], [7.0, 5.0]])
+    rounded, shape = shaped(problems.polyline(points))
+    splines = planned_on(with_spline(rounded, shape))
+    corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
+
+    def never(path):
+        raise AssertionError("nothing is to be planned")
+
+    mixed, best, left = _with_corners(rounded, shape, splines, never, corners)
+    assert list(left) == [0]
+    assert best is splines
+    assert mixed is shape

@@ -16,13 +16,14 @@ from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.spline import DEGREE, span_point
 from planner.geometry.toolpath import Joint
-from planner.methods.geometry import splined_with_stops
+from planner.methods.geometry import given_up, splined_with_stops
 from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program, read_program
+from planner.smoothing import lay, spline_path
 from planner.smoothing.interior import site_distance
 from planner.smoothing.lay import follow
-from planner.smoothing.relax import OVERLAP, _tighten
-from planner.smoothing.spline_path import cusp_joints, cusps, spline_shape, with_spline
+from planner.smoothing.relax import OVERLAP, _tighten, relax
+from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
@@ -224,7 +225,7 @@ def test_a_cusp_is_found_at_the_joint_that_turns_there(before):
     path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     shape = spline_shape(path, MACHINE)
     assert not cusps(shape.laid).any()
-    assert not len(cusp_joints(path, shape))
+    assert not len(lost_joints(path, shape))
     # six control points in one place: the curve stands still on the span between them
     span = len(shape.left) // 2
     control = shape.laid.control.copy()
@@ -232,7 +233,7 @@ def test_a_cusp_is_found_at_the_joint_that_turns_there(before):
     laid = shape.laid._replace(control=control)
     assert cusps(laid).all()
     lost = dataclasses.replace(shape, laid=laid._replace(fits=np.zeros(1, bool)))
-    joints = cusp_joints(path, lost)
+    joints = lost_joints(path, lost)
     place = path.legs.place[joints]
     begin, end = laid.breaks[span], laid.breaks[span + 1]
     near = np.abs(path.legs.place - (begin + end) / 2).min()
@@ -246,10 +247,90 @@ def test_stops_at_cusps_keep_the_splines_around_them(shared_dir):
     toolpath = toolpath_from_program(program, MACHINE, None)
     path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     before = spline_shape(path, MACHINE)
-    assert len(cusp_joints(path, before))
+    assert len(lost_joints(path, before))
     after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
     assert shape.laid.fits.all()
     assert (after.joint == Joint.STOP).sum() > (path.joint == Joint.STOP).sum()
+
+
+def used_of_tubes(shape):
+    """(J,) share of its tube that each site of the first spline uses."""
+    laid, e = shape.laid, np.empty(shape.laid.control.shape[1])
+    sites = laid.span, laid.weights, laid.target, laid.along, laid.slide
+    assert len(laid.fits) == 1
+    return np.array([site_distance(j, laid.control, *sites, e) for j in range(len(laid.span))]) / laid.radius
+
+
+def one_run():
+    """Sixty steps of 0.4 mm, each to the other side by up to 40 degrees."""
+    angle = np.deg2rad(np.random.default_rng(8).uniform(10.0, 40.0, 60)) * np.where(np.arange(60) % 2, 1, -1)
+    points = np.cumsum(0.4 * np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0)
+    toolpath = toolpath_from_program(problems.polyline(points), MACHINE, None)
+    return round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+
+
+@pytest.fixture
+def loose_knots(monkeypatch):
+    """No knots are added, so that first splines use more of the tube than `ROOM`."""
+    monkeypatch.setattr(lay, "_lay", lay._lay.py_func)
+    monkeypatch.setattr(lay, "DENSER_MAX", 0)
+    monkeypatch.setattr(lay, "ROOM", 0.3)
+    monkeypatch.setattr(
+        spline_path, "relax", lambda *given: np.copyto(given[-2], given[17])
+    )  # as if all had certificates
+    return monkeypatch
+
+
+def test_a_first_spline_inside_the_tube_is_one_however_much_room_it_should_have_left(loose_knots):
+    path = one_run()
+    first = used_of_tubes(spline_shape(path, MACHINE))
+    assert lay.ROOM < first.max() < lay.INSIDE
+    loose_knots.setattr(spline_path, "relax", relax)
+    shape = spline_shape(path, MACHINE)
+    assert shape.laid.fits.all()
+    assert (shape.left >= 0.0).all()
+
+
+def test_a_place_outside_of_the_tube_costs_a_full_stop_there_and_nothing_else(loose_knots):
+    path = one_run()
+    first = spline_shape(path, MACHINE)
+    used = used_of_tubes(first)
+    loose_knots.setattr(lay, "INSIDE", np.sort(used)[-2])  # all but the worst site are inside
+    whole = spline_shape(path, MACHINE)
+    assert not whole.laid.fits.any()
+    place = first.laid.place[np.argmax(used)]
+    joints = lost_joints(path, whole)
+    assert len(joints) == 1
+    assert np.abs(path.legs.place[joints] - place).max() < 1.0
+    after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
+    stops = np.flatnonzero((after.joint == Joint.STOP) & (path.joint != Joint.STOP))
+    assert 1 <= len(stops) <= 6
+    corners = shape.runs.joint_last - shape.runs.joint_first + 1
+    assert corners[shape.laid.fits].sum() >= 0.8 * len(path.d)
+    assert given_up(path, after, shape)[0].startswith(
+        f"{len(stops)} full stops where no curve fits inside the tolerance, the first after line {stops[0]}"
+    )
+
+
+def test_a_place_that_never_gets_a_certificate_loses_its_own_corners_only(monkeypatch):
+    path = one_run()
+    place = 0.5 * path.legs.place[-1]
+
+    def no_certificate(*given):
+        relax(*given)
+        span_first, breaks, left, good = given[6], given[7], given[20], given[-2]
+        for q in range(len(good)):
+            own = breaks[span_first[q] + q : span_first[q + 1] + q + 1]
+            if own[0] + 0.1 < place < own[-1] - 0.1:
+                good[q] = False
+                left[span_first[q] + np.searchsorted(own, place) - 1] = -1.0
+
+    monkeypatch.setattr(spline_path, "relax", no_certificate)
+    after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
+    corners = shape.runs.joint_last - shape.runs.joint_first + 1
+    assert corners[~shape.laid.fits].sum() <= 8
+    assert corners[shape.laid.fits].sum() >= 0.75 * len(path.d)
+    assert (after.joint == Joint.STOP).sum() <= 12
 
 
 def test_arcs_become_part_of_the_curve():

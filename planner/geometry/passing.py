@@ -1,0 +1,172 @@
+"""Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
+
+The path is a chain of straight pieces (arcs as chords within `CHORD_SHARE` of the tolerance) between vertices. Wanted is for every
+point n a piece i(n) that never goes back, within the piece's budget, such that every vertex between i(n-1) and i(n) is within
+`MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
+
+    sum of |point - piece|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
+                              +  budget^2 for every point that is faster than its block's feed allows
+
+is found by dynamic programming over the pieces that can be reached from the point before, a window of about two budgets, so that
+time and memory are linear in points and pieces. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
+the vertices last is taken: a motion that stands on a vertex is still at the block before.
+
+A motion that keeps the tolerance has such an assignment. Where nothing can be reached the budgets are widened, up to `WIDEST` times.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import Array, FloatArray
+from planner.geometry.chords import arc_point, arc_sagitta
+from planner.geometry.toolpath import Toolpath
+from planner.kernels import njit
+
+CHORD_SHARE = 1e-3  # sagitta of an arc's chords over its tolerance [-]
+SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry
+SAME_FEED = 1e-6  # [-] a feed above another by less is the same: rounding
+# Vertices may be missed by so many budgets [-]: a vertex passed at 1.01 must not hold up what follows.
+MISSED = 2.0
+FIRST_WIDER, WIDEST = (
+    1.05,
+    100.0,
+)  # budgets are widened by the first of these, then doubled, up to the second [-]
+ENTERED, THROUGH = (
+    1,
+    2,
+)  # bits of a cell: best entered on the chord before its point; best entered when left on the same chord
+
+
+class Chain(NamedTuple):
+    """K straight pieces and the K+1 vertices around them.
+
+    vertex    : (K+1, A) [mm]
+    at_vertex : (K+1,) budget there [mm]
+    budget    : (K,) of each piece, the larger one of its block's two joints [mm]
+    skipped   : (K,) price of leaving a piece without a point [mm2], 0 for the parts of an arc
+    feed      : (K,) programmed [mm/s]
+    segment   : (K,) of the toolpath; first (M+1,) piece of each segment
+    """
+
+    vertex: FloatArray
+    at_vertex: FloatArray
+    budget: FloatArray
+    skipped: FloatArray
+    feed: FloatArray
+    segment: Array
+    first: Array
+
+
+def chain_of(toolpath: Toolpath) -> Chain:
+    """The pieces of a toolpath."""
+    count, _ = arc_sagitta(toolpath, CHORD_SHARE)
+    first = np.concatenate([[0], np.cumsum(count)])
+    segment = np.repeat(np.arange(len(toolpath)), count)
+    vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])
+    part = np.arange(len(segment)) - first[segment]
+    inner = np.flatnonzero(part)
+    at = segment[inner]
+    vertex[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(
+        toolpath, at, toolpath.length[at] * part[inner] / count[at]
+    )
+    budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
+    at_vertex = np.append(budget, toolpath.tolerance[-1])
+    at_vertex[first] = toolpath.tolerance
+    skipped = np.where(count[segment] == 1, budget**2, 0.0)
+    return Chain(vertex, at_vertex, budget, skipped, toolpath.feed[segment], segment, first)
+
+
+def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Array | None:
+    """(T,) segment of the toolpath that each point (T, A) of a motion is at, moving at `feed` (T,) [mm/s]; None where that cannot be
+    told: the motion leaves the path, or does not end where it ends."""
+    chain = chain_of(toolpath)
+    piece, crossed = np.empty(len(point), np.int64), np.empty(len(chain.vertex))
+    point = np.ascontiguousarray(point, dtype=np.float64)
+    if not in_order(*chain[:5], point, feed, piece, crossed):
+        return None
+    return chain.segment[piece]
+
+
+@njit(cache=True, error_model="numpy")
+def _from_chord(begin, end, point):
+    """Squared distance of a point (A,) from a chord, and the share of the chord at its foot."""
+    along, length_sq = 0.0, 0.0
+    for k in range(len(point)):
+        u = end[k] - begin[k]
+        along += (point[k] - begin[k]) * u
+        length_sq += u * u
+    share = min(max(along / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0
+    off_sq = 0.0
+    for k in range(len(point)):
+        off_sq += (point[k] - begin[k] - share * (end[k] - begin[k])) ** 2
+    return (off_sq if off_sq > SAME_PLACE * SAME_PLACE else 0.0), share
+
+
+@njit(cache=True, error_model="numpy")
+def in_order(vertex, at_vertex, budget, skipped, cap, point, feed, piece, crossed):
+    """Match points (n, A) with feeds (n,) with a chain; the first arguments are fields of `Chain`. False where that fails.
+
+    piece   : (n,) written: the piece of each point
+    crossed : (K+1,) written: where each vertex is passed, the point before plus the share of the chord behind it
+    """
+    count, pieces = len(point), len(budget)
+    cost, new = np.empty(pieces), np.empty(pieces)
+    first, begin = np.empty(count, np.int64), np.empty(count, np.int64)
+    cells, used = np.empty(4 * count + 64, np.uint8), 0
+    low, high = 0, 0  # the pieces that the point before can be at
+    for n in range(count):
+        before = point[max(n - 1, 0)]
+        wide = 1.0
+        while True:
+            lowest, highest, cell = pieces, -1, used
+            stay, enter = np.inf, 0.0 if n == 0 else np.inf
+            for i in range(low, pieces):
+                if i > low:
+                    off_sq, _ = _from_chord(before, point[n], vertex[i])
+                    within = off_sq <= (wide * MISSED * at_vertex[i] + SAME_PLACE) ** 2
+                    enter = off_sq + min(stay, enter + skipped[i - 1]) if within else np.inf
+                stay = cost[i] if n > 0 and i <= high else np.inf
+                if i > high and enter == np.inf:
+                    break
+                if cell == len(cells):
+                    more = np.empty(2 * cell, np.uint8)
+                    for k in range(cell):
+                        more[k] = cells[k]
+                    cells = more
+                through = THROUGH if i + 1 < pieces and enter + skipped[i] < stay else 0
+                cells[cell] = through | (ENTERED if enter < np.inf and enter <= stay else 0)
+                cell += 1
+                off_sq, _ = _from_chord(vertex[i], vertex[i + 1], point[n])
+                new[i] = np.inf
+                if off_sq <= (wide * budget[i] + SAME_PLACE) ** 2:
+                    new[i] = min(stay, enter) + off_sq
+                    if feed[n] > cap[i] * (1.0 + SAME_FEED):
+                        new[i] += budget[i] * budget[i]
+                if new[i] < np.inf:
+                    lowest, highest = min(lowest, i), i
+            if highest >= 0:
+                break
+            wide = 2.0 * wide if wide > 1.0 else FIRST_WIDER
+            if wide > WIDEST:
+                return False
+        first[n], begin[n], used = low, used, cell
+        low, high = lowest, highest
+        cost, new = new, cost
+    if high != pieces - 1:
+        return False
+    i = high
+    crossed[0], crossed[pieces] = 0.0, count - 1.0
+    for n in range(count - 1, -1, -1):
+        piece[n] = i
+        bit = ENTERED
+        while i > first[n] and cells[begin[n] + i - first[n]] & bit:
+            _, share = _from_chord(point[max(n - 1, 0)], point[n], vertex[i])
+            crossed[i] = max(n - 1, 0) + share * min(n, 1)
+            i -= 1
+            bit = THROUGH
+    for i in range(pieces):
+        crossed[i + 1] = max(crossed[i + 1], crossed[i])
+    return True

@@ -1,0 +1,86 @@
+"""Plans that may be faster than the time-optimal motion on splines and Bezier corners, and how to tell cheaply that they are not.
+
+A smooth path is not always the fastest: where every corner is sharp and the legs are short, stopping at each takes no tolerance and no
+grid; other corner shapes use the tolerance otherwise; and a verdict that fails at a long interpolation period may be another's pass.
+
+stop         its time is known before it is planned, as the sum of closed forms over the blocks
+corner shape its time without jerk limits on a coarse grid is less than what it takes (methods/geometry.py); where that leaves a chance,
+             its time with jerk limits on a coarse grid is more, by less than `CHANCE` says
+kinematic    runs, with less freedom, on the corners of its own shape: a chance like theirs
+
+Beyond `RIVAL_POINTS` grid points only stopping is looked at.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+from planner.corners.smooth import SmoothPath, round_corners
+from planner.methods.geometry import corner_bounds
+from planner.methods.job import Job
+from planner.methods.kinematic import KinematicMethod
+from planner.methods.on_path import corner_shape
+from planner.methods.plan import Plan
+from planner.methods.reshape import OnPath
+from planner.methods.stop import StopMethod
+
+RIVAL_POINTS = 20_000
+SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
+# On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes
+# on random jobs of benchmarks/never_slower.py): one that takes more than `CHANCE` times the best there is not the fastest [-].
+COARSER, CHANCE = 25.0, 1.03
+FASTER = 1e-6  # less is the same time [-]
+
+
+def fastest(
+    plan: Plan,
+    job: Job,
+    on_corner: Callable[[str], Plan],
+    on_path: Callable[[SmoothPath, float], OnPath],
+) -> Plan:
+    """The plan, or a rival that passes its verdict in less time, or while the plan does not; its sentence says which.
+
+    on_corner : plans the job on a corner shape, by its name
+    on_path   : solves the feedrate problem on a path, on a grid of so many times the usual resolution
+    """
+    best = plan
+    if job.stop_time < _time(best):
+        best = _better(best, StopMethod().plan_job(job), "full stops at all blocks take less time")
+    if plan.grid_points <= RIVAL_POINTS:
+        for name in _chances(best, job, on_path):
+            best = _better(best, on_corner(name), f"{name} corners take less time")
+            if name == "kinematic":
+                best = _better(best, KinematicMethod().plan_job(job), "method kinematic takes less time")
+    if best is plan:
+        return plan
+    return dataclasses.replace(best, method=plan.method, corner=plan.corner, timings=job.stages.timings)
+
+
+def _chances(best: Plan, job: Job, on_path: Callable[[SmoothPath, float], OnPath]) -> Iterator[str]:
+    """Corner shapes that may be faster than the plan."""
+    dwell = float(job.toolpath.dwell.sum())
+    for name in SHAPES:
+        with job.stage("geometry"):
+            shape = corner_shape(name, job.machine, job.toolpath)
+            path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
+        with job.stage("solve"):
+            bounds = corner_bounds(path, job.machine)
+        if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= _time(best):
+            continue
+        coarse = on_path(path, COARSER).solution
+        if coarse.solved and coarse.cycle_time + dwell < CHANCE * _time(best):
+            yield name
+
+
+def _time(plan: Plan) -> float:
+    """Cycle time [s], inf unless the verdict is passed."""
+    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
+        return float("inf")
+    return plan.trajectory.cycle_time
+
+
+def _better(best: Plan, rival: Plan, why: str) -> Plan:
+    if _time(rival) < (1.0 - FASTER) * _time(best):
+        return dataclasses.replace(rival, sentence=f"{why} than splines; {rival.sentence}")
+    return best

@@ -70,14 +70,15 @@ class Job:
         of `seen` of their lengths [-]."""
         machine, toolpath = self.real
         assert machine.fir is not None
-        lengths = tuple(
-            seen * np.sqrt(share) * T for T in machine.fir.time_constants
-        )  # T^2 over tolerance stays
+        by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
+        lag = machine.fir.phase_lag_max
+        filters = {
+            "time_constants": tuple(by * T for T in machine.fir.time_constants),
+            "phase_lag_max": None if lag is None else by * lag,
+        }
         return dataclasses.replace(
             self,
-            machine=machine.model_copy(
-                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
-            ),
+            machine=machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)}),
             toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
             judged=(machine, toolpath),
             noted=[],

@@ -176,7 +176,7 @@ class _Starts:
         yield from list(self.made)
         while self._methods:
             own_clock = dataclasses.replace(self._job, stages=Stages(), noted=[])
-            plan = self._methods.pop(0).plan_within_periods(own_clock)
+            plan = self._methods.pop(0).plan_best(own_clock)
             if plan.trajectory is None:
                 self.failed.append(plan)
                 continue

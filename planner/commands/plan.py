@@ -48,7 +48,8 @@ def plan(
     rounds: Annotated[
         int | None,
         typer.Option(
-            min=0, help="of reshaping splines for optimal [default: as many as the size of the job lets pay]"
+            min=0,
+            help="of reshaping splines for optimal and toppra [default: as many as the size of the job lets pay]",
         ),
     ] = None,
     tolerance: ToleranceOption = None,

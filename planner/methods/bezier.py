@@ -53,6 +53,10 @@ class BezierMethod(Method):
 
     ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return self.allocate
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):

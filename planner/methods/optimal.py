@@ -99,7 +99,7 @@ class OptimalMethod(Method):
                 with job.stage("report"):
                     by_site = _site_prices(best)
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
-        return plan_of_solution(job, best, motion, made, method="optimal", corner=corner, prices=prices)
+        return plan_of_solution(job, best, made, method="optimal", corner=corner, prices=prices)
 
     def _again(self, job: Job) -> Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]:
         """The motion of another problem on the same grid, None if there is none."""

@@ -24,7 +24,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.errors import InputError
 from planner.report.optimum import optimum_summary
-from planner.report.planned import LeftOut, planned_program
+from planner.report.planned import LeftOut, planned_notes, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
@@ -174,11 +174,12 @@ def versions() -> dict[str, str]:
 
 
 def _planned(plan: Plan, directory: Path) -> tuple[bytes | None, list[str]]:
-    """The re-timed program, or None and a note that says why there is none."""
+    """The re-timed program, or None, and notes on it."""
     if _is_source(plan, directory / PLANNED):
         return None, [f"{PLANNED} is the program that was planned, and stays as it is"]
     try:
-        return planned_program(plan), []
+        text = planned_program(plan)
+        return text, planned_notes(plan, text)
     except LeftOut as why:
         return None, [f"{PLANNED} is left out: {why}"]
 

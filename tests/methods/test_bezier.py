@@ -122,6 +122,20 @@ def test_other_weights_are_faster_by_the_root_of_sigma2():
     assert better.trajectory.cycle_time < printed.trajectory.cycle_time
 
 
+@given(seed=st.integers(0, 10**6), dims=st.integers(2, 3))
+@settings(max_examples=10)
+def test_cutting_straight_lines_changes_nothing(seed, dims):
+    """Where a CAM system cuts a line into blocks is no place of the motion: the look-ahead must not see it."""
+    rng = np.random.default_rng(seed)
+    program = problems.random_polyline(rng, blocks=int(rng.integers(2, 8)), dimensions=dims, shortest=0.3)
+    points = np.vstack([program.start, program.end])
+    cuts = [np.append(np.sort(rng.uniform(0.05, 0.95, rng.integers(0, 5))), 1.0) for _ in program.end]
+    pieces = [a + q[:, None] * (b - a) for a, b, q in zip(points[:-1], points[1:], cuts, strict=True)]
+    machine = problems.machine(tolerance=10 ** rng.uniform(-2, -0.7), jerk=10 ** rng.uniform(4, 5.5))
+    whole, cut = (bezier(problems.polyline(p), machine) for p in (points, np.vstack([points[:1], *pieces])))
+    assert cut.trajectory.cycle_time == pytest.approx(whole.trajectory.cycle_time, rel=2e-6)
+
+
 # --- motions ------------------------------------------------------------------------------------------------------------------
 
 

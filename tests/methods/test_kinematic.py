@@ -301,12 +301,12 @@ def test_the_closed_form_is_that_of_the_motion_s_own_curvature(normal, dt):
 
 
 def test_samples_on_both_sides_of_a_stop_do_not_cut_its_vertex():
-    """With a dt^2/8 = 8 um and a tolerance of 1 um accelerations are lowered, or it would depend on where the samples fall."""
+    """With a dt^2/8 = 8 um and a tolerance of 1 um it waits for a sample at its stops, or it would depend on where they fall."""
     machine = problems.machine(dt=0.004, acceleration=4000.0, tolerance=1e-3)
     rng = np.random.default_rng(0)
     made = kinematic(problems.random_polyline(rng, blocks=60, shortest=0.5, longest=5.0), machine)
     assert made.verdict.vertex_error_mm <= 1e-3
-    assert made.verdict.limits["acceleration.x"].ratio <= 8 * 1e-3 / 0.004**2 / 4000.0 * 1.01
+    assert made.trajectory.cycle_time < made.stop_time + 59 * machine.dt
 
 
 def test_no_tolerance_for_blending_means_the_plan_of_stop():

@@ -35,9 +35,7 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     added = (path.joint == Joint.STOP) & (toolpath.joint[at] != Joint.STOP)
     if added.any():
         notes.append(
-            _at(
-                toolpath, at[added], "full stop", "where the smooth path would turn back within the tolerance"
-            )
+            _at(toolpath, at[added], "full stop", "where no smooth curve was found inside the tolerance")
         )
     on_spline = np.zeros(len(path.joint), bool)
     for first, last in zip(path.spline.joint_first, path.spline.joint_last, strict=True):

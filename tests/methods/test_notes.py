@@ -68,7 +68,7 @@ def test_what_a_path_gives_up_is_noted() -> None:
     whole = solved([])
     assert path_notes(toolpath, whole) == []
     assert path_notes(toolpath, solved([2])) == [
-        "line 3: a full stop where the smooth path would turn back within the tolerance"
+        "line 3: a full stop where no smooth curve was found inside the tolerance"
     ]
     assert path_notes(toolpath, solved([2, 4]))[0].startswith("line 3: the first of 2 full stops")
 

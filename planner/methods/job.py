@@ -80,6 +80,10 @@ class Job:
         """Add to the notes of the plan: what was given up, with its first line and how often."""
         self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
 
+    def afresh(self) -> Job:
+        """The job for another plan of it, with notes of its own."""
+        return replace(self, noted=[])
+
     @cached_property
     def stop_time(self) -> float:
         """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""
@@ -116,13 +120,14 @@ class Job:
     def _named(self, trajectory: Trajectory) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
         method's own blocks and a note."""
-        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
+        _, toolpath = self.real
+        segment = segments_at(toolpath, trajectory.position, trajectory.feed)
         if segment is None:
             self.note(
                 "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
             )
             return trajectory
-        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
+        return replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
 
     def plan(
         self,

@@ -86,7 +86,7 @@ def plan_of_solution(
         corner=corner if isinstance(corner, str) else corner.name,
         solver=best.solution.solver,
         status=best.solution.status,
-        sentence="; ".join((best.solution.sentence, *best.notes)),
+        sentence=best.solution.sentence,
         grid_points=len(best.samples),
         corners=corners,
         grid=grid,

@@ -46,12 +46,14 @@ def fastest(
     """
     best = plan
     if job.stop_time < _time(best):
-        best = _better(best, StopMethod().plan_job(job), "full stops at all blocks take less time")
+        best = _better(best, StopMethod().plan_job(job.afresh()), "full stops at all blocks take less time")
     if plan.grid_points <= RIVAL_POINTS:
         for name in _chances(best, job, on_path):
             best = _better(best, on_corner(name), f"{name} corners take less time")
             if name == "kinematic":
-                best = _better(best, KinematicMethod().plan_job(job), "method kinematic takes less time")
+                best = _better(
+                    best, KinematicMethod().plan_job(job.afresh()), "method kinematic takes less time"
+                )
     if best is plan:
         return plan
     return dataclasses.replace(best, method=plan.method, corner=plan.corner, timings=job.stages.timings)

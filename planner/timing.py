@@ -11,18 +11,19 @@ Samples lie at k dt and, last, at the end of the program, so the last period is 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
 from planner.errors import InputError
+from planner.kernels import njit
 from planner.path import PathSamples
-from planner.search import last_not_after
+from planner.search import last_not_after, nearest
 from planner.time_law import TimeLaw
 from planner.trajectory import Trajectory
 
@@ -61,6 +62,10 @@ class MotionInTime(Protocol):
         """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
         ...
 
+    def waiting(self, at: FloatArray, by: FloatArray) -> MotionInTime:
+        """The motion standing longer by `by` (n,) [s] where it comes to rest, at the ends `at` (n,) of pieces [s]."""
+        ...
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
@@ -82,6 +87,18 @@ class Motion:
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) [s]."""
         return _trajectory(self, times, dt)
+
+    def waiting(self, at: FloatArray, by: FloatArray) -> Motion:
+        """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to the times `at` (n,) [s]."""
+        law = self.law
+        still = np.flatnonzero(
+            np.append(law.run[1:] != law.run[:-1], True)
+        )  # a run's last piece is its standstill
+        more = np.zeros(len(law.t))
+        np.add.at(more, still[nearest(law.t[still], at)], by)
+        later = np.cumsum(more)
+        new = dataclasses.replace(law, t=law.t + (later - more), end=float(law.end + later[-1]))
+        return dataclasses.replace(self, law=new)
 
 
 def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
@@ -112,13 +129,18 @@ def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Tr
         yield motion.at(times[first : first + CHUNK + 1], dt)
 
 
-def _sample_times(end: float, dt: float) -> FloatArray:
-    """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
+def require_samples(end: float, dt: float) -> None:
+    """Raise InputError if a motion of `end` seconds has more samples than are made."""
     if not end / dt <= SAMPLES_MAX:
         raise InputError(
             f"the motion takes {end:.6g} s, {end / dt:.3g} periods of {dt:g} s; at most {SAMPLES_MAX:.0e} samples are made: "
-            "raise the machine's dt or split the program"
+            "raise the feed or the machine's dt, or split the program"
         )
+
+
+def _sample_times(end: float, dt: float) -> FloatArray:
+    """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
+    require_samples(end, dt)
     count = int(np.floor(end / dt * (1 + 1e-12)))
     times: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
     if count and end - times[-1] <= 1e-6 * dt:

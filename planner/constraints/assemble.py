@@ -8,6 +8,7 @@ from planner.arrays import Array, FloatArray
 from planner.constraints import bounds
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.allocation import error_rate
+from planner.errors import NotSolvedError
 from planner.machine import Machine
 from planner.path import PathSamples
 from planner.units import RAD_PER_DEG
@@ -24,9 +25,16 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
 
     measured : the error of the machine's filters is measured afterwards (methods/creeping.py), and bounded here on programmed arcs only
 
-    Raises InputError if the machine lacks an axis of the path.
+    Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for the path.
     """
     axes = samples.path.toolpath.axes
+    if samples.margin.max(initial=0.0) >= 1.0:
+        worst = int(samples.margin.argmax())
+        line = int(samples.path.toolpath.line[samples.segment[worst]])
+        raise NotSolvedError(
+            f"the path turns faster at line {line} than a grid of the finest step follows: moves there are too short for "
+            "this smoothing; leave them out, or use --corner bezier or --method stop"
+        )
     collected = _Collector(len(samples))
     left, right = interval_sides(samples)
     feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])

@@ -27,7 +27,7 @@ from planner.methods.geometry import AUTO
 from planner.methods.job import Job, Method
 from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
-from planner.methods.prices import price_list
+from planner.methods.prices import MORE_TOLERANCE, SitePrices, price_list
 from planner.methods.reshape import OnPath, tube_prices
 from planner.methods.rivals import fastest
 from planner.methods.slowing import within_limits, without_seen_excess
@@ -97,13 +97,9 @@ class OptimalMethod(Method):
             # behind filters what a limit costs is not the problem's to say
             if best.solution.multipliers and machine.fir is None:
                 with job.stage("report"):
-                    by_site = (
-                        (best.shape.laid.place, tube_prices(best, best.shape))
-                        if best.shape and len(best.path.spline)
-                        else None
-                    )
+                    by_site = _site_prices(best)
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
-        return plan_of_solution(job, best, motion, made, method="optimal", corner=corner, prices=prices)
+        return plan_of_solution(job, best, made, method="optimal", corner=corner, prices=prices)
 
     def _again(self, job: Job) -> Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]:
         """The motion of another problem on the same grid, None if there is none."""
@@ -128,3 +124,12 @@ class OptimalMethod(Method):
             return OnPath(
                 path=path, samples=samples, problem=problem, solution=self.solver.solve(problem, report)
             )
+
+
+def _site_prices(planned: OnPath) -> SitePrices | None:
+    """What the tube of a path's splines costs; None where it has none."""
+    shape = planned.shape
+    if shape is None or not len(planned.path.spline):
+        return None
+    now, wider = (tube_prices(planned, shape, more) for more in (0.0, MORE_TOLERANCE))
+    return SitePrices(place=shape.laid.place, now=now, wider=wider)

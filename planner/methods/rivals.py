@@ -76,10 +76,12 @@ def _chances(best: Plan, job: Job, on_path: Callable[[SmoothPath, float], OnPath
 
 
 def _time(plan: Plan) -> float:
-    """Cycle time [s], inf unless the verdict is passed."""
-    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
+    """Cycle time [s], inf unless the verdict is passed, or nothing but chords between samples stands against it: then the job is
+    planned again with less tolerance (methods/periods.py)."""
+    if plan.trajectory is None or plan.verdict is None:
         return float("inf")
-    return plan.trajectory.cycle_time
+    chords = all(fault.startswith(("vertex", "contour")) for fault in plan.verdict.faults)
+    return plan.trajectory.cycle_time if chords else float("inf")
 
 
 def _better(best: Plan, rival: Plan, why: str) -> Plan:

@@ -92,6 +92,10 @@ class Job:
         """Add to the notes of the plan: what was given up, with its first line and how often."""
         self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
 
+    def afresh(self) -> Job:
+        """The job for another plan of it, with notes of its own."""
+        return dataclasses.replace(self, noted=[])
+
     @cached_property
     def stop_time(self) -> float:
         """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""

@@ -6,6 +6,7 @@
     Program, read_program
     Toolpath, Trajectory, Verdict
     InputError, NotSolvedError
+    __version__
 
 Names and units: `planner.units`. Everything is imported on first use, so that `import planner` costs nothing.
 """
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from planner.nc.reader import read_program
     from planner.trajectory import Trajectory
     from planner.verify import Verdict
+
+    __version__: str
 
 _HOME = {
     "plan": "planner.methods.names",
@@ -54,6 +57,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("importlib.metadata").version("feedrate-planner")
     if name not in _HOME:
         raise AttributeError(f"module 'planner' has no attribute '{name}'")
     return getattr(import_module(_HOME[name]), name)

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
+from planner.kernels import njit
 from planner.search import last_not_after, nearest
 from planner.trajectory import Trajectory
 

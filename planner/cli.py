@@ -1,36 +1,36 @@
-"""The command line: every command of `planner.commands` under its name.
+"""The entry point of the command `planner`; the commands themselves are in `planner.commands.app`.
 
 Exit codes: 0 done and verified; 1 the verdict failed; 2 bad input; 3 not solved; 70 a bug of ours; 130
-interrupted.
+interrupted; 141 nobody reads the output any more.
+
+Nothing is imported before Ctrl-C has its handler, so that an interrupt during the imports ends like any other.
 """
 
 from __future__ import annotations
 
-import typer
+from typing import TYPE_CHECKING, Any
 
-from planner.commands.compare import compare
-from planner.commands.info import info
-from planner.commands.machine import init_file, list_machines, show_machine
-from planner.commands.plan import plan
-from planner.commands.pulses import pulses
-from planner.commands.verify import verify
+if TYPE_CHECKING:
+    from planner.commands.app import app
 
-app = typer.Typer(
-    help="The fastest motion of an NC program within the limits of a machine, planned and verified.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-for command in (plan, compare, verify, info, pulses):
-    app.command()(command)
-
-machine_app = typer.Typer(help="Machine files.", no_args_is_help=True)
-machine_app.command("list")(list_machines)
-machine_app.command("show")(show_machine)
-machine_app.command("init")(init_file)
-app.add_typer(machine_app, name="machine")
+__all__ = ["app", "main"]
 
 
 def main() -> None:
     """Entry point of the command `planner`."""
+    from planner.commands.interrupt import end_at_interrupts
+
+    end_at_interrupts()
+    from planner.commands.app import app
+    from planner.commands.terminal import prepare_streams
+
+    prepare_streams()
     app(prog_name="planner")
+
+
+def __getattr__(name: str) -> Any:
+    if name != "app":
+        raise AttributeError(f"module 'planner.cli' has no attribute '{name}'")
+    from planner.commands.app import app
+
+    return app

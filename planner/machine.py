@@ -16,10 +16,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from planner.arrays import FloatArray
 from planner.errors import InputError
+from planner.files import require_ending
 from planner.units import RAD_PER_DEG
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
+TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -39,7 +41,15 @@ class Axis(_Record):
 
 
 class Fir(_Record):
-    """FIR filters behind the interpolator (papers 000, 001): time constants [s], largest phase lag [deg]."""
+    """Moving averages in series in the drive or the control, behind the delivered setpoints.
+
+    The same for every method: the motion behind them stays within the tolerance. Filters that a method makes its setpoints with are
+    settings of that method.
+
+    time_constants : their lengths [s], any number, in any order
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; methods `optimal` and `toppra`,
+                     and `bezier` at its corners, keep it, the others do not use it
+    """
 
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
     phase_lag_max: Positive | None = None
@@ -109,8 +119,8 @@ class Machine(_Record):
                     if letter not in LINEAR_AXES:
                         raise ValueError(f"{table}.{key}: axis '{letter}' is not known; allowed are x, y, z")
         for tool in self.tools:
-            if not tool.isdecimal():
-                raise ValueError(f"tools: '{tool}' is not a tool number; write e.g. 1 = 25.0")
+            if not tool.isdecimal() or len(tool) > TOOL_DIGITS:
+                raise ValueError(f"tools: '{tool[:TOOL_DIGITS]}' is not a tool number; write e.g. 1 = 25.0")
         return self
 
     def limits(
@@ -144,7 +154,9 @@ def load_machine(path: str | Path) -> Machine:
         text, source = _read(Path(path)), str(path)
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as fault:
+    except RecursionError:
+        raise InputError("not a machine file: its values are nested too deep", source=source) from None
+    except ValueError as fault:  # a TOMLDecodeError, or a number of more digits than Python reads
         raise InputError(f"not valid TOML: {fault}", source=source) from fault
     return machine_from_dict(data, source=source)
 
@@ -172,6 +184,7 @@ def builtin_text(name: str) -> str:
 
 def _read(path: Path) -> str:
     try:
+        require_ending(path)
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())

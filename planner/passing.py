@@ -10,10 +10,10 @@ apart.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.kernels import njit
 from planner.search import nearest
 from planner.trajectory import Trajectory
 

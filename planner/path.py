@@ -45,6 +45,8 @@ MANY_CORNERS, COARSE_RESOLUTION = 50_000, 1e-2
 ARC_PERIOD = 0.5
 # ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
 REST_PERIOD = 0.25
+# A spline passes a change of the feed within so many tolerances of where the program has it [-].
+NEAR = 2.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -18,12 +18,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.elements import ElementTable, element_point, to_arc_length
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
+from planner.kernels import njit
 
 SWITCHING_WAY = 0.03  # h above [v/a]
 FREE_SHARE = 0.5  # of accelerations and jerks, on calm curves [-]

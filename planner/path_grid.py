@@ -8,9 +8,9 @@ number of points.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
+from planner.kernels import njit
 from planner.path_rows import grown, set_row
 
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].

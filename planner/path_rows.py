@@ -8,9 +8,9 @@ closing row.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.corners.blend import shape_at
+from planner.kernels import njit
 from planner.path_calm import SWITCHING_WAY, interval_ends
 from planner.search import last_not_after
 

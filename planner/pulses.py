@@ -19,10 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.errors import InputError
+from planner.kernels import njit
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.trajectory import Trajectory
 from planner.units import RAD_PER_DEG

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
+from planner.kernels import njit
 
 
 def nearest(values: FloatArray, wanted: FloatArray) -> Array:

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
 from planner.errors import InputError
+from planner.kernels import njit
 from planner.path import PathSamples
 from planner.search import last_not_after, nearest
 from planner.time_law import TimeLaw
@@ -129,13 +129,18 @@ def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Tr
         yield motion.at(times[first : first + CHUNK + 1], dt)
 
 
-def _sample_times(end: float, dt: float) -> FloatArray:
-    """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
+def require_samples(end: float, dt: float) -> None:
+    """Raise InputError if a motion of `end` seconds has more samples than are made."""
     if not end / dt <= SAMPLES_MAX:
         raise InputError(
             f"the motion takes {end:.6g} s, {end / dt:.3g} periods of {dt:g} s; at most {SAMPLES_MAX:.0e} samples are made: "
-            "raise the machine's dt or split the program"
+            "raise the feed or the machine's dt, or split the program"
         )
+
+
+def _sample_times(end: float, dt: float) -> FloatArray:
+    """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
+    require_samples(end, dt)
     count = int(np.floor(end / dt * (1 + 1e-12)))
     times: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
     if count and end - times[-1] <= 1e-6 * dt:

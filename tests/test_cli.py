@@ -5,20 +5,19 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hand_made import SQUARE, make_plan, trajectory_along
+from rich.text import Text
 from typer.testing import CliRunner, Result
 
 import planner
 from planner.cli import app
+from planner.commands.terminal import show
 from planner.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.machine import builtin_machines, load_machine
@@ -26,7 +25,6 @@ from planner.nc.reader import parse_program
 from planner.report.trajectory_file import write_trajectory
 
 TEMPLATE = Path(planner.__file__).parent / "templates" / "machine.toml"
-COMMAND = [sys.executable, "-c", "from planner.cli import main; main()"]
 
 
 def run(*arguments: object) -> Result:
@@ -135,7 +133,7 @@ def test_unwritable_output(planned: Callable[..., None], job: Path) -> None:
     planned()
     result = run("plan", job, "-o", job)
     assert result.exit_code == 2
-    assert result.stderr == f"{job}: cannot be written: is a file, not a directory; what was there stays\n"
+    assert result.stderr == f"{job}: cannot be written: is a file, not a directory\n"
 
 
 @pytest.mark.parametrize(
@@ -298,38 +296,148 @@ def test_every_key_of_the_template_is_valid_and_every_key_is_in_it(tmp_path: Pat
     assert machine.work_offsets["g55"]["x"] == 120.0
 
 
-# ------------------------------------------------------------------------------------------ as a process
+# ------------------------------------------------------------------------------------------ all commands
 
 
-def test_broken_pipe_is_quiet(job: Path) -> None:
-    read_end, write_end = os.pipe()
-    os.close(read_end)
-    done = subprocess.run(
-        [*COMMAND, "info", str(job)], stdout=write_end, stderr=subprocess.PIPE, text=True, check=False
-    )
-    os.close(write_end)
-    assert done.stderr == ""
-    assert done.returncode == 141
+def test_version_and_short_help() -> None:
+    assert run("--version").stdout == f"planner {planner.__version__}\n"
+    for words in ([], ["plan"], ["machine"], ["machine", "init"]):
+        assert run(*words, "-h").stdout == run(*words, "--help").stdout != ""
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to send")
-def test_ctrl_c(tmp_path: Path) -> None:
-    pipe = tmp_path / "job.ngc"
-    os.mkfifo(pipe)  # the reader waits for a writer, so that the interrupt surely meets it at work
-    with (
-        subprocess.Popen(
-            [*COMMAND, "info", str(pipe)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            # a shell's background jobs, these tests perhaps among them, are born with interrupts ignored
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        ) as process,
-        pipe.open("w"),
+def test_memory_used_up_exits_3(planned: Callable[..., None], job: Path) -> None:
+    planned(raises=MemoryError("Unable to allocate 428. MiB"))
+    result = run("plan", job)
+    assert result.exit_code == 3
+    assert result.stderr.startswith("not solved: the memory is used up (Unable to allocate 428. MiB); split")
+
+
+def test_control_characters_are_not_sent_to_the_terminal(
+    planned: Callable[..., None], tmp_path: Path
+) -> None:
+    evil = tmp_path / "a\x1b[31m\x9b.ngc"
+    evil.write_text(SQUARE)
+    machine = tmp_path / "m.toml"
+    machine.write_text(with_line('name = "my-machine"', 'name = "m\\u001b[31m"'))
+    planned()
+    for result in (
+        run("info", evil, "-m", machine),
+        run("info", tmp_path / "no\x1b.ngc"),
+        run("info", tmp_path / "a\x1b[31m\x9b.ngc", "-m", tmp_path / "no\x1b.toml"),
+        run("plan", evil, "-o", tmp_path / "out\x1b"),
     ):
-        time.sleep(0.2)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert out == ""
-    assert err == "interrupted\n"
+        assert "\x1b" not in result.output + result.stderr
+        assert "\x9b" not in result.output + result.stderr
+        assert "\\x1b" in result.output + result.stderr
+
+
+def test_rows_are_not_cut_in_pipes(job: Path, tmp_path: Path) -> None:
+    show(Text("wide " * 100 + "end"))
+    name = "long-" * 30 + ".ngc"
+    (tmp_path / name).write_text(SQUARE)
+    assert run("info", tmp_path / name).stdout.splitlines()[0].startswith(str(tmp_path / name))
+
+
+# ------------------------------------------------------------------------------------------ outputs
+
+
+def test_outputs_do_not_replace_what_is_not_ours(
+    planned: Callable[..., None], job: Path, tmp_path: Path
+) -> None:
+    planned()
+    (tmp_path / "summary.json").write_text("mine")
+    refused = run("plan", job, "-o", tmp_path)
+    assert refused.exit_code == 2
+    assert "summary.json: was not written by planner" in refused.stderr
+    assert (tmp_path / "summary.json").read_text() == "mine"
+    assert run("plan", job, "-o", tmp_path, "--force").exit_code == 0
+    assert run("plan", job, "-o", tmp_path).exit_code == 0
+
+
+def test_a_job_is_not_overwritten(planned: Callable[..., None], tmp_path: Path) -> None:
+    planned()
+    job = tmp_path / "trajectory.parquet"
+    job.write_text(SQUARE)
+    result = run("plan", job, "-o", tmp_path, "--force")
+    assert result.exit_code == 2
+    assert "read as input" in result.stderr
+    assert job.read_text() == SQUARE
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "n" * 300 + "/out"])
+def test_names_that_are_too_long(planned: Callable[..., None], job: Path, tmp_path: Path, name: str) -> None:
+    planned()
+    for arguments in (
+        ["plan", job, "-o", tmp_path / name],
+        ["compare", job, "--method", "stop", "-o", tmp_path / f"{name}.json"],
+        ["machine", "init", tmp_path / name],
+        ["info", tmp_path / name],
+        ["info", job, "-m", tmp_path / name],
+        ["verify", tmp_path / f"{name}.csv", job],
+        ["pulses", tmp_path / f"{name}.csv", "--steps", "x=1"],
+    ):
+        result = run(*arguments)
+        assert result.exit_code == 2, arguments
+        assert "File name too long" in result.stderr
+        assert "Traceback" not in result.stderr
+
+
+# ------------------------------------------------------------------------------------------ inputs
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices")
+def test_files_that_do_not_end(job: Path, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    for file, said in ((pipe, "this is a named pipe"), (tmp_path / "zero.csv", "this is a device")):
+        for arguments in (["info", file], ["info", job, "-m", file], ["verify", file, job]):
+            result = run(*arguments)
+            assert result.exit_code == 2
+            assert said in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = " + "[" * 100_000, "nested too deep"),
+        ("dt = " + "1" * 5000, "not valid TOML"),
+        (TEMPLATE.read_text() + "[tools]\n" + "1" * 5000 + " = 1\n", "not a tool number"),
+    ],
+)
+def test_machine_files_beyond_reason(job: Path, tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "machine.toml").write_text(text)
+    result = run("info", job, "-m", tmp_path / "machine.toml")
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert len(result.stderr) < 1000
+
+
+@pytest.mark.parametrize(
+    "about", ['{"not_limited": null}', '{"not_limited": 3}', "[" * 100_000, '{"a": ' + "1" * 5000 + "}"]
+)
+def test_metadata_beyond_reason(job: Path, tmp_path: Path, about: str) -> None:
+    (tmp_path / "t.csv").write_text("t,x,y,z\n" + "".join(f"{k},{k},0,0\n" for k in range(9)))
+    (tmp_path / "t.meta.json").write_text(about)
+    result = run("verify", tmp_path / "t.csv", job)
+    assert result.exit_code == (1 if "null" in about or "3}" in about else 2), result.output
+    assert "Traceback" not in result.stderr
+
+
+def test_an_array_named_npz(job: Path, tmp_path: Path) -> None:
+    with (tmp_path / "t.npz").open("wb") as file:
+        np.save(file, np.zeros(3))
+    result = run("verify", tmp_path / "t.npz", job)
+    assert result.exit_code == 2
+    assert "a single array" in result.stderr
+
+
+@pytest.mark.parametrize("method", ["optimal", "stop", "fir"])
+@pytest.mark.parametrize(
+    "move", ["F0.0001\nG1 X10", "F3000\nG2 X10 Y0 R900000000", "F3000\nG1 X10\nG4 P1000000"]
+)
+def test_motions_that_take_for_ever_are_refused_at_once(tmp_path: Path, method: str, move: str) -> None:
+    (tmp_path / "job.ngc").write_text(f"G21 G90 G17\n{move}\nM2\n")
+    result = run("plan", tmp_path / "job.ngc", "--method", method)
+    assert result.exit_code == 2
+    assert "samples are made: raise the feed" in result.stderr

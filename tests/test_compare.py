@@ -251,6 +251,30 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_work(
     assert asked == []
 
 
+@pytest.mark.parametrize("name", ["c.json", "c.csv"])
+def test_only_comparisons_are_overwritten(
+    answers: Callable[..., list[str]], job: Path, tmp_path: Path, name: str
+) -> None:
+    asked = answers()
+    out = tmp_path / name
+    for content in ("mine", "[1]", '{"best": 1}'):
+        out.write_text(content)
+        result = run(job, "--method", "stop", "-o", out)
+        assert result.exit_code == 2
+        assert "was not written by planner" in result.stderr
+        assert out.read_text() == content
+    assert asked == []
+    assert run(job, "--method", "stop", "-o", out, "--force").exit_code == 0
+    assert run(job, "--method", "toppra", "-o", out).exit_code == 0
+    assert "toppra" in out.read_text()
+    program = tmp_path / ("job" + out.suffix)
+    program.write_text(SQUARE)
+    refused = run(program, "--method", "stop", "-o", program, "--force")
+    assert refused.exit_code == 2
+    assert "read as input" in refused.stderr
+    assert program.read_text() == SQUARE
+
+
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -283,3 +283,23 @@ def test_unknown_formats_exit_2(file, tmp_path):
     result = run(file, "--steps", "x=400,y=400", "-o", tmp_path / "p.xlsx")
     assert result.exit_code == 2
     assert ".parquet, .csv" in result.stderr
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_the_command_overwrites_pulses_only(file, tmp_path, suffix):
+    out = tmp_path / ("p" + suffix)
+    out.write_text("mine")
+    refused = run(file, "--steps", "x=400,y=400", "-o", out)
+    assert refused.exit_code == 2
+    assert "was not written by planner" in refused.stderr
+    assert out.read_text() == "mine"
+    assert run(file, "--steps", "x=400,y=400", "-o", out, "--force").exit_code == 0
+    assert run(file, "--steps", "x=200,y=200", "-o", out).exit_code == 0
+
+
+def test_the_command_does_not_overwrite_its_input(file, tmp_path):
+    before = file.read_bytes()
+    result = run(file, "--steps", "x=400,y=400", "-o", file, "--force")
+    assert result.exit_code == 2
+    assert "read as input" in result.stderr
+    assert file.read_bytes() == before

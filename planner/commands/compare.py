@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption, Method, ToleranceOption
-from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, ProgressBar, guarded, show
+from planner.commands.options import (
+    DEFAULT_MACHINE,
+    ForceOption,
+    Job,
+    JsonOption,
+    MachineOption,
+    Method,
+    QuietOption,
+    ToleranceOption,
+)
+from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, ProgressBar, guarded, say, show
 from planner.errors import InputError, NotSolvedError
 
 if TYPE_CHECKING:
@@ -33,6 +42,8 @@ def compare(
         Path | None,
         typer.Option("-o", "--output", "--out", metavar="FILE", help="write the comparison (.json, .csv)"),
     ] = None,
+    force: ForceOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a program with several methods, and put cycle times, worst ratios, errors and verdicts side by side.
@@ -51,19 +62,19 @@ def compare(
     )
 
     if output is not None:
-        check_place(output)
+        check_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     limits = load_machine(machine or DEFAULT_MACHINE)
     program = read_program(job, limits)
-    rows = [_run(name, program, limits, tolerance) for name in methods]
+    rows = [_run(name, program, limits, tolerance, quiet) for name in methods]
     about = about_job(str(job), limits, tolerance)
     if output is not None:
         write_comparison(output, rows, about)
     if as_json:
-        typer.echo(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
+        say(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
     else:
         show(comparison_table(rows, f"{job}: {len(rows)} methods, machine {limits.name}"))
         if output is not None:
-            typer.echo(str(output))
+            say(str(output))
     outcomes = {row.outcome for row in rows}
     if "passed" not in outcomes:
         raise typer.Exit(
@@ -85,12 +96,12 @@ def parse_methods(text: str) -> list[str]:
     return names
 
 
-def _run(method: str, program: Program, machine: Machine, tolerance: float | None) -> Row:
+def _run(method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool) -> Row:
     """Plan with one method and say on standard error how it went."""
     from planner import plan
     from planner.report.comparison import refused, row_of_plan
 
-    with ProgressBar() as progress:
+    with ProgressBar(quiet=quiet) as progress:
         try:
             made = plan(
                 program,
@@ -103,5 +114,5 @@ def _run(method: str, program: Program, machine: Machine, tolerance: float | Non
         except (InputError, NotSolvedError) as fault:
             row = refused(method, fault)
     took = "" if row.cycle_time is None else f" {row.cycle_time:.4f} s,"
-    typer.echo(f"{method}:{took} {row.outcome}", err=True)
+    say(f"{method}:{took} {row.outcome}", err=True)
     return row

@@ -7,7 +7,7 @@ import json
 import typer
 
 from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption
-from planner.commands.terminal import BAD_INPUT, guarded, show
+from planner.commands.terminal import BAD_INPUT, guarded, say, show
 
 
 @guarded
@@ -20,7 +20,7 @@ def info(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -
 
     found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE))
     if as_json:
-        typer.echo(json.dumps(info_summary(found), indent=2, allow_nan=False))
+        say(json.dumps(info_summary(found), indent=2, allow_nan=False))
     else:
         show(info_table(found))
     if found.unsupported:

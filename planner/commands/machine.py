@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from planner.commands.terminal import guarded, show
+from planner.commands.terminal import guarded, say, show
 from planner.errors import InputError
 
 
@@ -25,7 +25,7 @@ def show_machine(name: Annotated[str, typer.Argument(metavar="NAME", help="built
     """Print the file of a built-in machine."""
     from planner.machine import builtin_text
 
-    typer.echo(builtin_text(name), nl=False)
+    say(builtin_text(name).rstrip("\n"))
 
 
 @guarded
@@ -43,4 +43,4 @@ def init_file(file: Annotated[Path, typer.Argument(metavar="FILE", help="file to
         ) from None
     except OSError as fault:
         raise InputError(f"cannot be written: {fault.strerror}", source=str(file)) from fault
-    typer.echo(f"{file} written; plan with: planner plan JOB -m {file}")
+    say(f"{file} written; plan with: planner plan JOB -m {file}")

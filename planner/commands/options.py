@@ -68,3 +68,5 @@ ToleranceOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
+QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="say nothing about progress")]
+ForceOption = Annotated[bool, typer.Option("--force", help="overwrite files that planner did not write, too")]

@@ -11,15 +11,17 @@ import typer
 from planner.commands.options import (
     DEFAULT_MACHINE,
     Corner,
+    ForceOption,
     Format,
     Job,
     JsonOption,
     MachineOption,
     Method,
+    QuietOption,
     Solver,
     ToleranceOption,
 )
-from planner.commands.terminal import FAILED, ProgressBar, guarded, show
+from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
 from planner.errors import InputError, NotSolvedError
 
 NO_CORNERS = "no rounded corners to list: they lie on splines or are full stops (--corner bezier rounds each by itself)"
@@ -63,6 +65,8 @@ def plan(
     corners: Annotated[
         bool, typer.Option("--corners", help="print the corners next to their closed-form speed")
     ] = False,
+    force: ForceOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Plan, sample and verify the motion of a program."""
@@ -71,9 +75,13 @@ def plan(
     if file_format is not None and output is None:
         raise InputError("--format is that of the trajectory in the output directory: give one with -o DIR")
     from planner import plan as plan_program
-    from planner.report.export import SUMMARY, summary, write_plan
+    from planner.report.export import SUMMARY, check_places, summary, write_plan
 
-    with ProgressBar() as progress:
+    form = file_format or Format.parquet
+    if output is not None:
+        inputs = [job, Path(machine or DEFAULT_MACHINE)]
+        check_places(output, inputs, file_format=form.value, plots=plot, force=force)
+    with ProgressBar(quiet=quiet) as progress:
         result = plan_program(
             job,
             machine or DEFAULT_MACHINE,
@@ -87,15 +95,13 @@ def plan(
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)
-            written = write_plan(
-                result, output, file_format=(file_format or Format.parquet).value, plots=plot
-            )
+            written = write_plan(result, output, file_format=form.value, plots=plot, force=force)
 
     said = summary(result)
     if written and output is not None:  # with what was not written, and why
         said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]
     if as_json:
-        typer.echo(json.dumps(said, indent=2, allow_nan=False))
+        say(json.dumps(said, indent=2, allow_nan=False))
     else:
         from planner.report.tables import corner_table, plan_table
 
@@ -103,7 +109,7 @@ def plan(
         if corners:
             show("", corner_table(result) or NO_CORNERS)
         for name in written:
-            typer.echo(str(output / name) if output else name)
+            say(str(output / name) if output else name)
     if result.trajectory is None:
         kept = f"; {output} was not touched" if output is not None else ""
         raise NotSolvedError(f"{result.sentence}{kept}")

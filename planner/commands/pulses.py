@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from planner.commands.terminal import FAILED, guarded
+from planner.commands.options import ForceOption, JsonOption
+from planner.commands.terminal import FAILED, guarded, say
 from planner.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,17 +33,20 @@ def pulses(
     pulse_width: Annotated[
         float | None, typer.Option(metavar="US", help="shortest high and low time of the step signal [us]")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of a table")] = False,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Step and direction pulses of a trajectory, less than one pulse off at every instant.
 
     Where they follow faster than the drives take them nothing is written, and the exit code is 1.
     """
     from planner.pulses import Drive, overrun, pulses_of
-    from planner.report.pulse_file import write_pulses
+    from planner.report.pulse_file import check_place, write_pulses
     from planner.report.trajectory_file import read_trajectory
 
     wanted = parse_steps(steps)
+    if output is not None:
+        check_place(output, [trajectory], force=force)
     drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
     read = read_trajectory(trajectory)
     trains = pulses_of(read.trajectory, wanted)
@@ -53,18 +57,18 @@ def pulses(
         }
         write_pulses(output, trains, about)
     if as_json:
-        typer.echo(json.dumps({"axes": _figures(trains), "faults": faults}, indent=2, allow_nan=False))
+        say(json.dumps({"axes": _figures(trains), "faults": faults}, indent=2, allow_nan=False))
     else:
         for axis, figures in _figures(trains).items():
             rate = figures["highest_frequency_hz"]
-            typer.echo(
+            say(
                 f"{axis}: {figures['pulses']:,} pulses, {figures['direction_changes']:,} changes of direction"
                 + (f", at most {rate:,.0f} per second" if rate is not None else "")
             )
         for fault in faults:
-            typer.echo(fault, err=True)
+            say(fault, err=True)
         if output is not None and not faults:
-            typer.echo(str(output))
+            say(str(output))
     if faults:
         raise typer.Exit(FAILED)
 

@@ -1,24 +1,57 @@
-"""How a command speaks: its exit code, its messages, tables on standard output, a bar on standard error."""
+"""How a command speaks: its exit code, its messages, tables on standard output, progress on standard error."""
 
 from __future__ import annotations
 
+import codecs
 import functools
+import io
 import os
 import sys
 import time
+import unicodedata
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from planner import kernels
+from planner.commands.interrupt import INTERRUPTED
 from planner.errors import InputError, NotSolvedError
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-FAILED, BAD_INPUT, NOT_SOLVED, BUG, INTERRUPTED, BROKEN_PIPE = 1, 2, 3, 70, 130, 141
+FAILED, BAD_INPUT, NOT_SOLVED, BUG, BROKEN_PIPE = 1, 2, 3, 70, 141
 PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
-PIPE_WIDTH = 120  # columns where the output is no terminal
+LINE_EVERY = 10.0  # [s] between lines of progress where there is no terminal
+# Columns where the output is no terminal: rows are for other programs there, and are not cut or folded.
+PIPE_WIDTH = 1000
+COMPILING = "compiling"
+COMPILING_ONCE = f"{COMPILING}, once: the kernels are kept for the next run"
+PLAIN = {"µ": "u", "²": "2", "³": "3", "°": "deg", "…": "..."}  # for encodings that lack them
+
+
+def prepare_streams() -> None:
+    """Let any text be written whatever the encoding, and warnings be one line."""
+    codecs.register_error("planner", _plain_text)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="planner")
+    warnings.showwarning = _show_warning
+
+
+def _plain_text(fault: UnicodeError) -> tuple[str, int]:
+    """What an encoding lacks: plain letters for units, escapes for the rest, file names that are no UTF-8 among them."""
+    if not isinstance(fault, UnicodeEncodeError):
+        raise fault
+    lacking = fault.object[fault.start : fault.end]
+    return "".join(PLAIN.get(c) or c.encode("ascii", "backslashreplace").decode() for c in lacking), fault.end
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    say(f"warning: {message}", err=True)
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -28,28 +61,29 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     def run(*args: Any, **kwargs: Any) -> None:
         try:
             command(*args, **kwargs)
-            sys.stdout.flush()
         except InputError as fault:
-            typer.echo(str(fault), err=True)
+            say(str(fault), err=True)
             raise typer.Exit(BAD_INPUT) from None
         except NotSolvedError as fault:
-            typer.echo(f"not solved: {fault}", err=True)
+            say(f"not solved: {fault}", err=True)
+            raise typer.Exit(NOT_SOLVED) from None
+        except MemoryError as fault:
+            say(f"not solved: the memory is used up ({fault or 'no more is given'}); {MORE_MEMORY}", err=True)
             raise typer.Exit(NOT_SOLVED) from None
         except KeyboardInterrupt:
-            typer.echo("interrupted", err=True)
+            say("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
-            # without this the flush at exit would fail once more
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _drop_output()
             raise typer.Exit(BROKEN_PIPE) from None
         except typer.Exit:
             raise
         except Exception:
             import traceback
 
-            traceback.print_exc()
-            typer.echo(
-                "\nThis is a bug in planner, not in your program. Please report it with the lines above, "
+            say(traceback.format_exc(), err=True)
+            say(
+                "This is a bug in planner, not in your program. Please report it with the lines above, "
                 "the NC program and the machine file.",
                 err=True,
             )
@@ -58,50 +92,130 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
+MORE_MEMORY = "split the program, or use --corner spline or a faster --method (kinematic, stop)"
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print a line or more; control characters, which a terminal might obey, are printed as escapes.
+
+    Raises InputError where the output cannot be written, BrokenPipeError where nobody reads it any more.
+    """
+    _write(printable(text), err=err)
+
+
+def _write(text: str, *, err: bool = False) -> None:
+    stream = sys.stderr if err else sys.stdout
+    if stream is None:  # closed by the caller: >&-
+        return
+    try:
+        stream.write(text + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as fault:
+        _drop_output()
+        raise InputError(f"the output cannot be written: {fault.strerror}") from fault
+
+
+def _drop_output() -> None:
+    """Without this the flush at exit would fail once more."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def printable(text: str) -> str:
+    """The text with control characters other than line ends and tabs written as \\x1b and the like."""
+    if text.isprintable():
+        return text
+    return "".join(c if c in "\n\t" or unicodedata.category(c) != "Cc" else f"\\x{ord(c):02x}" for c in text)
+
+
+def show(*tables: RenderableType) -> None:
+    """Print tables, folded to a terminal's width; elsewhere a row is a line."""
+    from rich.console import Console
+    from rich.segment import Segment, Segments
+
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    # Into a string, since rich's own writing ends the process on a broken pipe, with exit code 1.
+    console: Console = Console(
+        file=io.StringIO(), force_terminal=terminal, width=None if terminal else PIPE_WIDTH
+    )
+    for table in tables:
+        rendered = [
+            Segment(printable(text), style, control) for text, style, control in console.render(table)
+        ]
+        console.print(Segments(rendered), end="")
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().removesuffix("\n").split("\n")
+    _write("\n".join(lines if terminal else [line.rstrip() for line in lines]))
+
+
 class ProgressBar:
-    """A bar on standard error that appears when a job takes longer than a moment, on a terminal only."""
+    """What a long job does, on standard error: on a terminal a bar with a clock, elsewhere a line now and then.
+
+    quiet : say nothing
+
+    The number of rounds is not known before, so the bar only shows that work goes on; the text beside it names the stage, says in
+    which pass it is, and how much of the pass is done.
+    """
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        self._quiet = quiet
+        self._bar: Any = None
+        self._task: Any = None
+        self._times: dict[str, int] = {}
+        self._compiling_said = False
 
     def __enter__(self) -> ProgressBar:
         self._start = time.monotonic()
-        self._bar: Any = None
-        self._task: Any = None
+        self._next_line = self._start + LINE_EVERY
+        kernels.at_compilation(self._compile)
         return self
 
     def __exit__(self, *_: object) -> None:
+        kernels.at_compilation(None)
         if self._bar is not None:
             self._bar.stop()
+            self._bar = None
 
     def __call__(self, stage: str, fraction: float) -> None:
-        """Show that `stage` is done to `fraction` (0 to 1)."""
-        if self._bar is None:
-            if not sys.stderr.isatty() or time.monotonic() - self._start < PROGRESS_AFTER:
-                return
-            self._open()
-        self._bar.update(self._task, description=stage, completed=fraction)
+        """Show that `stage` is done to `fraction` (0 to 1); at 0 it begins, perhaps once more."""
+        if fraction == 0.0:
+            self._times[stage] = self._times.get(stage, 0) + 1
+        self._show(self._text(stage, fraction))
+
+    def _compile(self, kept: bool) -> None:
+        """Called before a kernel is compiled."""
+        self._show(COMPILING_ONCE if kept else COMPILING)
+
+    def _text(self, stage: str, fraction: float) -> str:
+        times = self._times.get(stage, 1)
+        part = f", {fraction:.0%}" if 0.0 < fraction < 1.0 else ""
+        return f"{stage}, pass {times}{part}" if times > 1 else stage + part
+
+    def _show(self, text: str) -> None:
+        now = time.monotonic()
+        if self._quiet or now - self._start < PROGRESS_AFTER:
+            return
+        if sys.stderr.isatty():
+            if self._bar is None:
+                self._open()
+            self._bar.update(self._task, description=printable(text))
+        elif now >= self._next_line or (text.startswith(COMPILING) and not self._compiling_said):
+            self._compiling_said |= text.startswith(COMPILING)
+            self._next_line = now + LINE_EVERY
+            say(f"{now - self._start:.0f} s: {text}", err=True)
 
     def _open(self) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
             TimeElapsedColumn(),
+            BarColumn(),
+            TextColumn("{task.description}", markup=False),
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self._bar.add_task("", total=1.0)
+        self._task = self._bar.add_task("", total=None)  # a task with a total would stop its clock at it
         self._bar.start()
-
-
-def show(*tables: RenderableType) -> None:
-    from rich.console import Console
-
-    console: Console = Console() if sys.stdout.isatty() else Console(width=PIPE_WIDTH)
-    with (
-        console.capture() as captured
-    ):  # rich's own writing ends the process on a broken pipe, with exit code 1
-        for table in tables:
-            console.print(table)
-    sys.stdout.write(captured.get())
-    sys.stdout.flush()

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, ToleranceOption
-from planner.commands.terminal import FAILED, ProgressBar, guarded, show
+from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, QuietOption, ToleranceOption
+from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
 from planner.errors import InputError
 
 
@@ -35,6 +35,7 @@ def verify(
             metavar="QUANTITY", help="report without judging: jerk for a plan that does not limit it"
         ),
     ] = None,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Judge a trajectory against its program and a machine; it may come from anywhere."""
@@ -56,14 +57,16 @@ def verify(
     recorded_tolerance = read.metadata.get("tolerance_mm")
     if tolerance is None and isinstance(recorded_tolerance, float):
         tolerance = recorded_tolerance
-    unjudged = tuple(read.metadata.get("not_limited", ()) if not_limited is None else not_limited)
+    recorded_free = read.metadata.get("not_limited")
+    recorded_names = recorded_free if isinstance(recorded_free, list) else []
+    unjudged = tuple(recorded_names if not_limited is None else not_limited)
     for name in unjudged:
         if name not in NOT_LIMITED_NAMES:
             raise InputError(
                 f"--not-limited {name}: there is no such limit; {', '.join(NOT_LIMITED_NAMES)} are"
             )
     toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance)
-    with ProgressBar() as progress:
+    with ProgressBar(quiet=quiet) as progress:
         verdict = judge(
             read.trajectory,
             toolpath,
@@ -72,12 +75,10 @@ def verify(
             progress=lambda fraction: progress("verify", fraction),
         )
     if as_json:
-        typer.echo(
-            json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2)
-        )
+        say(json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2))
     else:
         for note in read.notes:
-            typer.echo(f"note: {note}", err=True)
+            say(f"note: {note}", err=True)
         show(verdict_table(verdict, f"{trajectory} on {job}, machine {limits.name}"))
     if not verdict.passed:
         raise typer.Exit(FAILED)

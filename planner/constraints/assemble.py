@@ -8,6 +8,7 @@ from planner.arrays import Array, FloatArray
 from planner.constraints import bounds
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.allocation import error_rate
+from planner.errors import NotSolvedError
 from planner.machine import Machine
 from planner.path import PathSamples
 from planner.units import RAD_PER_DEG
@@ -19,12 +20,21 @@ CURVATURE_MARGIN = 5e-4
 JUMP_ROUNDING = 1e-6
 
 
-def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
+def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
     """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
 
-    Raises InputError if the machine lacks an axis of the path.
+    measured : the error of the machine's filters is measured afterwards (methods/creeping.py), and bounded here on programmed arcs only
+
+    Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for the path.
     """
     axes = samples.path.toolpath.axes
+    if samples.margin.max(initial=0.0) >= 1.0:
+        worst = int(samples.margin.argmax())
+        line = int(samples.path.toolpath.line[samples.segment[worst]])
+        raise NotSolvedError(
+            f"the path turns faster at line {line} than a grid of the finest step follows: moves there are too short for "
+            "this smoothing; leave them out, or use --corner bezier or --method stop"
+        )
     collected = _Collector(len(samples))
     left, right = interval_sides(samples)
     feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])
@@ -36,8 +46,9 @@ def feedrate_problem(samples: PathSamples, machine: Machine) -> FeedrateProblem:
     for k, letter in enumerate(axes):
         collected.tighten(f"velocity.{letter}", np.where(axis == k, per_axis, np.inf))
     budget = _remaining_budget(samples, machine)
+    closed = _programmed(samples) | (not measured)
     for side, kappa in ((left, samples.kappa_left), (right, samples.kappa_right)):
-        for name, bound in _curvature_bounds(kappa, budget[side], machine):
+        for name, bound in _curvature_bounds(kappa, budget[side], closed[side], machine):
             collected.tighten(name, bound * (1.0 - CURVATURE_MARGIN))
     jump, axis = bounds.curvature_jump(*_jumps(samples), machine.limits("acceleration", axes))
     for k, letter in enumerate(axes):
@@ -95,19 +106,30 @@ def _remaining_budget(samples: PathSamples, machine: Machine) -> FloatArray:
     return budget
 
 
+def _programmed(samples: PathSamples) -> Array:
+    """(P,) True for intervals on programmed lines and arcs."""
+    return (samples.element >= 0) & (samples.element < len(samples.table.legs))
+
+
 def _curvature_bounds(
-    kappa: FloatArray, budget: FloatArray, machine: Machine
+    kappa: FloatArray, budget: FloatArray, closed: Array, machine: Machine
 ) -> list[tuple[str, FloatArray]]:
-    """The bounds that depend on curvature; chord and filter errors share the budget in proportion (PAPERS D)."""
+    """The bounds that depend on curvature. Where `closed`, chord and filter errors share the budget in proportion (PAPERS D);
+    elsewhere the chord has the whole of it."""
     rate = error_rate(machine)
     found = []
     if machine.normal_acceleration is not None:
         found.append(("normal_acceleration", bounds.normal_acceleration(kappa, machine.normal_acceleration)))
-    tol_chord = budget * (machine.dt**2 / 8.0 / rate)
+    tol_chord = np.where(closed, budget * (machine.dt**2 / 8.0 / rate), budget)
     found.append(("chord_error", bounds.chord_error(kappa, tol_chord, machine.dt)))
     if machine.fir is not None:
         filters = machine.fir.time_constants
-        found.append(("filter_error", bounds.filter_error(kappa, budget - tol_chord, filters)))
+        found.append(
+            (
+                "filter_error",
+                np.where(closed, bounds.filter_error(kappa, budget - tol_chord, filters), np.inf),
+            )
+        )
         if machine.fir.phase_lag_max is not None:
             angle = machine.fir.phase_lag_max * RAD_PER_DEG
             found.append(("phase_lag", bounds.phase_lag(kappa, angle, filters)))

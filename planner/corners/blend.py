@@ -32,10 +32,10 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
 from planner.geometry.legs import leg_point
+from planner.kernels import njit
 
 # Largest angle between the two tangents that are superposed [rad]; at pi the corner would have a cusp.
 BEND_MAX = np.deg2rad(176.0)

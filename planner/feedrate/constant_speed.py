@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.constraints.assemble import feedrate_problem
@@ -23,6 +22,7 @@ from planner.corners.elements import element_point, to_arc_length
 from planner.feedrate.rest_to_rest import block_limits
 from planner.feedrate.stretches import Stretches
 from planner.geometry.toolpath import Toolpath
+from planner.kernels import njit
 from planner.machine import Machine
 from planner.path import PathSamples
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.feedrate.arc_pieces import spline_at_rest
@@ -27,6 +26,7 @@ from planner.feedrate.ramps import ENTRY, ZERO, corner_at, leg_end, leg_top, pha
 from planner.geometry.chords import arc_point
 from planner.geometry.legs import Legs as PathLegs
 from planner.geometry.toolpath import Toolpath
+from planner.kernels import njit
 
 # A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius.
 ARC_PIECE = 0.01

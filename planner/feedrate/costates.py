@@ -22,10 +22,10 @@ some percent, not to rounding (tested against the change of the time with the li
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Multipliers
+from planner.kernels import njit
 
 # A row, or x, within this share of its limit holds it [-]: the passes of the solver end there to rounding.
 HOLDS = 1e-6

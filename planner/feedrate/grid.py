@@ -83,9 +83,9 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
     margin = samples.margin.copy()
     margin[straight] = np.maximum(1.0 - tau[straight] * j / a, 0.0)  # leaves the acceleration j tau
     model = replace(samples, margin=margin)
-    problem = _slow_at_corners(feedrate_problem(model, machine))
+    problem = _slow_at_corners(feedrate_problem(model, machine, measured=True))
     model = add_switching_points(model, problem, Reachability().solve(problem), machine)
-    problem = _slow_at_corners(feedrate_problem(model, machine))
+    problem = _slow_at_corners(feedrate_problem(model, machine, measured=True))
     solution = Reachability().solve(problem).require()
     interval = _straight(model)
     parent = np.searchsorted(samples.s[straight], model.s[interval], side="right") - 1

@@ -12,10 +12,10 @@ ramp of a nanometre beside millimetres at constant speed has no more than its pa
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.feedrate.jerk_riccati import offsets, riccati, slope
 from planner.feedrate.jerk_rows import empty_model, kinematics, linearise
+from planner.kernels import njit
 
 HESSIAN_MIN = 1e-12  # keeps the reduced Hessian positive where no row is near; far below any row's weight [-]
 SLACK_MIN = 0.3  # of the first slacks [-]; smaller ones block the way of a start that violates other rows

@@ -8,7 +8,7 @@ with dx_0 = du_0 = 0 and dx_N = du_N = 0: the last two controls are fixed by the
 
 from __future__ import annotations
 
-from numba import njit
+from planner.kernels import njit
 
 PIVOT_MIN = 1e-6  # of the positive parts: smallest reduced Hessian taken for convex [-]
 

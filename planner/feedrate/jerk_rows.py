@@ -24,9 +24,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
+from planner.kernels import njit
 
 DOMAIN = 0.95  # share of the kinematics' domain p ds <= 3 vm^2 that an interval may use [-]; a start with constant jerk uses 8/9
 SLOPE_MIN = 1e-3  # of the mean feed: floor of vm - p h/6, which is 0 at the domain's edge [-]

@@ -15,10 +15,10 @@ constant jerk, so that the kinematics are exact, and slowed down enough it keeps
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
+from planner.kernels import njit
 
 ACCELERATION_SHARE = 0.4  # of the limits, for the second-order profile underneath [-]
 NORMAL_SHARE = 0.7  # of the acceleration limits, for the caps [-]

@@ -17,12 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk_rows import duration
 from planner.feedrate.solution import FeedrateSolution
+from planner.kernels import njit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -24,10 +24,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.feedrate.ramps import ENTRY, corner_at, leg_end, leg_time, reach
+from planner.kernels import njit
 
 LENGTH_ROUNDING = 1e-14  # the choice may lack this share of a leg's length [-]: rounding of sums of lengths
 BISECTIONS = 60  # of a speed's bracket: to its last digit

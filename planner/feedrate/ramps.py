@@ -17,9 +17,9 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 
 from planner.corners.kinematic import entry_acceleration, phase_times
+from planner.kernels import njit
 
 ROUNDING = 1e-15  # of a leg's length [-]
 # What is left of a leg between two ramps is run at constant speed if it is at most this share of the leg [-]: faster still would save

@@ -22,10 +22,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.feedrate.ramps import leg_top, reach
+from planner.kernels import njit
 
 ROUNDING = 1e-12  # of speeds [-]
 PHASES = 7  # of a free stretch: two ramps of three phases, and the cruise between them

@@ -20,11 +20,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import FloatArray, freeze
 from planner.fir.course import Course
 from planner.fir.superpose import Pieces
+from planner.kernels import njit
 from planner.machine import Machine
 
 # Normal acceleration, which is not linear on a piece, is looked at this many times on either half of it, and may use this share of

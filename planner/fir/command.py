@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.fir.course import Course
+from planner.kernels import njit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

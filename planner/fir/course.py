@@ -40,6 +40,7 @@ class Course:
     sin_half  : (R+1,) sine of half the turning angle at the joint, 0 at full stops
     first     : (S+1,)
     dwell     : (S+1,) standstill before the first stretch and after each [s]
+    own       : lengths of the two filters that every stretch has [s]; None to choose them
     """
 
     lines: Toolpath
@@ -56,6 +57,7 @@ class Course:
     sin_half: FloatArray
     first: Array
     dwell: FloatArray
+    own: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         legs, axes = len(self.length), len(self.lines.axes)
@@ -125,6 +127,7 @@ class Course:
             sin_half=self.sin_half[joints],
             first=first,
             dwell=np.zeros(len(first)),
+            own=self.own,
         )
 
     def stopping(self, joints: Array) -> Course:
@@ -137,8 +140,8 @@ class Course:
         return dataclasses.replace(self, first=first, dwell=dwell, sin_half=sin_half)
 
 
-def course_of(toolpath: Toolpath, machine: Machine) -> Course:
-    """Lay out a toolpath as a course."""
+def course_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None = None) -> Course:
+    """Lay out a toolpath as a course; `own`: lengths of the two filters [s], None to choose them."""
     lines = chorded(toolpath, CHORD_SHARE, np.zeros(len(toolpath), bool))
     legs = legs_of(parted_by_feed(lines))
     at = legs.first
@@ -171,4 +174,5 @@ def course_of(toolpath: Toolpath, machine: Machine) -> Course:
         sin_half=sin_half,
         first=first,
         dwell=lines.dwell[at[first]],
+        own=own,
     )

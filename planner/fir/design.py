@@ -21,7 +21,7 @@ MODES = 2
 def filters_for(
     course: Course, machine: Machine, speed: FloatArray, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 and T2 (S,) [s]: the machine's own, or the shortest for legs run at their feed and at most at `speed`.
+    """T1 and T2 (S,) [s]: the course's own, or the shortest for legs run at their feed and at most at `speed`.
 
     T1 = V/A, T2 = margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or both equal where V does
     not reach A), lengthened to whole periods of the machine's vibration modes (eq. 10).
@@ -29,8 +29,8 @@ def filters_for(
     speed  : (S,) [mm/s]
     margin : (S,) [-]
     """
-    if machine.fir is not None:
-        return _own(course, machine)
+    if course.own is not None:
+        return _own(course, course.own)
     V = np.minimum(course.feed, speed[course.stretch])
     T1 = course.largest(V / course.a_max)
     product = margin * course.largest(V / course.j_max)
@@ -56,7 +56,7 @@ def plain_plan(course: Course, machine: Machine) -> Schedule:
     """The paper's rules and nothing else: T1 = V/A, T2 = A/J, full speed, and eq. 15 at every corner."""
     a, j = (machine.limits(q, course.lines.axes).min() for q in ("acceleration", "jerk"))
     V = course.largest(course.feed)
-    T1, T2 = lengths_from_limits(V, a, j) if machine.fir is None else _own(course, machine)
+    T1, T2 = lengths_from_limits(V, a, j) if course.own is None else _own(course, course.own)
     before, after, at = course.feed[:-1], course.feed[1:], course.stretch[1:]
     overlap = np.zeros(len(course) + 1)
     overlap[1:-1] = overlap_time(
@@ -72,8 +72,7 @@ def plain_plan(course: Course, machine: Machine) -> Schedule:
     )
 
 
-def _own(course: Course, machine: Machine) -> tuple[FloatArray, FloatArray]:
-    """The machine's own two filters for every stretch."""
-    assert machine.fir is not None
-    T2, T1 = sorted(machine.fir.time_constants)
+def _own(course: Course, own: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """The two given filters for every stretch."""
+    T2, T1 = sorted(own)
     return np.full(course.stretches, T1), np.full(course.stretches, T2)

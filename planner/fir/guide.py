@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.corners.elements import element_point, to_arc_length
 from planner.fir.schedule import lower_between
 from planner.geometry.nurbs import Nurbs
+from planner.kernels import njit
 from planner.machine import Machine
 from planner.path import PathSamples
 

@@ -21,7 +21,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.fir.audit import slowest
@@ -29,6 +28,7 @@ from planner.fir.command import Command
 from planner.fir.guide import STRAIGHT, Guide, feeds_held
 from planner.fir.spline_speeds import filter_lengths, first_speeds, guide_point
 from planner.fir.superpose import Pieces, superpose
+from planner.kernels import njit
 from planner.machine import LINEAR_AXES, Machine
 
 # Rounds until the filters are no longer shortened again, until everything gets slower, and at most.
@@ -229,19 +229,24 @@ def _slower_chords(guide: Guide, command: Command, seen: Seen, n: int) -> FloatA
     return np.where(guide.kappa > STRAIGHT, by, 1.0)
 
 
-def promised(guide: Guide, machine: Machine) -> tuple[list[Held], FloatArray]:
+def promised(
+    guide: Guide, machine: Machine, own: tuple[float, float] | None
+) -> tuple[list[Held], FloatArray]:
     """Commands with lower and lower largest speeds, not yet held, and the times (n, G) [s] that they promise."""
     high = guide.largest(np.where(guide.length > 0, guide.feed, 0.0))
     corners = np.add.reduceat(np.diff(guide.corner, prepend=-1) > 0, guide.first[:-1])
     leg = np.add.reduceat(guide.length, guide.first[:-1]) / (1 + corners)
     low = np.minimum(LOWEST * high, np.cbrt(machine.limits("jerk", guide.axes).min() * leg**2 / 4.0))
-    starts = [_start(guide, machine, high * (low / high) ** (k / (SPEEDS - 1))) for k in range(SPEEDS)]
+    starts = [_start(guide, machine, own, high * (low / high) ** (k / (SPEEDS - 1))) for k in range(SPEEDS)]
     return starts, np.array([start.time(guide) for start in starts])
 
 
-def fastest(guide: Guide, machine: Machine) -> Held:
-    """The fastest of a few commands that keep tolerance and limits, for each run by itself. `guide` has no dwells."""
-    starts, times = promised(guide, machine)
+def fastest(guide: Guide, machine: Machine, own: tuple[float, float] | None) -> Held:
+    """The fastest of a few commands that keep tolerance and limits, for each run by itself. `guide` has no dwells.
+
+    own : lengths of the two filters [s]; None to choose them
+    """
+    starts, times = promised(guide, machine, own)
     best, best_time = starts[0], np.full(guide.runs, np.inf)
     for rank in np.argsort(times, axis=0)[:HELD_MAX]:
         chosen = Held(
@@ -249,7 +254,7 @@ def fastest(guide: Guide, machine: Machine) -> Held:
             T1=np.choose(rank, [s.T1 for s in starts]),
             T2=np.choose(rank, [s.T2 for s in starts]),
         )
-        held = hold(guide, machine, chosen, given=machine.fir is not None)
+        held = hold(guide, machine, chosen, given=own is not None)
         time = held.time(guide)
         better = time < best_time
         best_time = np.where(better, time, best_time)
@@ -261,12 +266,12 @@ def fastest(guide: Guide, machine: Machine) -> Held:
     return best
 
 
-def _start(guide: Guide, machine: Machine, top: FloatArray) -> Held:
+def _start(guide: Guide, machine: Machine, own: tuple[float, float] | None, top: FloatArray) -> Held:
     """First speeds up to `top` (G,) and the filters for them."""
     acceleration, jerk = _limits(guide, machine)
     most, ones = np.minimum(guide.feed, top[guide.run]), np.ones((2, guide.runs))
-    if machine.fir is not None:
-        long, short = sorted(machine.fir.time_constants, reverse=True)
+    if own is not None:
+        long, short = sorted(own, reverse=True)
         T1, T2 = long * ones[0], short * ones[0]
         v = first_speeds(guide, most, acceleration, T1, T2)
     else:

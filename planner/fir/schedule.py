@@ -27,12 +27,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.fir.command import Cells
 from planner.fir.course import Course
 from planner.fir.overlap import overlap_beside, overlap_within, overlap_within_limits
+from planner.kernels import njit
 from planner.machine import Machine
 from planner.search import last_not_after
 

@@ -86,7 +86,7 @@ def _least_time(course: Course, stops: Array) -> FloatArray:
 
 def _settled(course: Course, machine: Machine) -> Schedule:
     """The fastest of the settled schedules, each stretch with the choices that are most promising for it."""
-    margins = MARGINS if machine.fir is None else MARGINS[:1]
+    margins = MARGINS if course.own is None else MARGINS[:1]
     speeds, times = _search(course, machine, margins)
     every = np.arange(course.stretches)
     plan = plan_for(course, machine, speeds[0], np.full(course.stretches, margins[0]))

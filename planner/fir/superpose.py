@@ -16,10 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.fir.command import Command
+from planner.kernels import njit
 
 # Pieces shorter than this are left out, the jerk is that of the piece behind [s]: the order of edges that close is rounding.
 SHORTEST_PIECE = 1e-12

@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.kernels import njit
 
 # Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
 JOINED_ANGLE = 1e-7

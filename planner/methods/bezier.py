@@ -51,6 +51,8 @@ class BezierMethod(Method):
     corner: BezierCorner = field(default_factory=BezierCorner)
     allocate: bool = True
 
+    ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
+
     @property
     def keeps_tolerance(self) -> bool:
         return self.allocate
@@ -70,6 +72,7 @@ class BezierMethod(Method):
             samples = sample_path(path, shares) if stops.any() else samples
         with job.stage("solve"):
             motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
+        motion = job.behind_filters(motion)
         made = job.deliver(motion)
         with job.stage("report"):
             corners = _corner_table(motion, limits)

@@ -1,4 +1,4 @@
-"""What methods `fir` and `fir-spline` share: the machine's filters, and the axes of a motion made of filtered pieces."""
+"""What methods `fir` and `fir-spline` share: the filters that make their profile, and the axes of a motion made of filtered pieces."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from planner.axis_motion import AxisMotion
 from planner.errors import InputError
 from planner.fir.superpose import Pieces
 from planner.geometry.toolpath import Toolpath
-from planner.machine import Machine
 
 COLUMNS = ("position", "velocity", "acceleration", "jerk")
 
 
-def check_filters(machine: Machine, method: str) -> None:
-    """Raise InputError for a machine whose own filters are not two."""
-    if machine.fir is not None and len(machine.fir.time_constants) != 2:
+def check_profile_filters(times: tuple[float, float] | None) -> None:
+    """Raise InputError for profile filters that are not two positive lengths."""
+    if times is not None and (len(times) != 2 or not all(0 < T < np.inf for T in times)):
         raise InputError(
-            f"machine '{machine.name}' has {len(machine.fir.time_constants)} filters in fir.time_constants; "
-            f"method {method} plans for two (or give none, and it chooses them)"
+            f"profile_filters = {', '.join(f'{T:g}' for T in times) or 'none'}; give two lengths [s], positive and finite, or None: "
+            "then the method chooses them"
         )
 
 

@@ -1,12 +1,14 @@
 """Method `fir`: paper 000's velocity pulses, overlapped at the corners and smoothed by two FIR filters.
 
-1. Arcs become chords. Between full stops the filters are chosen anew (fir/design.py), unless the machine has filters of its own.
+1. Arcs become chords. Between full stops the filters are chosen anew (fir/design.py), unless `profile_filters` says which.
 2. At sharp corners the command waits for the gap that eq. 15 leaves of the filters' delay; through curves it flows without a gap,
    at a speed at which the filters stay within the tolerance (fir/schedule.py).
 3. The filtered motion is made exactly, in pieces of constant jerk (fir/superpose.py).
 4. Its deviation from the path, its accelerations and its jerks are measured exactly, and where one is too large the command slows
    down (fir/audit.py, fir/settle.py): what the filters promise for isolated pulses, |a| <= V/T1 and |j| <= V/(T1 T2), holds for
    no chain of pulses (up to 2 V/T1 and 4 V/(T1 T2), PAPERS), and eq. 14 not for short ones.
+
+These filters make the setpoints. Filters that the machine has behind its setpoints (`[fir]`) come after them, as with every method.
 
 `plain` is the paper without 4: T1 = V/A, T2 = A/J, eq. 15 at every corner. Its verdict shows what that exceeds.
 """
@@ -25,7 +27,7 @@ from planner.fir.schedule import Schedule
 from planner.fir.search import fastest
 from planner.fir.settle import make
 from planner.fir.superpose import Pieces
-from planner.methods.filtered import axes_of, check_filters, reached
+from planner.methods.filtered import axes_of, check_profile_filters, reached
 from planner.methods.job import Job, Method
 from planner.methods.plan import Plan
 
@@ -34,27 +36,34 @@ from planner.methods.plan import Plan
 class FirMethod(Method):
     """Overlapped pulses through two FIR filters.
 
-    plain : the paper's rules as they are, whatever they exceed
+    plain           : the paper's rules as they are, whatever they exceed
+    profile_filters : lengths of the two filters that the setpoints are made with [s]; None to choose them
     """
 
     plain: bool = False
+    profile_filters: tuple[float, float] | None = None
+
+    ways = ((0.5, 1.0), (0.25, 1.0), (0.1, 1.0), (0.03, 1.0))
+
+    def __post_init__(self) -> None:
+        check_profile_filters(self.profile_filters)
 
     @property
     def keeps_tolerance(self) -> bool:
         return not self.plain
 
     def plan_job(self, job: Job) -> Plan:
-        check_filters(job.machine, "fir")
         with job.stage("geometry"):
-            course = course_of(job.toolpath, job.machine)
+            course = course_of(job.toolpath, job.machine, self.profile_filters)
         with job.stage("solve"):
             if self.plain:
                 schedule = plain_plan(course, job.machine)
             else:
                 course, schedule = fastest(course, job.machine)
             pieces = make(course, job.machine, schedule).pieces
+            motion = motion_of(course, pieces)
         return job.plan(
-            job.deliver(motion_of(course, pieces)),
+            job.deliver(motion if self.plain else job.behind_filters(motion)),
             method="fir-plain" if self.plain else "fir",
             corner="fir",
             solver="pulses",

@@ -21,6 +21,7 @@ import numpy as np
 from planner.axis_motion import AxisMotion
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.errors import InputError
 from planner.feedrate.solution import Status
 from planner.fir.guide import Guide, guide_of_curve, guide_of_path
 from planner.fir.hold import Held, command_of, fastest, promised
@@ -30,12 +31,11 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
-from planner.methods.filtered import axes_of, check_filters, reached
-from planner.methods.job import Job, Method
+from planner.methods.filtered import axes_of, check_profile_filters, reached
+from planner.methods.job import Job, Method, faster
 from planner.methods.plan import Plan
 from planner.methods.stages import Progress, Stages
 from planner.path import sample_path
-from planner.units import RAD_PER_DEG
 
 # Share of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
 # zig-zag 2.93, 2.66, 2.65 s with 0.5, 0.1, 0.05; circle and spiral of chords do not care.
@@ -46,7 +46,7 @@ RESOLUTION = 0.05
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
 # Share of the tolerance that the chords of a curve's program may use [-].
 CHORD_SHARE = 0.05
-# Phase lag phi of v_ph unless the machine has its own [rad]: up to it the second-order error is good to 1 % (PAPERS).
+# Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (PAPERS).
 PHASE_LAG = 0.5
 
 
@@ -54,19 +54,29 @@ PHASE_LAG = 0.5
 class FirSplineMethod(Method):
     """Closed-form feed limits and two FIR filters along a smooth path.
 
-    plain : the paper's speeds and filters as they are, whatever they exceed
+    plain           : the paper's speeds and filters as they are, whatever they exceed
+    profile_filters : lengths of the two filters that the setpoints are made with [s]; None to choose them
+    phase_lag       : phi of v_ph [rad], for `plain`
     """
 
     plain: bool = False
+    profile_filters: tuple[float, float] | None = None
+    phase_lag: float = PHASE_LAG
+
+    ways = ((0.5, 1.0), (0.25, 1.0), (0.1, 1.0), (0.03, 1.0))
+
+    def __post_init__(self) -> None:
+        check_profile_filters(self.profile_filters)
+        if not 0 < self.phase_lag < np.inf:
+            raise InputError(f"phase_lag = {self.phase_lag} rad; it must be positive and finite")
 
     @property
     def keeps_tolerance(self) -> bool:
         return not self.plain
 
     def plan_job(self, job: Job) -> Plan:
-        check_filters(job.machine, "fir-spline")
         with job.stage("geometry"):
-            stopping = job.toolpath if self.plain else _with_stops(job.toolpath, job.machine)
+            stopping = job.toolpath if self.plain else self._with_stops(job.toolpath, job.machine)
             guide = _guide_of(stopping, job.machine)
         return self._finish(job, guide, "bezier")
 
@@ -82,7 +92,6 @@ class FirSplineMethod(Method):
 
         Raises InputError for what cannot be planned.
         """
-        check_filters(machine, "fir-spline")
         stages = Stages(progress)
         with stages.stage("geometry"):
             whole = machine.tolerance if tolerance is None else tolerance
@@ -91,18 +100,30 @@ class FirSplineMethod(Method):
             toolpath = toolpath_from_program(program, machine, whole)
             ends = curve.stations(chords)
             back = ends[1:][toolpath.block[np.flatnonzero(toolpath.joint[1:-1] == Joint.STOP)]]
-            guide = guide_of_curve(curve, machine, feed, whole - chords, ends, back)
         job = Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
-        return self._finish(job, guide, None)
+
+        def within(share: float) -> Plan:
+            with job.stage("geometry"):
+                guide = guide_of_curve(curve, machine, feed, share * (whole - chords), ends, back)
+            return self._finish(job, guide, None)
+
+        best = within(1.0)
+        for share, _ in self.ways if machine.fir is not None else ():
+            best = faster(best, within(share))
+        return best
 
     def _finish(self, job: Job, guide: Guide, corner: str | None) -> Plan:
         with job.stage("solve"):
             alone = guide.pick(np.ones(guide.runs, bool))
-            held = _plain(alone, job.machine) if self.plain else fastest(alone, job.machine)
+            held = (
+                self._plain(alone, job.machine)
+                if self.plain
+                else fastest(alone, job.machine, self.profile_filters)
+            )
             motion = _motion(guide, held, job.toolpath)
         delay = 1e3 * (held.T1 + held.T2)
         return job.plan(
-            job.deliver(motion),
+            job.deliver(motion if self.plain else job.behind_filters(motion)),
             method="fir-spline-plain" if self.plain else "fir-spline",
             corner=corner,
             solver="filters",
@@ -110,6 +131,39 @@ class FirSplineMethod(Method):
             sentence=f"filters of {delay.min():.3g} to {delay.max():.3g} ms in all",
             grid_points=len(guide),
         )
+
+    def _with_stops(self, toolpath: Toolpath, machine: Machine) -> Toolpath:
+        """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by itself: at a full stop
+        the filters may change."""
+        ends = np.flatnonzero(toolpath.joint == Joint.STOP)
+        best, best_time = toolpath.joint, np.full(len(ends) - 1, np.inf)
+        for angle in STOP_ANGLES:
+            sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > angle)
+            if not sharp.any() and np.isfinite(best_time).all():
+                continue
+            stopping = toolpath.with_joints(sharp, Joint.STOP)
+            joint = stopping.joint
+            guide = _guide_of(stopping, machine)
+            time = promised(guide.pick(np.ones(guide.runs, bool)), machine, self.profile_filters)[1].min(
+                axis=0
+            )
+            run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
+            time = np.bincount(run, time, len(ends) - 1)
+            better = np.append(time < best_time, False)[
+                np.searchsorted(ends, np.arange(len(joint)), side="right") - 1
+            ]
+            best, best_time = np.where(better, joint, best), np.minimum(time, best_time)
+        return dataclasses.replace(toolpath, joint=best)
+
+    def _plain(self, guide: Guide, machine: Machine) -> Held:
+        """Paper 001 as it is: T1 = v_p/a, T2 = a/j with the largest v_p of each run, and v_sc."""
+        acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
+        v_p = guide.largest(np.where(guide.length > 0, guide.feed, 0.0))
+        T1, T2 = v_p / acceleration, acceleration / jerk
+        if self.profile_filters is not None:
+            T1, T2 = np.full(guide.runs, self.profile_filters[0]), self.profile_filters[1]
+        T1, T2 = np.maximum(T1, T2), np.minimum(T1, T2)
+        return Held(v=v_sc(guide, T1, T2, self.phase_lag), T1=T1, T2=T2)
 
 
 def _guide_of(toolpath: Toolpath, machine: Machine) -> Guide:
@@ -120,40 +174,6 @@ def _guide_of(toolpath: Toolpath, machine: Machine) -> Guide:
         path, toolpath=toolpath, tol=path.tol / ROUNDING_SHARE
     )  # from here on the whole of it
     return guide_of_path(sample_path(path, machine, RESOLUTION), machine)
-
-
-def _with_stops(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by itself: at a full stop
-    the filters may change."""
-    ends = np.flatnonzero(toolpath.joint == Joint.STOP)
-    best, best_time = toolpath.joint, np.full(len(ends) - 1, np.inf)
-    for angle in STOP_ANGLES:
-        sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > angle)
-        if not sharp.any() and np.isfinite(best_time).all():
-            continue
-        stopping = toolpath.with_joints(sharp, Joint.STOP)
-        joint = stopping.joint
-        guide = _guide_of(stopping, machine)
-        time = promised(guide.pick(np.ones(guide.runs, bool)), machine)[1].min(axis=0)
-        run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
-        time = np.bincount(run, time, len(ends) - 1)
-        better = np.append(time < best_time, False)[
-            np.searchsorted(ends, np.arange(len(joint)), side="right") - 1
-        ]
-        best, best_time = np.where(better, joint, best), np.minimum(time, best_time)
-    return dataclasses.replace(toolpath, joint=best)
-
-
-def _plain(guide: Guide, machine: Machine) -> Held:
-    """Paper 001 as it is: T1 = v_p/a, T2 = a/j with the largest v_p of each run, and v_sc."""
-    acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
-    v_p = guide.largest(np.where(guide.length > 0, guide.feed, 0.0))
-    T1, T2, phi = v_p / acceleration, acceleration / jerk, PHASE_LAG
-    if machine.fir is not None:
-        T1, T2 = np.full(guide.runs, machine.fir.time_constants[0]), machine.fir.time_constants[1]
-        phi = (machine.fir.phase_lag_max or PHASE_LAG / RAD_PER_DEG) * RAD_PER_DEG
-    T1, T2 = np.maximum(T1, T2), np.minimum(T1, T2)
-    return Held(v=v_sc(guide, T1, T2, phi), T1=T1, T2=T2)
 
 
 def _motion(guide: Guide, held: Held, toolpath: Toolpath) -> AxisMotion:

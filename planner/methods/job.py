@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,14 +19,16 @@ from planner.geometry.passing import segments_at
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.methods import periods
+from planner.methods.behind import kept
 from planner.methods.closed_form import CornerTable
 from planner.methods.notes import job_notes
+from planner.methods.pacing import TimedT
 from planner.methods.periods import settled
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
 from planner.nc.program import Program
-from planner.timing import MotionInTime, sample_motion
+from planner.timing import MotionInTime, require_samples, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
@@ -40,20 +42,43 @@ PERIOD_ROUNDS = 8
 class Job:
     """A program on its way to a plan.
 
-    toolpath   : the path that is planned: the program's exact path, with its tolerances, or less of them (methods/periods.py)
-    stages     : the clock
-    programmed : the path by which the motion is judged; None for `toolpath`
-    noted      : what the method has said of what it gave up (`note`)
-    motion_of  : the motions of the trajectories delivered so far, as long as these live
+    toolpath  : the program's exact path, with its tolerances, or less of them (`with_share`, methods/periods.py)
+    stages    : the clock
+    judged    : machine and toolpath that the motion is kept to and judged by where it is planned with others, else None
+    noted     : what the method has said of what it gave up (`note`)
+    motion_of : the motions of the trajectories delivered so far, as long as these live
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
-    programmed: Toolpath | None = None
     noted: list[str] = field(default_factory=list)
+    judged: tuple[Machine, Toolpath] | None = None
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
+
+    @property
+    def real(self) -> tuple[Machine, Toolpath]:
+        """Machine and toolpath that the motion is kept to and judged by."""
+        return self.judged or (self.machine, self.toolpath)
+
+    def with_share(self, share: float, seen: float) -> Job:
+        """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
+        of `seen` of their lengths [-]."""
+        machine = self.real[0]
+        assert machine.fir is not None
+        lengths = tuple(
+            seen * np.sqrt(share) * T for T in machine.fir.time_constants
+        )  # T^2 over tolerance stays
+        return replace(
+            self,
+            machine=machine.model_copy(
+                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
+            ),
+            toolpath=replace(self.toolpath, tolerance=share * self.toolpath.tolerance),
+            judged=self.real,
+            noted=[],
+        )
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage; yields a function that takes the fraction done."""
@@ -66,13 +91,15 @@ class Job:
     @cached_property
     def stop_time(self) -> float:
         """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""
-        times = rest_to_rest_times(self.judged.length, *block_limits(self.judged, self.machine))
-        return float(times.sum() + np.sum(self.judged.dwell))
+        machine, toolpath = self.real
+        times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
+        return float(times.sum() + np.sum(toolpath.dwell))
 
-    @property
-    def judged(self) -> Toolpath:
-        """The path by which the motion is judged."""
-        return self.toolpath if self.programmed is None else self.programmed
+    def behind_filters(self, motion: TimedT) -> TimedT:
+        """The motion, slower where the machine's own filters would otherwise leave the tolerance (methods/behind.py)."""
+        with self.stage("filters"):
+            machine, toolpath = self.real
+            return kept(motion, toolpath, machine)
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
         """Sample a motion at the interpolation period, with stops that its chords do not cut off (methods/periods.py), and have it
@@ -80,15 +107,16 @@ class Job:
 
         seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
         """
+        machine, toolpath = self.real
         with self.stage("sample"):
-            motion = self.settled(motion, not_limited)
-            trajectory = self._named(sample_motion(motion, self.machine.dt))
+            motion = settled(motion, toolpath, machine, "jerk" not in not_limited)
+            trajectory = self._named(sample_motion(motion, machine.dt))
         self.motion_of[trajectory] = motion
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
-                self.judged,
-                self.machine,
+                toolpath,
+                machine,
                 motion=motion,
                 seed=seed,
                 not_limited=not_limited,
@@ -96,20 +124,16 @@ class Job:
             )
         return trajectory, verdict
 
-    def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
-        """The motion as it is delivered: with the standstills that its samples need."""
-        return settled(motion, self.judged, self.machine, "jerk" not in not_limited)
-
     def _named(self, trajectory: Trajectory) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
         method's own blocks and a note."""
-        segment = segments_at(self.judged, trajectory.position, trajectory.feed)
+        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
         if segment is None:
             self.note(
                 "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
             )
             return trajectory
-        return dataclasses.replace(trajectory, block=self.judged.block[segment], line=self.judged.line[segment])
+        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
 
     def plan(
         self,
@@ -121,7 +145,7 @@ class Job:
         status: Status,
         sentence: str,
         grid_points: int,
-        corners: CornerTable | None = None,
+        rounded: CornerTable | None = None,
         grid: GridHistory | None = None,
         prices: PriceList | None = None,
     ) -> Plan:
@@ -132,29 +156,30 @@ class Job:
             corner=corner,
             solver=solver,
             program=self.program,
-            machine=self.machine,
-            toolpath=self.judged,
+            machine=self.real[0],
+            toolpath=self.real[1],
             status=status,
             sentence=sentence,
             trajectory=trajectory,
             verdict=verdict,
-            corners=corners,
+            rounded=rounded,
             grid=grid,
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=prices,
-            notes=(*job_notes(self.program, self.machine, self.toolpath), *self.noted),
+            notes=(*job_notes(self.program, *self.real), *self.noted),
             timings=self.stages.timings,
         )
 
 
 class Method(ABC):
-    """A way to plan a job; its repr is its row label in every table."""
+    """A way to plan a job; its repr is its row label in every table.
 
-    @property
-    def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
-        return True
+    ways : for machines with filters behind the setpoints: shares of the tolerance, and of the filters' lengths that closed forms see
+           (`Job.with_share`), that are tried beside (1, 1); the fastest plan is taken
+    """
+
+    ways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
     def plan(
         self,
@@ -172,32 +197,57 @@ class Method(ABC):
         stages = Stages(progress)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
+        # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
+        require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
         return self.plan_within_periods(
             Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
         )
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        return True
+
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""
-        made = self.plan_job(job)
-        given, planned, programmed = job, job.toolpath, job.judged
+        made = self._fastest(job)
+        given, planned, (machine, programmed) = job, job.toolpath, job.real
         for _ in range(PERIOD_ROUNDS):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
                 break
             with job.stage("geometry"):
-                near, far = periods.missed(job.motion_of[made.trajectory], programmed, job.machine.dt)
+                near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
                 less = periods.with_less_tolerance(planned, programmed, near, far)
             if less is None:
                 break
             planned = less
-            job = dataclasses.replace(given, toolpath=planned, programmed=programmed, noted=[])
-            made = self.plan_job(job)
+            job = replace(given, toolpath=planned, judged=given.real, noted=[])
+            made = self._fastest(job)
         if job is given:
             return made
-        return dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
+        return replace(made, notes=(*made.notes, _said(made, programmed, planned)))
+
+    def _fastest(self, job: Job) -> Plan:
+        """The plan; for a machine with filters the fastest of those that are tried (`ways`)."""
+        best = self.plan_job(job)
+        if job.machine.fir is None or not best.solved:
+            return best
+        for share, seen in self.ways:
+            best = faster(best, self.plan_job(job.with_share(share, seen)))
+        return best
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
         """Plan a program whose path is laid out."""
+
+
+def faster(plan: Plan, other: Plan) -> Plan:
+    """Of two plans the one that passed or, if both did, the faster one; the first if there is no difference."""
+    if plan.trajectory is None or plan.verdict is None or other.trajectory is None or other.verdict is None:
+        return plan
+    if plan.verdict.passed != other.verdict.passed:
+        return plan if plan.verdict.passed else other
+    return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
 
 
 def _inside(made: Plan) -> bool:

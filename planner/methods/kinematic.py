@@ -60,6 +60,8 @@ class KinematicMethod(Method):
     start_stop: float = 0.0
     short_segment: float = 1.0
 
+    ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
+
     def __post_init__(self) -> None:
         if not 0 <= self.start_stop < np.inf:
             raise InputError(f"start_stop = {self.start_stop} mm/s; it must be finite and not negative")
@@ -71,7 +73,7 @@ class KinematicMethod(Method):
         with job.stage("solve"):
             course = self._course(job.toolpath, job.machine, exact)
             motion = _motion(course, job.toolpath.axes)
-        made = job.deliver(motion)
+        made = job.deliver(job.behind_filters(motion))
         with job.stage("report"):
             corners = _corner_table(course, job.machine)
         return job.plan(

@@ -11,24 +11,29 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from planner.constraints.assemble import feedrate_problem
+from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import JerkLimited
 from planner.machine import Machine
+from planner.methods.creeping import within_filters
 from planner.methods.geometry import AUTO
 from planner.methods.job import Job, Method
 from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
-from planner.methods.prices import price_list
+from planner.methods.prices import MORE_TOLERANCE, SitePrices, price_list
 from planner.methods.reshape import OnPath, tube_prices
 from planner.methods.rivals import fastest
 from planner.methods.slowing import within_limits, without_seen_excess
 from planner.methods.stages import Stages
 from planner.path import RESOLUTION, sample_path
+from planner.timing import Motion
 
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
 # (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
@@ -48,6 +53,8 @@ class OptimalMethod(Method):
     corner: str | CornerShape = AUTO
     solver: JerkLimited = field(default_factory=JerkLimited)
     rounds: int | None = None
+
+    ways = ((0.5, 1.0), (0.1, 1.0))
 
     def plan_job(self, job: Job) -> Plan:
         plan = self._on_corner(job, self.corner)
@@ -78,6 +85,8 @@ class OptimalMethod(Method):
         if best.solution.solved:
             with job.stage("solve"):
                 best, motion = within_limits(best, self.solver.solve, job.toolpath, machine)
+            with job.stage("filters"):
+                best, motion = within_filters(best, motion, self._again(job), job.real)
             made = job.deliver(motion)
             for again in range(SEEN_ROUNDS):
                 gentler = without_seen_excess(motion, made[1], again)
@@ -85,15 +94,23 @@ class OptimalMethod(Method):
                     break
                 motion = gentler
                 made = job.deliver(motion, seed=again + 1)  # times from which nothing was fed back
-            if best.solution.multipliers:
+            # behind filters what a limit costs is not the problem's to say
+            if best.solution.multipliers and machine.fir is None:
                 with job.stage("report"):
-                    by_site = (
-                        (best.shape.laid.place, tube_prices(best, best.shape))
-                        if best.shape and len(best.path.spline)
-                        else None
-                    )
+                    by_site = _site_prices(best)
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
         return plan_of_solution(job, best, made, method="optimal", corner=corner, prices=prices)
+
+    def _again(self, job: Job) -> Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]:
+        """The motion of another problem on the same grid, None if there is none."""
+
+        def again(planned: OnPath, problem: FeedrateProblem) -> tuple[OnPath, Motion] | None:
+            other = dataclasses.replace(planned, problem=problem, solution=self.solver.solve(problem))
+            if not other.solution.solved:
+                return None
+            return within_limits(other, self.solver.solve, job.toolpath, job.machine)
+
+        return again
 
     def _on_path(self, path: SmoothPath, machine: Machine, stages: Stages, finer: float = 1.0) -> OnPath:
         """The time-optimal motion on a path, on a grid of `finer` times the usual resolution."""
@@ -103,7 +120,16 @@ class OptimalMethod(Method):
             )
         with stages.stage("solve") as report:
             samples = refine_for_jerk(samples, machine)
-            problem = feedrate_problem(samples, machine)
+            problem = feedrate_problem(samples, machine, measured=True)
             return OnPath(
                 path=path, samples=samples, problem=problem, solution=self.solver.solve(problem, report)
             )
+
+
+def _site_prices(planned: OnPath) -> SitePrices | None:
+    """What the tube of a path's splines costs; None where it has none."""
+    shape = planned.shape
+    if shape is None or not len(planned.path.spline):
+        return None
+    now, wider = (tube_prices(planned, shape, more) for more in (0.0, MORE_TOLERANCE))
+    return SitePrices(place=shape.laid.place, now=now, wider=wider)

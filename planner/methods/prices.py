@@ -2,98 +2,63 @@
 
 The solver's multipliers price what is directly in the feedrate problem: axis limits and programmed feed (feedrate/lagrangian.py). The
 tolerance works through the path: more of it makes corners larger. So do accelerations, the other way: the more a corner could use,
-the more of its budget is set aside for the chord error that goes with it (eq. (20)). Therefore
+the more of its budget is set aside for the chord error that goes with it (eq. (20)); both in methods/corner_prices.py.
 
-1. every corner is grown to scale by a little, its legs giving way, and the Lagrangian on the corresponding grid tells what that does
-   to the time: dT/d(size) of each corner, from one evaluation of the path, or two where it has arcs;
-2. the multipliers of the chord (and filter) error bounds are dT/d(ln budget) of each corner;
-3. the path is rounded again with a little more tolerance, or acceleration; by how much that changes sizes and budgets, shared legs
-   included, times 1. and 2. is the price.
-
-No problem is solved again. All prices are derivatives at the plan, of the optimum on its grid; what they leave out is that
-a corner may soon hit another limit, and the slowing down before delivery (methods/optimal.py, 1e-3 and less). Where two limits hold
-together and both must give (equal axes at 45 degrees) the time has a kink and the price is a slope between the left one and the right
-one. The programmed feed's price is that of more feed.
-
-Growing to scale is what Bezier corners do. Corner shapes that limits and filters design ("fir", "kinematic") bend while they grow:
-there acceleration and jerk are priced with the shape as it is, and the tolerance to within 10 % (kinematic) or a third (fir).
+Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with the corners, the splines
+and the `limit_scale` that it has (methods/slowing.py). Where two limits hold together and both must give (equal axes at 45 degrees)
+the time has a kink and the price is a slope between the left one and the right one. Prices of the programmed feed and of axis
+velocities are those of more of them: where both are equal, neither alone is worth anything.
 
 Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of reshaping (methods/reshape.py)
-from the present shape gives dT/d(tolerance) at every site as a multiplier, added up at the nearest joint of the program. They are those
-of an optimum that the plan has not quite reached: 10 to 25 % above what plans made again gained by 1 to 10 um more (pentagon, zig-zag,
-spiral, relief). Accelerations are priced with the path as it is.
+from the present shape gives dT/d(tolerance) at every site as a multiplier, added up at the nearest joint of the program. Accelerations
+are priced with the path as it is.
 
-**Finite changes.** 10 um are a fifth to a whole of usual tolerances, too much for a derivative alone. What accelerations let through
-a corner goes with the root of its size, so savings by tolerance are extrapolated as roots,
-
-    saved = -dT/dtol 2 tol (sqrt(1 + more/tol) - 1),
-
-those by limits in the logarithm of the limit. Against plans made again, for 10 um at each of 40 corners of five jobs: mostly within
-10 % at a tolerance of 50 um; mostly within 15 % at 10 um, where three corners soon hit another limit and saved two thirds of it.
-All corners together are less certain where they share short legs, since every change of sizes there soon meets another corner. On eight
-programs and excerpts of 15 to 300 blocks, at 50 and 20 um, what 10 um save was foretold within 15 % where it was more than 1 % of the
-time (zig-zag), and within 0.2 % of the time on all others but one (KB-850, 0.5 and 1.2 %); on the two looked at closer (tiger, relief)
-the price itself held for 1 um. Rounding the path again with all of the 10 um, and going by the roots of the sizes found, was better on
-some of them and worse on others.
+**Finite changes.** Ten per cent of a limit and 10 um of tolerance are a long way. What they save is found by solving again
+(methods/savings.py), on rounded corners to within a few per cent, on splines between a least and a most. For the tolerance of splines
+these are the multipliers of two rounds, one in the tube as it is and one in the wider tube, times the 10 um: a round's problem is
+convex, so its optimum falls ever less steeply. A plan made again finds another shape, too, and ends a little faster or slower for no
+other reason: by `UNREST`. Where least and most are so far apart that their middle may be off by more than `HINT` of itself and more
+than `HINT_LEAST` of the time, the saving is no more than a hint.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
-from planner.constraints.assemble import feedrate_problem, interval_sides
+from planner.arrays import FloatArray
+from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
-from planner.corners.smooth import SmoothPath, round_corners
+from planner.corners.smooth import SmoothPath
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
-from planner.path import PathSamples, moved_grid
-from planner.path_rows import FREE_PART_MIN
+from planner.methods.corner_prices import (
+    DEAREST,
+    MORE_TOLERANCE,
+    SAVED_MIN,
+    STEP,
+    CornerPrices,
+    DearCorners,
+    corner_prices,
+    sums,
+)
+from planner.methods.savings import Change, Thinned, more_of, thinned
+from planner.path import PathSamples
 
-MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
-MORE_TOLERANCE = 0.01  # ... and for so much more tolerance [mm]
-DEAREST = 10  # corners that are listed
-SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
-STEP = 1e-4  # relative steps of differences [-]: far above rounding, far below what bends a curve ...
-STEP_OF_LEG = 1e-2  # ... and at most this share of the free part of a leg [-]
-CANDIDATES = 30  # corners whose own price is looked at
-# Joints on either side of a corner whose sizes it can change: neighbours share legs, one more in each round (corners/sharing.py).
-REACH = 12
-TIGHT = 1e-3  # legs with a smaller free share are shared by their corners, to rounding of that sharing [-]
-BUDGETS = ("chord_error", "filter_error")  # bounds in proportion to what the rounding leaves of the tolerance
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class DearCorners:
-    """The corners where more tolerance saves most, the dearest first.
-
-    line     : (C,) source line of the block that ends there
-    position : (C, A) vertex [mm]
-    theta    : (C,) turning angle [rad]
-    price    : (C,) dT/d(tolerance at that corner alone) [s/mm]
-    saved    : (C,) by `MORE_TOLERANCE` there [s]
-    """
-
-    line: Array
-    position: FloatArray
-    theta: FloatArray
-    price: FloatArray
-    saved: FloatArray
-
-    def __post_init__(self) -> None:
-        corners = len(self.line)
-        freeze(self, "line", np.int32, (corners,))
-        freeze(self, "position", np.float64, (corners, None))
-        for name in ("theta", "price", "saved"):
-            freeze(self, name, np.float64, (corners,))
-
-    def __len__(self) -> int:
-        return len(self.line)
+MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-]
+WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
+HINT, HINT_LEAST = (
+    0.15,
+    1e-4,
+)  # how far a saving may be off and still be told as a number [-, share of the time]
+# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]; with 1e-4 more or less of the
+# tolerance up to 2.5e-4 (pentagon).
+UNREST = 5e-4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,6 +69,8 @@ class PriceList:
     feed      : dT/d(ln feed override) [s]
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known: on splines that nothing priced
     saved     : by `MORE_LIMIT` more of each axis limit and of the "feed", by `MORE_TOLERANCE` more "tolerance" if known [s]
+    ranges    : least and most that this may be in a plan made again [s]
+    hints     : what is told by its range only: `saved`, its middle, is no more than a hint
     corners   : the dearest ones; None where they are not known
     """
 
@@ -112,6 +79,8 @@ class PriceList:
     tolerance: float | None
     saved: dict[str, float]
     corners: DearCorners | None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    hints: tuple[str, ...] = ()
 
     def ranked(self) -> list[tuple[str, float]]:
         """What saves time, with the time saved by `MORE_LIMIT` or `MORE_TOLERANCE` more of it [s]; the most valuable first."""
@@ -119,16 +88,25 @@ class PriceList:
         return sorted(worth, key=lambda entry: -entry[1])
 
 
+class SitePrices(NamedTuple):
+    """What the tube of splines costs at J sites: `place` along the legs (J,) [mm], dT/d(tolerance) there now (J,) and with
+    `MORE_TOLERANCE` more (J,) [s/mm] (`reshape.tube_prices`)."""
+
+    place: FloatArray
+    now: FloatArray
+    wider: FloatArray
+
+
 def price_list(
     samples: PathSamples,
     problem: FeedrateProblem,
     solution: FeedrateSolution,
     machine: Machine,
-    by_site: tuple[FloatArray, FloatArray] | None = None,
+    by_site: SitePrices | None = None,
 ) -> PriceList:
     """The prices of a solution. Raises ValueError if its solver gives no multipliers.
 
-    by_site : for splines, places along the legs (J,) [mm] and dT/d(tolerance) there (J,) (`reshape.tube_prices`)
+    by_site : for splines
     """
     now = lagrangian(problem, solution)
     prices = solution.prices
@@ -140,31 +118,104 @@ def price_list(
     }
     direct = np.concatenate([prices.velocity, prices.acceleration, prices.jerk])
     by_share = {name: price * limit[name] for name, price in zip(limit, direct.tolist(), strict=True)}
-    by_share["feed"] = _by_feed(samples, problem, machine, now)  # these are dT/d(ln limit)
-    saved_by_tolerance: dict[str, float] = {}
-    tolerance = dear = None
+    changes = {name: Change(machine=more_of(machine, name)) for name in limit}
+    changes["feed"] = Change(machine=lambda share: machine, feed=lambda share: 1.0 + share)
+    speeds = ["feed", *(name for name in limit if name.startswith("velocity") and by_share[name] < 0.0)]
+    for name in speeds:  # these are dT/d(ln limit)
+        by_share[name] = _by_speed(samples, problem, now, changes[name])
+    dear, tolerance = None, None
+    corners: CornerPrices | None = None
     if by_site is not None:
-        together = _by_joint(samples.path, *by_site)
+        together = _by_joint(samples.path, by_site.place, by_site.now)
         tolerance = float(together.sum())
-        saved_by_tolerance["tolerance"] = float(_saved(tolerance, float(samples.path.tol.mean())))
-        dear = _dearest(samples.path, together)
+        wider = _by_joint(samples.path, by_site.place, by_site.wider)
+        dear = _dearest(samples.path, together, -0.5 * MORE_TOLERANCE * (together + wider))
     elif isinstance(samples.path, SmoothPath) and not len(samples.path.spline):
-        corners = _corners(samples.path, samples, problem, solution, machine, now)
+        corners = corner_prices(samples.path, samples, problem, solution, machine, now)
         for axis in problem.axes:
             by_share[f"acceleration.{axis}"] += corners.by_acceleration(axis)
         together = corners.by_tolerance()
         tolerance = float(together.sum()) + corners.between()
-        mean = float(samples.path.toolpath.tolerance.mean())
-        saved_by_tolerance["tolerance"] = float(_saved(tolerance, mean))
         dear = corners.dearest(together)
-    more = float(np.log1p(MORE_LIMIT))
+        changes["tolerance"] = Change(
+            machine=lambda share: machine, tolerance=lambda share: share * MORE_TOLERANCE
+        )
+    found = _Savings(samples, problem, solution, machine, changes, speeds, now).all(by_share, tolerance)
+    if by_site is not None:
+        found["tolerance"] = Saving(*sorted(-MORE_TOLERANCE * float(x.sum()) for x in by_site[1:]))
+    unrest = 0.0 if corners is not None else UNREST * solution.cycle_time
+    found = {name: saving.widened(unrest) for name, saving in found.items()}
+    most = solution.cycle_time * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
+    found = {name: saving if name == "tolerance" else saving.below(most) for name, saving in found.items()}
     return PriceList(
         limits={name: by_share[name] / limit[name] for name in limit},
         feed=by_share["feed"],
         tolerance=tolerance,
-        saved={name: -more * price for name, price in by_share.items()} | saved_by_tolerance,
+        saved={name: saving.middle for name, saving in found.items()},
         corners=dear,
+        ranges={name: (saving.least, saving.most) for name, saving in found.items()},
+        hints=tuple(name for name, saving in found.items() if saving.vague(solution.cycle_time)),
     )
+
+
+class Saving(NamedTuple):
+    """What is saved, between a least and a most [s]."""
+
+    least: float
+    most: float
+
+    @property
+    def middle(self) -> float:
+        return 0.5 * (self.least + self.most)
+
+    def widened(self, by: float) -> Saving:
+        return Saving(self.least - by, self.most + by)
+
+    def below(self, bound: float) -> Saving:
+        return Saving(min(self.least, bound), min(self.most, bound))
+
+    def vague(self, cycle_time: float) -> bool:
+        """True if its middle may be off by more than a number that is told."""
+        return 0.5 * (self.most - self.least) > max(HINT * abs(self.middle), HINT_LEAST * cycle_time)
+
+
+@dataclass(frozen=True, eq=False)
+class _Savings:
+    """What more of everything saves (methods/savings.py)."""
+
+    samples: PathSamples
+    problem: FeedrateProblem
+    solution: FeedrateSolution
+    machine: Machine
+    changes: dict[str, Change]
+    speeds: list[str]
+    now: Lagrangian
+
+    def all(self, by_share: dict[str, float], tolerance: float | None) -> dict[str, Saving]:
+        """Of `MORE_LIMIT` more of every limit, and of `MORE_TOLERANCE` more tolerance where that is a change of corners; from the
+        prices dT/d(ln limit) and dT/d(tolerance)."""
+        slope = by_share | ({"tolerance": MORE_TOLERANCE * tolerance} if "tolerance" in self.changes else {})
+        straight = {name: self._straight(name, price) for name, price in slope.items()}
+        worth = [name for name in slope if abs(straight[name]) >= WORTH * self.solution.cycle_time]
+        part: Thinned | None = None
+        if worth:
+            part = thinned(self.samples, self.problem, self.solution, self.machine, len(worth))
+        found = {name: Saving(*sorted((0.0, most))) for name, most in straight.items()}
+        for name in worth if part is not None else ():
+            solved = part.saves(self.changes[name], 1.0 if name == "tolerance" else MORE_LIMIT, slope[name])
+            if solved is not None:
+                other = solved if part.rounds_again and not part.sampled else straight[name]
+                found[name] = Saving(*sorted((solved, other)))
+        return found
+
+    def _straight(self, name: str, price: float) -> float:
+        """What a straight line foretells [s]: in one over the limit, in the tolerance."""
+        if name == "tolerance":
+            return -price
+        if name not in self.speeds:
+            return -price * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
+        more = _bounds(self.samples, self.changes[name], MORE_LIMIT)
+        return -2.0 * float(self.now.feed_sq_max @ (1.0 - np.sqrt(self.problem.feed_sq_max / more)))
 
 
 def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatArray:
@@ -172,12 +223,11 @@ def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatAr
     joints = np.concatenate([[0.0], np.cumsum(path.legs.length)])
     inner = np.flatnonzero(path.joint != Joint.STOP)
     middles = (joints[inner[1:]] + joints[inner[:-1]]) / 2.0
-    return _sums(inner[np.searchsorted(middles, place)], price, len(joints))
+    return sums(inner[np.searchsorted(middles, place)], price, len(joints))
 
 
-def _dearest(path: SmoothPath, price: FloatArray) -> DearCorners:
-    """The dearest joints of a spline, of prices (R+1,)."""
-    saved = np.asarray(_saved(price, path.tol))
+def _dearest(path: SmoothPath, price: FloatArray, saved: FloatArray) -> DearCorners:
+    """The dearest joints of a spline, of prices (R+1,) and what more tolerance saves there (R+1,)."""
     best = np.argsort(-saved, kind="stable")[:DEAREST]
     best = best[saved[best] >= SAVED_MIN]
     at = path.legs.first[best]
@@ -191,158 +241,15 @@ def _dearest(path: SmoothPath, price: FloatArray) -> DearCorners:
     )
 
 
-def _saved(price: FloatArray | float, tol: FloatArray | float) -> FloatArray | float:
-    """Seconds that `MORE_TOLERANCE` saves (module text)."""
-    return -2.0 * price * tol * (np.sqrt(1.0 + MORE_TOLERANCE / tol) - 1.0)
-
-
-def _by_feed(samples: PathSamples, problem: FeedrateProblem, machine: Machine, now: Lagrangian) -> float:
-    """dT/d(ln feed override) [s] for more feed: where the feed and another bound are equal, it is the other one that stays."""
-    toolpath = samples.path.toolpath
-    faster = dataclasses.replace(toolpath, feed=toolpath.feed * (1.0 + STEP))
-    there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=faster))
-    gained = np.log(feedrate_problem(there, machine).feed_sq_max / problem.feed_sq_max)
+def _by_speed(samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change) -> float:
+    """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the other one that stays."""
+    gained = np.log(_bounds(samples, change, STEP) / problem.feed_sq_max)
     return float(now.feed_sq_max @ gained) / STEP
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Corners:
-    """What the R+1 corners of a path do to the time: size (R+1,) dT/d(d) [s/mm], budget (R+1,) dT/d(ln budget) [s], and
-    segment (M,), the same of the budgets of segments between corners."""
-
-    path: SmoothPath
-    machine: Machine
-    size: FloatArray
-    budget: FloatArray
-    segment: FloatArray
-
-    def by_acceleration(self, axis: str) -> float:
-        """dT/d(ln acceleration) of an axis as far as it works through the corners' sizes and budgets [s]."""
-        limits = self.machine.axes[axis]
-        more = limits.model_copy(update={"acceleration": limits.acceleration * (1.0 + STEP)})
-        machine = self.machine.model_copy(update={"axes": self.machine.axes | {axis: more}})
-        return float(self._change(machine, self.path.toolpath.tolerance).sum()) / STEP
-
-    def by_tolerance(self) -> FloatArray:
-        """(R+1,) what each corner adds to dT/d(tolerance of all corners) [s/mm]; the segments between them add `between`."""
-        before = self.path.toolpath.tolerance
-        step = STEP * float(before.mean())
-        return self._change(self.machine, before + step) / step
-
-    def between(self) -> float:
-        """dT/d(tolerance) by the error bounds of the segments between the corners [s/mm]."""
-        tolerance = self.path.toolpath.tolerance
-        return float((self.segment / np.minimum(tolerance[:-1], tolerance[1:])).sum())
-
-    def dearest(self, together: FloatArray) -> DearCorners:
-        """Prices of single corners; of those that share a leg only the `CANDIDATES` that look dearest when the tolerance of all is
-        raised `together`."""
-        toolpath, at = self.path.toolpath, self.path.legs.first
-        joint = np.argsort(-np.asarray(_saved(together, self.path.tol)), kind="stable")[:CANDIDATES]
-        joint = np.sort(joint[together[joint] < 0.0])
-        price = together[joint]
-        step = STEP * toolpath.tolerance[at]
-        shared = np.flatnonzero(self._shares_leg()[joint])
-        for batch in _apart(joint, shared):
-            tolerance = toolpath.tolerance.copy()
-            tolerance[at[joint[batch]]] += step[joint[batch]]
-            change = self._change(self.machine, tolerance)
-            for k in batch:
-                near = slice(max(joint[k] - REACH, 0), joint[k] + REACH + 1)
-                price[k] = change[near].sum() / step[joint[k]]
-        saved = np.asarray(_saved(price, self.path.tol[joint]))
-        best = np.argsort(-saved, kind="stable")[:DEAREST]
-        best = best[saved[best] >= SAVED_MIN]
-        joint = joint[best]
-        return DearCorners(
-            line=toolpath.line[at[joint] - 1],
-            position=toolpath.end[at[joint] - 1],
-            theta=self.path.theta[joint],
-            price=price[best],
-            saved=saved[best],
-        )
-
-    def _shares_leg(self) -> Array:
-        """(R+1,) True for the corners that can take something from a neighbour: a leg beside them has next to nothing free."""
-        path = self.path
-        tight = path.legs.length - path.d_out[:-1] - path.d_in[1:] < TIGHT * path.legs.length
-        return np.append(tight, False) | np.insert(tight, 0, False)
-
-    def _change(self, machine: Machine, tolerance: FloatArray) -> FloatArray:
-        """(R+1,) change of the time by every corner if the path is rounded for another machine and another tolerance (M+1,) [s]."""
-        path = self.path
-        toolpath = dataclasses.replace(path.toolpath, tolerance=tolerance)
-        new = round_corners(toolpath, machine, path.corner, blend_tangents=True)
-        budgets = np.log((new.tol - new.tol_ap) / (path.tol - path.tol_ap))
-        return self.size * (new.d - path.d) + self.budget * budgets
-
-
-def _apart(joint: Array, shared: Array) -> list[list[int]]:
-    """Indices `shared` into ascending joints, in batches whose members change nothing at one another's corners."""
-    batches: list[list[int]] = []
-    for k in shared:
-        for batch in batches:
-            if joint[k] - joint[batch[-1]] > 2 * REACH:
-                batch.append(int(k))
-                break
-        else:
-            batches.append([int(k)])
-    return batches
-
-
-def _corners(
-    path: SmoothPath,
-    samples: PathSamples,
-    problem: FeedrateProblem,
-    solution: FeedrateSolution,
-    machine: Machine,
-    now: Lagrangian,
-) -> _Corners:
-    """Grow every corner a little (module text, 1.), and sort the multipliers of the error bounds by corner (2.)."""
-    joints = np.arange(len(path.d))
-    corner, leg = samples.element < 0, np.maximum(samples.element, 0)
-    growth, total = _growth(path), np.zeros(len(joints))
-    # Between straight legs it does not matter at which end a leg gives way; on arcs the ends differ, and take turns.
-    turns = (joints % 2 == 0, joints % 2 == 1) if path.legs.table["round"].any() else (joints >= 0,)
-    for own in turns:
-        by = np.where(own, growth, 0.0)
-        grown = dataclasses.replace(path, stretch=path.stretch * (1.0 + by)[:, None])
-        moved = feedrate_problem(moved_grid(samples, grown), machine)
-        there = lagrangian(dataclasses.replace(moved, limit_scale=problem.limit_scale), solution)
-        change = there.value - now.value
-        total += _sums(~samples.element[corner], change[corner], len(joints))
-        on_leg = _sums(leg[~corner], change[~corner], len(joints) - 1)
-        first, second = by[:-1] * path.d_out[:-1], by[1:] * path.d_in[1:]
-        share = np.divide(first, first + second, out=np.zeros(len(first)), where=first + second > 0)
-        total[:-1] += share * on_leg
-        total[1:] += (1.0 - share) * on_leg
-    # A bound of an error belongs to the interval on its right if that is in a corner, else to the one on its left.
-    left, right = interval_sides(samples)
-    side = np.where(corner[right], right, left)
-    names = [k for k, name in enumerate(problem.bound_names) if name in BUDGETS]
-    of_budget = np.where(np.isin(problem.feed_sq_bound, names), now.feed_sq_max, 0.0)
-    inside = corner[side]
-    return _Corners(
-        path=path,
-        machine=machine,
-        size=np.divide(total, growth * path.d, out=np.zeros(len(joints)), where=path.d > 0),
-        budget=_sums(~samples.element[side[inside]], of_budget[inside], len(joints)),
-        segment=_sums(samples.segment[side[~inside]], of_budget[~inside], len(path.toolpath)),
-    )
-
-
-def _growth(path: SmoothPath) -> FloatArray:
-    """(R+1,) by what share to grow the corners, less where the legs have next to nothing to give; legs without a free part do not
-    count, their corners grow over each other."""
-    taken = path.d_out[:-1] + path.d_in[1:]
-    free = path.legs.length - taken
-    gives = (free > FREE_PART_MIN * path.legs.length) & (taken > 0)
-    most = np.divide(STEP_OF_LEG * free, taken, out=np.full(len(free), STEP), where=gives)
-    beside = np.full((2, len(path.d)), STEP)
-    beside[0, :-1], beside[1, 1:] = most, most
-    return np.minimum(beside.min(axis=0), STEP)
-
-
-def _sums(index: Array, values: FloatArray, count: int) -> FloatArray:
-    """Sums of values by their index."""
-    return np.bincount(index, values, count).astype(np.float64)
+def _bounds(samples: PathSamples, change: Change, share: float) -> FloatArray:
+    """(P,) bounds of feed^2 with a share more feed or axis velocity [mm2/s2]."""
+    toolpath = samples.path.toolpath
+    faster = dataclasses.replace(toolpath, feed=toolpath.feed * change.feed(share))
+    there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=faster))
+    return feedrate_problem(there, change.machine(share)).feed_sq_max

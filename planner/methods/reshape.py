@@ -152,10 +152,12 @@ def _reshape(
     return _chosen(shape, new, good & ~cusps(new.laid)), -multiplier / used
 
 
-def tube_prices(planned: OnPath, shape: SplineShape) -> FloatArray:
-    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube in a round from the present shape."""
+def tube_prices(planned: OnPath, shape: SplineShape, more: float = 0.0) -> FloatArray:
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube, so much wider [mm], in a round from the present shape."""
     H, Q = price_bands(planned, shape)
-    _, prices = _reshape(planned, shape, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
+    guide = shape.guide._replace(tol=shape.guide.tol + more, tol_chord=shape.guide.tol_chord + more)
+    wider = dataclasses.replace(shape, guide=guide, used=shape.used + more, left=shape.left + more)
+    _, prices = _reshape(planned, wider, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
     return prices
 
 

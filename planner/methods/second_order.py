@@ -13,10 +13,10 @@ from planner.path import PathSamples
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
     """Solve, add the points where the profile switches on straight stretches, and solve again; a failure is the solution's status."""
-    problem = feedrate_problem(samples, machine)
+    problem = feedrate_problem(samples, machine, measured=True)
     solution = solver.solve(problem)
     if solution.solved:
         samples = add_switching_points(samples, problem, solution, machine)
-        problem = feedrate_problem(samples, machine)
+        problem = feedrate_problem(samples, machine, measured=True)
         solution = solver.solve(problem)
     return OnPath(path=path, samples=samples, problem=problem, solution=solution)

@@ -38,7 +38,9 @@ class StopMethod(Method):
         except NotSolvedError as fault:
             status, sentence = Status.NUMERICAL_ERROR, str(fault)
         else:
-            made = job.deliver(Motion(samples=samples, law=law_of_phases(samples, duration, jerk)))
+            made = job.deliver(
+                job.behind_filters(Motion(samples=samples, law=law_of_phases(samples, duration, jerk)))
+            )
         return job.plan(
             made,
             method="stop",

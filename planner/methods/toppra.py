@@ -9,11 +9,13 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
+from planner.methods.creeping import within_filters
 from planner.methods.geometry import AUTO
 from planner.methods.job import Job, Method
 from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
@@ -40,6 +42,8 @@ class ToppraMethod(Method):
     solver: str | FeedrateSolver = "reachability"
     rounds: int | None = None
 
+    ways = ((0.5, 1.0), (0.1, 1.0))
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
@@ -62,5 +66,16 @@ class ToppraMethod(Method):
         motion = made = None
         if best.solution.solved:
             motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
+
+            def again(planned: OnPath, problem: FeedrateProblem) -> tuple[OnPath, Motion] | None:
+                other = dataclasses.replace(planned, problem=problem, solution=solver.solve(problem))
+                if not other.solution.solved:
+                    return None
+                return other, Motion(
+                    samples=other.samples, law=law_of_solution(other.samples, other.solution)
+                )
+
+            with job.stage("filters"):
+                best, motion = within_filters(best, motion, again, job.real)
             made = job.deliver(motion, not_limited=("jerk",))
         return plan_of_solution(job, best, made, method="toppra", corner=self.corner)

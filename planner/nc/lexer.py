@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
+from planner.kernels import njit
 
 # The longest source line [bytes]. RS274NGC stops at 255; programs with long comments exist, a line beyond this is not a program's.
 LINE_MAX = 4096

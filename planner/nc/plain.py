@@ -9,8 +9,8 @@ interpreter, which says what is wrong.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from planner.kernels import njit
 from planner.nc.block import NUMBER_MAX
 from planner.nc.codes import LETTERS_REFUSED
 from planner.nc.lexer import Words

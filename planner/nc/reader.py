@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from planner.errors import InputError
+from planner.files import require_ending
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none
@@ -60,11 +61,14 @@ def interpret(
 def load(path: str | Path) -> bytes:
     """The bytes of a program file. Raises InputError if there is no such file or it cannot be read."""
     try:
+        require_ending(path)
         return Path(path).read_bytes()
     except FileNotFoundError as fault:
         raise InputError("program file not found", source=str(path)) from fault
     except IsADirectoryError as fault:
         raise InputError("this is a directory; give the program file", source=str(path)) from fault
+    except InputError:
+        raise
     except (OSError, ValueError) as fault:
         raise InputError(f"program file cannot be read: {fault}", source=str(path)) from fault
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ from rich.text import Text
 from planner.errors import InputError
 from planner.machine import LINEAR_AXES
 from planner.report.export import summary, verdict_summary, versions
-from planner.report.replace import replacing_file
+from planner.report.replace import check_file, replacing_file, starts_with
 from planner.report.tables import ratio_text
 from planner.units import MICROMETRE
 
@@ -200,19 +201,25 @@ def comparison_csv(rows: list[Row]) -> str:
     return out.getvalue()
 
 
-def check_place(path: Path) -> None:
-    """Raise InputError for another suffix than .json and .csv, or a place that is no file in a directory."""
+def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+    """Raise InputError for another suffix than .json and .csv, or a place that is no file in a directory; for one of the inputs; for a
+    file that no comparison wrote, unless `force` is set."""
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
-    if path.is_dir():
-        raise InputError("cannot be written: is a directory", source=str(path))
-    if path.parent.exists() and not path.parent.is_dir():
-        raise InputError(f"cannot be written: {path.parent} is no directory", source=str(path))
+    check_file(path, inputs, _is_comparison, force=force)
+
+
+def _is_comparison(path: Path) -> bool:
+    if path.suffix == ".csv":
+        return starts_with(path, comparison_csv([]).rstrip())
+    try:
+        return {"best", "methods", "versions"} <= set(json.loads(path.read_bytes()))
+    except (ValueError, RecursionError, TypeError):
+        return False
 
 
 def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None:
     """Write the comparison as JSON or CSV, the whole file or none of it. Raises InputError where it cannot be written."""
-    check_place(path)
     text = comparison_csv(rows) if path.suffix == ".csv" else _json(comparison_dict(rows, about))
     with replacing_file(path) as new:
         new.write_text(text, encoding="utf-8")

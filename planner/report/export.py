@@ -13,7 +13,8 @@ import json
 import math
 import platform
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from planner.arrays import FloatArray
 from planner.errors import InputError
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program
-from planner.report.replace import LAST, replacing
+from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
 if TYPE_CHECKING:
@@ -32,19 +33,25 @@ if TYPE_CHECKING:
     from planner.nc.info import ProgramInfo
     from planner.verify import Verdict
 
-SUMMARY = LAST
 PLANNED = "planned.ngc"
 PACKAGES = ("numpy", "scipy", "numba", "toppra", "ruckig", "pyarrow")
 
 
 def write_plan(
-    plan: Plan, directory: str | Path, *, file_format: Format = "parquet", plots: bool = False
+    plan: Plan,
+    directory: str | Path,
+    *,
+    file_format: Format = "parquet",
+    plots: bool = False,
+    force: bool = False,
 ) -> list[str]:
     """Write the files of a solved plan into `directory`, all or nothing; return their names.
 
+    force : replace files of these names that no run wrote, too
+
     What is left out, and why, is among the `notes` of the summary, behind those of the plan.
 
-    Raises InputError if the directory cannot be written.
+    Raises InputError if the directory cannot be written, or if a file stands in the way that no run wrote.
     """
     if plan.trajectory is None:
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
@@ -52,26 +59,40 @@ def write_plan(
     run_id = uuid.uuid4().hex
     program, notes = _planned(plan, directory)
     kept = {PLANNED} if _is_source(plan, directory / PLANNED) else set()
-    try:
-        with replacing(directory, [name for name in _previous(directory) if name not in kept]) as new:
-            about = trajectory_metadata(plan, run_id)
-            write_trajectory(new / f"trajectory.{file_format}", plan.trajectory, about)
-            if program is not None:
-                (new / PLANNED).write_bytes(program)
-            if plots:
-                from planner.report.plots import write_figures
+    with replacing(directory, kept=kept, force=force) as new:
+        about = trajectory_metadata(plan, run_id)
+        write_trajectory(new / f"trajectory.{file_format}", plan.trajectory, about)
+        if program is not None:
+            (new / PLANNED).write_bytes(program)
+        if plots:
+            from planner.report.plots import write_figures
 
-                write_figures(plan, new)
-            names = sorted([SUMMARY, *(file.name for file in new.iterdir())])
-            _write_json(
-                new / SUMMARY,
-                {**summary(plan), "run_id": run_id, "files": names, "notes": [*plan.notes, *notes]},
-            )
-    except OSError as fault:
-        raise InputError(
-            f"cannot be written: {fault.strerror or fault}; what was there stays", source=str(directory)
-        ) from fault
+            write_figures(plan, new)
+        sums = checksums(new)
+        names = sorted([SUMMARY, *sums])
+        said = {
+            **summary(plan),
+            "run_id": run_id,
+            "files": names,
+            "sha256": sums,
+            "notes": [*plan.notes, *notes],
+        }
+        _write_json(new / SUMMARY, said)
     return names
+
+
+def check_places(
+    directory: Path, inputs: Sequence[Path], *, file_format: Format, plots: bool, force: bool
+) -> None:
+    """Raise InputError if `write_plan` could not write into `directory`: one of its files is among the `inputs`, program and machine,
+    or stands there and no run wrote it. A `planned.ngc` that is the program stays as it is, and is no reason."""
+    names = [f"trajectory.{file_format}", SUMMARY]
+    names += [CSV_METADATA] * (file_format == "csv") + ["toolpath.png", "profiles.png"] * plots
+    refuse_inputs([directory / name for name in names], inputs)
+    with suppress(InputError):
+        refuse_inputs([directory / PLANNED], inputs[:1])
+        names.append(PLANNED)
+    check_output(directory, names, force=force)
 
 
 def summary(plan: Plan) -> dict[str, Any]:
@@ -169,15 +190,6 @@ def _is_source(plan: Plan, file: Path) -> bool:
 def _uniform(tolerance: FloatArray) -> float | None:
     """The contour tolerance if it is the same at every joint; None where the program changes it (G64 P)."""
     return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
-
-
-def _previous(directory: Path) -> list[str]:
-    """Names of the files an earlier run wrote into `directory`, by its summary; none if there is none."""
-    try:
-        named = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))["files"]
-        return [name for name in named if isinstance(name, str) and Path(name).name == name]
-    except (OSError, ValueError, KeyError, TypeError):
-        return []
 
 
 def _plain(value: Any) -> Any:

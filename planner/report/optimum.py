@@ -21,6 +21,7 @@ SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in 
 MILLISECOND = 1e-3  # [s]
 OTHERS = "others"
 NOTHING = "nothing"
+HINT = "no more than a hint"
 
 
 def held_by_text(grid: GridHistory) -> str:
@@ -39,15 +40,19 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
     from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE
 
     least = SAVED_SHOWN * cycle_time
-    worth = [
-        f"{name} {saved:.3g} s" for name, saved in prices.ranked() if name != "tolerance" and saved >= least
-    ]
-    rows = [(f"{100.0 * MORE_LIMIT:g} % more saves", ", ".join(worth[:LIMITS_SHOWN]) or NOTHING)]
+    ranked = [name for name, saved in prices.ranked() if name != "tolerance" and saved >= least]
+    ranked = ranked[:LIMITS_SHOWN]
+    told = ", ".join(f"{name} {_seconds(prices, name)}" for name in ranked) or NOTHING
+    if set(ranked) & set(prices.hints):
+        told += f"; ranges are {HINT}"
+    rows = [(f"{100.0 * MORE_LIMIT:g} % more saves", told)]
     more = f"{MORE_TOLERANCE / MICROMETRE:g} µm more"
     if prices.tolerance is None:
         return [*rows, (f"{more} tolerance", "not known on this path")]
     saved = prices.saved["tolerance"]
-    if saved >= least:
+    if saved >= least and "tolerance" in prices.hints:
+        told = f"saves {_seconds(prices, 'tolerance')}, {HINT}"
+    elif saved >= least:
         told = f"saves {saved:.3g} s"
     elif saved <= -least:
         told = f"costs {-saved:.3g} s: on short legs corners take from each other"
@@ -59,6 +64,14 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
         by_line = ", ".join(f"{line}: {saved / MILLISECOND:.2g}" for line, saved in pairs)
         rows.append((f"{more} at line", f"saves, in ms, {by_line}"))
     return rows
+
+
+def _seconds(prices: PriceList, name: str) -> str:
+    """What more of a limit saves: a number, or a range where a number would say too much."""
+    if name not in prices.hints:
+        return f"{prices.saved[name]:.3g} s"
+    least, most = prices.ranges[name]
+    return f"{least:.2g} to {most:.2g} s"
 
 
 def optimum_summary(grid: GridHistory | None, prices: PriceList | None) -> dict[str, Any]:
@@ -80,6 +93,8 @@ def _price_summary(prices: PriceList) -> dict[str, Any]:
         "more_limit": MORE_LIMIT,
         "more_tolerance_mm": MORE_TOLERANCE,
         "saved_s": prices.saved,
+        "saved_range_s": {name: list(between) for name, between in prices.ranges.items()},
+        "hints": list(prices.hints),
         "corners": None
         if dear is None
         else [

@@ -9,6 +9,7 @@ appears as a whole: it is written beside its place, forced to disk and renamed.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,29 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.pulses import AxisPulses
-from planner.report.replace import replacing_file
+from planner.report.replace import check_file, replacing_file, starts_with
 
 SUFFIXES = (".parquet", ".csv")
+COLUMNS = ("t", "axis", "direction", "count", "line")
+
+
+def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+    """Raise InputError for another suffix than those of pulse files, one of the inputs, or a file that holds no pulses of ours, unless
+    `force` is set."""
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
+    check_file(path, inputs, _is_pulse_file, force=force)
+
+
+def _is_pulse_file(path: Path) -> bool:
+    from pyarrow import parquet
+
+    if path.suffix == ".csv":
+        return starts_with(path, ",".join(COLUMNS))
+    try:
+        return tuple(parquet.read_schema(path).names) == COLUMNS
+    except (OSError, ValueError):
+        return False
 
 
 def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:

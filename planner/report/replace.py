@@ -1,76 +1,115 @@
-"""A set of output files that appears as a whole: a kill at any moment leaves the old set or the new one.
+"""Output files that take their place when all of them are written, `summary.json` last.
 
-The files are first written into a hidden directory beside the output directory and forced to disk. Then
+The files of a run are written into a hidden directory inside the output directory and forced to disk. Then each is renamed into
+its place: the trajectory first, the rest, and `summary.json` last; files of the run before that the new one lacks (another format,
+no pictures) go in between. The output directory itself stays what it is: owner, group, mode, mount point.
 
-* a directory that does not exist yet is made by one rename;
-* an existing one is *exchanged* with the new one by one system call (Linux `renameat2`, RENAME_EXCHANGE).
-  Whatever else it holds is hard-linked into the new directory before, so that files that are not ours stay as
-  they are.
+A kill before the renames leaves the old set, after them the new one. A kill between two renames, which take a fraction of a
+millisecond, leaves files of two runs, each of them whole. That can be seen: the `run_id` of the trajectory is then not that of
+`summary.json`, or one of the two is missing.
 
-Either way one atomic step separates "all old" from "all new", and files of the old set that the new one
-lacks (another format, no pictures) go in the same step.
+Nothing is replaced or removed that a run did not write. `summary.json` names its files with their SHA-256; a file under one of the
+names of `OUTPUTS` whose content it vouches for is ours. Anything else stands in the way, unless the user says `--force`.
 
-Some directories cannot be exchanged: mount points, the current directory (the shell in it would be left in a
-deleted one), directories that hold directories (which cannot be hard-linked), systems other than Linux. There
-the files are renamed into place one by one, `summary.json` last. Each file is then still old or new as a
-whole; a kill in the fraction of a millisecond between two renames leaves files of two runs, whose `run_id`
-differ.
-
-A killed run leaves its hidden directory behind; the next run with the same output directory removes it. A
-file lock, which the kernel releases with the process, tells it from the directory of a run that is still at
-work.
+A lock on the output directory, which the kernel releases with the process, makes a second run into the same directory wait; a hidden
+directory found under the lock is the leftover of a killed run, and removed. Its `summary.json` vouches for files too: some of them may
+be in place already. Windows and file systems without such locks do without.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
+import hashlib
+import json
 import os
 import shutil
+import stat
 import sys
 import uuid
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from planner.errors import InputError
 
 if sys.platform != "win32":
     import fcntl
 
-LAST = "summary.json"  # renamed last where the directory cannot be exchanged: who finds it finds the rest
-_RENAME_EXCHANGE = 2  # linux/fs.h
-_AT_FDCWD = -100  # fcntl.h
+SUMMARY = "summary.json"
+CSV_METADATA = "trajectory.meta.json"
+OUTPUTS = (
+    CSV_METADATA,
+    "trajectory.parquet",
+    "trajectory.csv",
+    "trajectory.npz",
+    "planned.ngc",
+    "toolpath.png",
+    "profiles.png",
+    SUMMARY,
+)  # every name that a run may write, in the order in which they take their places
+HIDDEN = ".planner-" + 12 * "[0-9a-f]"  # pattern of the names of temporaries
+
+_undo: list[Callable[[], object]] = []  # what removes the temporaries of this process
+
+
+def remove_temporaries() -> None:
+    """Remove what is written only in part, before the process ends without unwinding."""
+    for step in reversed(_undo):
+        with contextlib.suppress(OSError):
+            step()
 
 
 @contextlib.contextmanager
-def replacing(directory: Path, previous: Collection[str] = ()) -> Iterator[Path]:
-    """Give an empty directory to write into; when the block ends well, its files take their place in
-    `directory`.
-
-    previous : names of files of an earlier set in `directory`, to vanish where the new set lacks them
-
-    After an exception `directory` is as before. Raises OSError where it cannot be written.
-    """
-    directory = directory.resolve()
-    directory.parent.mkdir(parents=True, exist_ok=True)
-    if directory.exists() and not directory.is_dir():
-        raise NotADirectoryError(20, "is a file, not a directory", str(directory))
-    exchangeable = _exchangeable(directory)
-    place, prefix = (
-        (directory.parent, f".{directory.name}.planner-") if exchangeable else (directory, ".planner-")
-    )
-    _remove_leftovers(place, prefix)
-    new, lock = _make_locked(place, prefix)
+def _undone(step: Callable[[], object]) -> Iterator[None]:
+    """Run `step` when the block ends, however it ends; an OSError of the step is passed over."""
+    _undo.append(step)
     try:
-        yield new
-        for file in new.iterdir():
-            _sync(file)
-        if not (exchangeable and _take_place(new, directory, previous)):
-            _rename_each(new, directory, previous)
+        yield
     finally:
-        shutil.rmtree(new, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
+        with contextlib.suppress(OSError):
+            step()
+        _undo.remove(step)
+
+
+@contextlib.contextmanager
+def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False) -> Iterator[Path]:
+    """Give an empty directory to write files into; when the block ends well, they take their places in `directory`.
+
+    kept  : files of the run before that stay, though the new one lacks them
+    force : replace files that no run wrote, too
+
+    One of the files is `summary.json`, with `checksums` of the others. After an exception in the block `directory` is as before.
+    Raises InputError if `directory` cannot be written, or if a file stands in the way that no run wrote.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            check_output(directory, (), force=force)
+            for missing in _missing(directory):
+                missing.mkdir(exist_ok=True)
+                stack.enter_context(_undone(missing.rmdir))  # goes only if it is empty
+            stack.enter_context(_locked(directory))
+            vouched = _vouched(directory)
+            for leftover in directory.glob(HIDDEN + "/"):
+                shutil.rmtree(leftover, ignore_errors=True)
+            new = directory / _hidden_name()
+            stack.enter_context(_undone(lambda: shutil.rmtree(new, ignore_errors=True)))
+            new.mkdir()
+        except OSError as fault:
+            raise _cannot_be_written(directory, fault) from fault
+        try:
+            yield new
+            for file in new.iterdir():
+                _sync(file)
+        except OSError as fault:
+            raise _cannot_be_written(directory, fault, "; what was there stays") from fault
+        names = sorted(os.listdir(new), key=OUTPUTS.index)
+        _refuse_foreign(directory, names, vouched, force)
+        stale = [
+            name
+            for name in OUTPUTS
+            if name not in names and name not in kept and _is_ours(directory / name, vouched)
+        ]
+        _take_places(new, directory, names, stale)
 
 
 @contextlib.contextmanager
@@ -79,114 +118,183 @@ def replacing_file(path: Path) -> Iterator[Path]:
 
     After an exception `path` is as before. Raises InputError where it cannot be written.
     """
-    new = path.with_name(f".{path.name}.planner-{uuid.uuid4().hex[:12]}")
+    new = path.with_name(_hidden_name() + path.suffix)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        yield new
-        _sync(new)
-        new.replace(path)
+        with _undone(new.unlink):
+            yield new
+            _sync(new)
+            os.replace(new, path)
     except OSError as fault:
-        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(path)) from fault
-    finally:
-        new.unlink(missing_ok=True)
+        raise _cannot_be_written(path, fault) from fault
 
 
-def _exchangeable(directory: Path) -> bool:
-    if not os.access(directory.parent, os.W_OK):
-        return False
-    if not directory.exists():
-        return True
-    here = Path.cwd()
-    if sys.platform != "linux" or directory.is_mount() or here == directory or directory in here.parents:
-        return False
-    return all(entry.is_symlink() or entry.is_file() for entry in list(os.scandir(directory)))
-
-
-def _take_place(new: Path, directory: Path, previous: Collection[str]) -> bool:
-    """Put `new` in the place of `directory` in one step; False, and nothing changed, if that fails."""
-    ours = {*previous, *os.listdir(new)}
+def check_output(directory: Path, names: Iterable[str], *, force: bool = False) -> None:
+    """Raise InputError if `directory` cannot be written, or a file of `names` in it was not written by a run and `force` is not set."""
     try:
-        if not directory.exists():
-            _sync(new)
-            new.rename(directory)
-        else:
-            for entry in list(os.scandir(directory)):
-                if entry.name not in ours:
-                    os.link(entry.path, new / entry.name, follow_symlinks=False)
-            shutil.copystat(directory, new)
-            _sync(new)
-            _exchange(new, directory)
+        if directory.exists() and not directory.is_dir():
+            raise InputError("cannot be written: is a file, not a directory", source=str(directory))
+        missing = _missing(directory)
+        there = missing[0].parent if missing else directory
+        if not os.access(there, os.W_OK):
+            raise InputError(f"cannot be written: no permission to write in {there}", source=str(directory))
+        _refuse_foreign(directory, names, _vouched(directory), force)
+    except OSError as fault:
+        raise _cannot_be_written(directory, fault) from fault
+
+
+def check_file(
+    path: Path, inputs: Iterable[Path], written_by_us: Callable[[Path], bool], *, force: bool = False
+) -> None:
+    """Raise InputError if `path` is a directory, an input, or there already without being ours and `force` is not set.
+
+    written_by_us : whether a file is one of the kind that we write
+    """
+    try:
+        if path.is_dir():
+            raise InputError("cannot be written: is a directory", source=str(path))
+        if path.parent.exists() and not path.parent.is_dir():
+            raise InputError(f"cannot be written: {path.parent} is no directory", source=str(path))
+        refuse_inputs([path], inputs)
+        if os.path.lexists(path) and not force and not (path.is_file() and written_by_us(path)):
+            raise InputError(
+                "was not written by planner, and is not overwritten; give another name, or --force",
+                source=str(path),
+            )
+    except OSError as fault:
+        raise _cannot_be_written(path, fault) from fault
+
+
+def starts_with(path: Path, line: str) -> bool:
+    """Whether that is the first line of a file."""
+    start = (line + "\n").encode()
+    with path.open("rb") as stream:
+        return stream.read(len(start)) == start
+
+
+def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Raise InputError if one of the files to write is one of those that are read."""
+    for output in outputs:
+        for given in inputs:
+            with contextlib.suppress(OSError):
+                if output.samefile(given):
+                    raise InputError(
+                        "is read as input and would be overwritten; write elsewhere", source=str(output)
+                    )
+
+
+def checksums(directory: Path) -> dict[str, str]:
+    """SHA-256 of every file of a directory, by name."""
+    return {file.name: _sha256(file) for file in sorted(directory.iterdir())}
+
+
+def _hidden_name() -> str:
+    return f".planner-{uuid.uuid4().hex[:12]}"
+
+
+def _missing(directory: Path) -> list[Path]:
+    """The directories to make for `directory` to exist, the outermost first."""
+    missing: list[Path] = []
+    place = directory.resolve()
+    while not place.exists():
+        missing.insert(0, place)
+        place = place.parent
+    return missing
+
+
+def _vouched(directory: Path) -> dict[str, set[str]]:
+    """The checksums of what runs wrote into `directory`, by name, as their summaries say."""
+    vouched: dict[str, set[str]] = {}
+    for file in (directory / SUMMARY, *directory.glob(f"{HIDDEN}/{SUMMARY}")):
+        for name, checksum in _recorded(file).items():
+            vouched.setdefault(name, set()).add(str(checksum))
+    return vouched
+
+
+def _recorded(summary: Path) -> dict[str, Any]:
+    """The checksums in a summary, with its own; none if it is not one that a run wrote."""
+    try:
+        said = json.loads(summary.read_bytes())
+        if isinstance(said["run_id"], str) and isinstance(said["sha256"], dict):
+            return {**said["sha256"], SUMMARY: _sha256(summary)}
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        pass
+    return {}
+
+
+def _is_ours(file: Path, vouched: dict[str, set[str]]) -> bool:
+    try:
+        return stat.S_ISREG(file.lstat().st_mode) and _sha256(file) in vouched.get(file.name, ())
     except OSError:
         return False
-    _sync(directory.parent)
-    if new.exists():  # now the old directory: what others put there since it was linked moves on
-        for entry in list(os.scandir(new)):
-            home = directory / entry.name
-            if entry.name not in ours and not (home.exists() and entry.inode() == home.lstat().st_ino):
-                os.replace(entry.path, home)
-    return True
 
 
-def _rename_each(new: Path, directory: Path, previous: Collection[str]) -> None:
-    names = sorted(os.listdir(new), key=lambda name: (name == LAST, name))
-    directory.mkdir(exist_ok=True)
+def _refuse_foreign(directory: Path, names: Iterable[str], vouched: dict[str, set[str]], force: bool) -> None:
     for name in names:
-        os.replace(new / name, directory / name)
-    for name in set(previous) - set(names):
-        (directory / name).unlink(missing_ok=True)
-    _sync(directory)
+        file = directory / name
+        if file.is_dir() and not file.is_symlink():
+            raise InputError("cannot be written: is a directory", source=str(file))
+        if not force and os.path.lexists(file) and not _is_ours(file, vouched):
+            raise InputError(
+                "was not written by planner, or changed since, and is not overwritten; give another directory, or --force",
+                source=str(file),
+            )
 
 
-def _exchange(a: Path, b: Path) -> None:
-    """Exchange two directory entries atomically. Raises OSError where kernel or file system cannot."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    if not hasattr(libc, "renameat2"):
-        raise OSError("this C library has no renameat2")
-    if libc.renameat2(_AT_FDCWD, os.fsencode(a), _AT_FDCWD, os.fsencode(b), _RENAME_EXCHANGE) != 0:
-        code = ctypes.get_errno()
-        raise OSError(code, os.strerror(code), str(b))
-
-
-def _make_locked(place: Path, prefix: str) -> tuple[Path, int | None]:
-    """Make and lock a new directory; once more if another run took it for a leftover in between."""
-    while True:
-        new = place / f"{prefix}{uuid.uuid4().hex[:12]}"
-        new.mkdir(parents=True)
-        if sys.platform == "win32":
-            return new, None
-        try:
-            lock = os.open(new, os.O_RDONLY)
-        except FileNotFoundError:
-            continue
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if new.exists():
-            return new, lock
-        os.close(lock)
-
-
-def _remove_leftovers(place: Path, prefix: str) -> None:
-    if sys.platform == "win32" or not place.is_dir():
-        return
-    for entry in place.iterdir():
-        if entry.name.startswith(prefix) and entry.is_dir() and not entry.is_symlink():
-            with contextlib.suppress(OSError):  # another user's, or gone by now
-                lock = os.open(entry, os.O_RDONLY)
-                try:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    shutil.rmtree(entry)
-                finally:
-                    os.close(lock)
-
-
-def _sync(path: Path) -> None:
-    """Force a file or directory to disk, as far as the system can."""
-    if sys.platform == "win32" and path.is_dir():
-        return
-    handle = os.open(path, os.O_RDONLY)
+def _take_places(new: Path, directory: Path, names: list[str], stale: list[str]) -> None:
+    changed = False
     try:
-        os.fsync(handle)
-    except OSError:  # file systems without fsync on directories
-        if not path.is_dir():
-            raise
+        for name in sorted({*names, *stale}, key=OUTPUTS.index):
+            if name == SUMMARY:
+                _sync_directory(directory)
+            if name in names:
+                os.replace(new / name, directory / name)
+            else:
+                (directory / name).unlink()
+            changed = True
+        _sync_directory(directory)
+    except OSError as fault:
+        said = "; it holds files of two runs now, which their run_id tells apart" if changed else ""
+        raise _cannot_be_written(directory, fault, said) from fault
+
+
+def _cannot_be_written(place: Path, fault: OSError, more: str = "") -> InputError:
+    return InputError(f"cannot be written: {fault.strerror or fault}{more}", source=str(place))
+
+
+def _sha256(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def _locked(directory: Path) -> Iterator[None]:
+    """Hold a lock on a directory, and wait until it is free."""
+    if sys.platform == "win32":
+        yield
+        return
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # file systems without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _sync(file: Path) -> None:
+    """Force a file to disk. Windows does so through handles that may write only."""
+    with file.open("r+b") as stream:
+        os.fsync(stream.fileno())
+
+
+def _sync_directory(directory: Path) -> None:
+    """Force the names in a directory to disk, where the system can."""
+    if sys.platform == "win32":
+        return
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # file systems without fsync on directories
+            os.fsync(handle)
     finally:
         os.close(handle)

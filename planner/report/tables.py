@@ -187,6 +187,9 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
     table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
     table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    if (after := verdict.after_filters) is not None:
+        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm))
+        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
     for mode in verdict.ringing:
         table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
@@ -252,3 +255,7 @@ def _pairs() -> Table:
 def _titled(title: str, *parts: RenderableType) -> Group:
     # not the table's own title, which is folded to the table's width
     return Group(Text(title, style="bold"), *parts)
+
+
+def _micrometres(error: float | None) -> str:
+    return "not known" if error is None else f"{error / MICROMETRE:.3f} µm"

@@ -27,6 +27,7 @@ import numpy as np
 
 from planner.arrays import Array, FloatArray
 from planner.errors import InputError
+from planner.files import require_ending
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.trajectory import Trajectory
 
@@ -136,10 +137,15 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
     if read is None:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(FORMATS)}", source=str(path))
     try:
+        require_ending(path)
         given, text = read(path)
         about = json.loads(text) if text else {}
+    except InputError:
+        raise
     except FileNotFoundError as fault:
         raise InputError("trajectory file not found", source=str(path)) from fault
+    except RecursionError:
+        raise InputError("cannot be read: its metadata are nested too deep", source=str(path)) from None
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
         raise InputError(f"cannot be read: {fault}", source=str(path)) from fault
     columns = {name: _numbers(path, name, column) for name, column in given.items()}
@@ -167,9 +173,10 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
-    with np.load(path, allow_pickle=False) as file:
-        if not isinstance(file, np.lib.npyio.NpzFile):
-            raise ValueError("a single array, not a .npz file")
+    file = np.load(path, allow_pickle=False)
+    if not isinstance(file, np.lib.npyio.NpzFile):
+        raise ValueError("a single array (.npy), not a .npz file")
+    with file:
         return {name: file[name] for name in file.files if name != "metadata"}, (
             str(file["metadata"]) if "metadata" in file.files else ""
         )

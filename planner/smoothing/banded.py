@@ -7,7 +7,8 @@ Inner loops run along whole rows, zeros included, so that a compiler makes vecto
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from planner.kernels import njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,8 @@ The polynomials come from the recursion of Cox and de Boor, carried out on polyn
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from planner.kernels import njit
 
 DEGREE = 5
 ORDER = DEGREE + 1

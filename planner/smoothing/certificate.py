@@ -9,8 +9,8 @@ on it because neighbouring pieces share their ends.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from planner.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER
 
 PARTS = 8  # into which a piece is cut if its bound is too large

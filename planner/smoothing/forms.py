@@ -13,8 +13,8 @@ g = |p_u|:  u' = v/g,  u'' = (a - g_u u'^2)/g,  u''' = (j - g_uu u'^3 - 3 g_u u'
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from planner.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)

@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array
 from planner.corners.smooth import SmoothPath
 from planner.geometry.legs import leg_point
+from planner.kernels import njit
 from planner.smoothing.runs import Runs
 
 SAGITTA = 0.01  # of chords on arcs [share of the tolerance]

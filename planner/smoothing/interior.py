@@ -17,8 +17,8 @@ method ends early, the path is less smooth than it could be and no less inside.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from planner.kernels import njit
 from planner.smoothing.banded import factorise, solve
 from planner.smoothing.basis import ORDER
 

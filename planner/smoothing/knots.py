@@ -12,7 +12,8 @@ by `GROWTH` of the distance from there, and stay below what a motion needs to bu
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from planner.kernels import njit
 
 # Control points on the path leave a corner by sin(theta/2) sqrt(h^2/2) sqrt(2/pi) = 0.28 theta h, so by 0.56 of the tolerance.
 FITTING = 2.0

@@ -15,9 +15,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
+from planner.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.guide import Guide
 from planner.smoothing.interior import site_distance

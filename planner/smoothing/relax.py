@@ -10,8 +10,8 @@ is too large, and relaxed again.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from planner.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.certificate import certify
 from planner.smoothing.forms import third_derivative_energy

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.corners.allocation import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
+from planner.kernels import njit
 from planner.machine import Machine
 from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
 from planner.smoothing.forms import third_derivative_forms

@@ -11,6 +11,7 @@ sharp each check is:
     contour.py    how far motion and path are apart, also where a motion was lost
     samples.py    periods, density and digits of the samples, their unit of time, rest at both ends
     given.py      what of a trajectory was delivered, and how exactly
+    filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
     ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
@@ -22,6 +23,6 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 from planner.verify.given import Given
 from planner.verify.judge import verify
 from planner.verify.ringing import Ringing
-from planner.verify.verdict import LimitCheck, Verdict
+from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
 
-__all__ = ["Given", "LimitCheck", "Ringing", "Verdict", "verify"]
+__all__ = ["AfterFilters", "Given", "LimitCheck", "Ringing", "Verdict", "verify"]

@@ -13,6 +13,7 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
 from planner.verify import contour, findings, samples
 from planner.verify.dense import Comparison
+from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.pieces import Pieces, pieces_of, widened
@@ -100,6 +101,8 @@ def verify(
     faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    after = after_filters(trajectory, motion, toolpath, machine, pieces)
+    faults += after.faults if after is not None else ()
     return Verdict(
         passed=not faults,
         limits=checks,
@@ -116,6 +119,7 @@ def verify(
         faults=tuple(faults),
         ringing=ringing_of(trajectory, machine),
         notes=tuple(notes),
+        after_filters=after,
     )
 
 

@@ -21,10 +21,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from planner.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.kernels import njit
 
 PIECE_ANGLE = (
     np.pi / 8

@@ -53,6 +53,17 @@ class LimitCheck:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class AfterFilters:
+    """What the machine's own filters leave of the tolerance (filtered.py); fields as in `Verdict`."""
+
+    contour: LimitCheck
+    vertex: LimitCheck
+    contour_error_mm: float | None
+    vertex_error_mm: float | None
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Verdict:
     """What `verify` found.
 
@@ -70,6 +81,7 @@ class Verdict:
     lost             : indices of the program's blocks that the motion never visits
     lost_lines       : their NC lines
     faults           : one sentence per failure: what, by how much, when, where, NC line
+    after_filters    : the motion behind the machine's filters, judged likewise; None for a machine without
     ringing          : what each vibration mode of the machine does; reported, not judged
     notes            : what could not be judged sharply, and why
     """
@@ -86,13 +98,23 @@ class Verdict:
     lost: tuple[int, ...]
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
+    after_filters: AfterFilters | None = None
     ringing: tuple[Ringing, ...] = ()
     lost_after: int | None = None
     notes: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The part of `summary.json` that is called `verdict`."""
-        return {
+        after = self.after_filters
+        behind = (
+            {}
+            if after is None
+            else {
+                "contour_error_after_filters_mm": after.contour_error_mm,
+                "vertex_error_after_filters_mm": after.vertex_error_mm,
+            }
+        )
+        return behind | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},
             "contour_error_mm": self.contour_error_mm,

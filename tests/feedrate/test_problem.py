@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from random_problems import line
 
 from planner.constraints import bounds
+from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.errors import NotSolvedError
+from planner.geometry.build import toolpath_from_program
+from planner.machine import load_machine
+from planner.nc.reader import parse_program
+from planner.path import sample_path
 
 positive = st.floats(1e-3, 1e3)
 curvature = st.floats(1e-6, 1e3)
@@ -59,6 +67,17 @@ def test_pieces_share_an_arc_length() -> None:
     two = {"feed_sq_start": [0.0] * 2, "feed_sq_end": [0.0] * 2, "piece": [0, 2, 4]}
     problem = dataclasses.replace(line(10.0, 4), s=[0.0, 1.0, 1.0, 2.0], **two)
     np.testing.assert_array_equal(problem.interval, [True, False, True, False])
+
+
+def test_a_path_that_no_grid_follows_is_not_solved() -> None:
+    """The remaining interpolation error is taken off the limits; where it is all of them nothing is left."""
+    machine = load_machine("mill")
+    toolpath = toolpath_from_program(parse_program("G21 F600\nG1 X1\nY1\n", machine), machine)
+    samples = sample_path(round_corners(toolpath, machine, BezierCorner()), machine)
+    feedrate_problem(samples, machine)
+    margin = np.where(np.arange(len(samples)) == len(samples) - 2, 1.5, 0.0)
+    with pytest.raises(NotSolvedError, match=r"at line 3 .*--corner bezier"):
+        feedrate_problem(dataclasses.replace(samples, margin=margin), machine)
 
 
 def one(value: float) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -8,8 +8,9 @@ import pytest
 from benchmarks import problems
 from planner.errors import InputError
 from planner.filters import residual_vibration
-from planner.machine import Fir, Mode
+from planner.machine import Mode
 from planner.methods.fir import FirMethod
+from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.names import plan
 from planner.nc.program import PathControl
 from planner.nc.reader import parse_program
@@ -49,10 +50,11 @@ def test_the_papers_pentagon():
         [[0.0, 0.0], np.cumsum(side * np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0)]
     )
     program = problems.polyline(points)
-    machine = problems.machine(tolerance=0.1, dt=1e-4, fir=Fir(time_constants=(0.05, 0.03)))
-    whole = FirMethod(plain=True).plan(program, machine)
+    machine = problems.machine(tolerance=0.1, dt=1e-4)
+    method = FirMethod(plain=True, profile_filters=(0.05, 0.03))
+    whole = method.plan(program, machine)
     stops = problems.polyline(points, path_control=PathControl.EXACT_STOP)
-    assert FirMethod(plain=True).plan(stops, machine).trajectory.cycle_time == pytest.approx(1.416, abs=1e-6)
+    assert method.plan(stops, machine).trajectory.cycle_time == pytest.approx(1.416, abs=1e-6)
     assert whole.trajectory.cycle_time == pytest.approx(1.2189, abs=1e-4)
     assert whole.verdict.vertex_error_mm == pytest.approx(0.1, rel=2e-3)
 
@@ -68,8 +70,8 @@ def test_the_plain_mode_says_what_it_exceeds():
 
 @pytest.mark.parametrize("name", ["pentagon", "zigzag", "arcs"])
 def test_filters_that_are_given_are_kept(name):
-    machine = problems.machine(fir=Fir(time_constants=(0.012, 0.06)))
-    made = fir(JOBS[name], machine)
+    made = FirMethod(profile_filters=(0.012, 0.06)).plan(JOBS[name], MACHINE)
+    assert made.verdict.passed, made.verdict.faults
     assert made.sentence.endswith("filters of 72 to 72 ms in all")
 
 
@@ -87,11 +89,11 @@ def test_filters_matched_to_modes_leave_nothing_of_them():
     assert matched.trajectory.cycle_time > ignorant.trajectory.cycle_time
 
 
-@pytest.mark.parametrize("filters", [(0.01,), (0.03, 0.02, 0.01)])
-@pytest.mark.parametrize("plain", [True, False])
-def test_it_plans_for_two_filters(filters, plain):
-    with pytest.raises(InputError, match=f"has {len(filters)} filters"):
-        FirMethod(plain=plain).plan(JOBS["pentagon"], problems.machine(fir=Fir(time_constants=filters)))
+@pytest.mark.parametrize("method", [FirMethod, FirSplineMethod])
+@pytest.mark.parametrize("filters", [(0.01,), (0.03, 0.02, 0.01), (0.01, 0.0), (0.01, np.nan)])
+def test_its_profile_is_made_by_two_filters(method, filters):
+    with pytest.raises(InputError, match="give two lengths"):
+        method(profile_filters=filters)
 
 
 def test_stops_dwells_rapids_and_feeds():

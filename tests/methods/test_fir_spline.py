@@ -21,7 +21,7 @@ from planner.fir.guide import Guide, guide_of_curve
 from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint
-from planner.machine import Axis, Fir, Machine
+from planner.machine import Axis, Machine
 from planner.methods.fir_spline import CHORD_SHARE, FirSplineMethod
 from planner.methods.names import plan
 from planner.nc.reader import parse_program
@@ -207,21 +207,18 @@ def test_the_filters_are_the_shortest_that_an_isolated_step_allows(V, a, j, dire
 # --- motions ----------------------------------------------------------------------------------------------------------------
 
 
-def with_filters(**more) -> Machine:
-    return problems.machine(
-        velocity=1e3,
-        acceleration=1e5,
-        jerk=1e8,
-        fir=Fir(time_constants=(T1, T2), phase_lag_max=170.0),
-        **more,
-    )
+def strong(**more) -> Machine:
+    return problems.machine(velocity=1e3, acceleration=1e5, jerk=1e8, **more)
+
+
+GIVEN = FirSplineMethod(plain=True, profile_filters=(T1, T2), phase_lag=np.deg2rad(170.0))
 
 
 @pytest.mark.parametrize("rho", [1.0, 5.0, 20.0])
 def test_the_plain_motion_on_a_circle_runs_on_the_one_further_inside(rho):
     """In the steady part the radius is rho less the exact error, at the speed v_eps in time, within what the chords leave."""
-    machine = with_filters(dt=1e-4)
-    made = FirSplineMethod(plain=True).plan_curve(circle(rho, turns=6), machine, 1e3)
+    machine = strong(dt=1e-4)
+    made = GIVEN.plan_curve(circle(rho, turns=6), machine, 1e3)
     tol = (1 - CHORD_SHARE) * machine.tolerance * 0.99
     v = np.sqrt(24 * rho * tol / (T1**2 + T2**2))
     t = made.trajectory
@@ -256,8 +253,7 @@ def test_on_varying_curvature_the_plain_mode_exceeds_and_says_so_and_the_safe_on
     """PAPERS G3: v_sc varies within the window, so none of the formulas is a bound; the verdict shows it. v_ph, when it is not left
     out of the way, hides most of it. Papers' limits: 2000 mm/s2 and 66 667 mm/s3, filters of 50 and 30 ms."""
     curve, machine = curve_named(name), problems.machine(jerk=66_667.0, tolerance=tolerance)
-    own = machine.model_copy(update={"fir": Fir(time_constants=(T1, T2), phase_lag_max=170.0)})
-    plain = FirSplineMethod(plain=True).plan_curve(curve, own, 100.0)
+    plain = GIVEN.plan_curve(curve, machine, 100.0)
     worst = excess(plain)
     assert not plain.verdict.passed
     assert {name for name, ratio in worst.items() if ratio > 1.05} == set(exceeded.split())
@@ -286,7 +282,8 @@ def test_the_safe_mode_holds_tolerance_and_limits_on_random_curves(seed, axes, t
 def test_given_filters_are_kept_and_the_safe_mode_slows_down_for_them():
     curve = curve_named("trident")
     plain, safe = (
-        FirSplineMethod(plain=p).plan_curve(curve, with_filters(tolerance=0.02), 100.0) for p in (True, False)
+        FirSplineMethod(plain=p, profile_filters=(T1, T2)).plan_curve(curve, strong(tolerance=0.02), 100.0)
+        for p in (True, False)
     )
     assert safe.verdict.passed, safe.verdict.faults
     for made in (plain, safe):
@@ -342,16 +339,6 @@ def test_rapids_have_no_feed_and_stops_none_either(plain):
     )
     assert made.trajectory.feed.max() > 99.0
     np.testing.assert_allclose(made.trajectory.position[-1], 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("filters", [(0.01,), (0.03, 0.02, 0.01)])
-@pytest.mark.parametrize("plain", [True, False])
-def test_it_plans_for_two_filters(filters, plain):
-    machine = problems.machine(fir=Fir(time_constants=filters))
-    with pytest.raises(InputError, match=f"has {len(filters)} filters"):
-        FirSplineMethod(plain=plain).plan(problems.pentagon(), machine)
-    with pytest.raises(InputError, match=f"has {len(filters)} filters"):
-        FirSplineMethod(plain=plain).plan_curve(circle(5.0), machine, 100.0)
 
 
 @pytest.mark.parametrize("feed", [0.0, -1.0, np.inf, np.nan])

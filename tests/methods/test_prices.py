@@ -118,7 +118,7 @@ def test_axis_limits_cost_what_plans_made_again_say(job):
         slope = job.slope(lambda factor, name=name: {"machine": with_limit(job.machine, name, factor)})
         share = priced.limits[name] * limit(job.machine, name)
         assert share == pytest.approx(slope, rel=0.05, abs=NOTHING * job.time), name
-        assert priced.saved[name] == pytest.approx(-share * np.log(1.0 + MORE_LIMIT), rel=1e-12)
+        assert priced.saved[name] <= -share * MORE_LIMIT + NOTHING * job.time  # convex
         some += slope < -0.02 * job.time
     assert some >= 4
 

@@ -143,6 +143,7 @@ def test_filters_that_follow_get_their_share_of_the_tolerance():
     assert made.verdict.contour_error_mm < 0.05 / 2 * (
         1 + 1e-3
     )  # eq. (20) leaves half where filters are what limits
+    assert made.verdict.after_filters.vertex_error_mm <= 0.05
 
 
 def test_a_lower_feed_holds_on_its_block():

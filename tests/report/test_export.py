@@ -13,7 +13,7 @@ from planner.errors import InputError
 from planner.machine import machine_from_dict
 from planner.nc.info import describe
 from planner.nc.reader import parse_program
-from planner.report.export import info_summary, summary, write_plan
+from planner.report.export import check_places, info_summary, summary, write_plan
 from planner.report.trajectory_file import FORMATS, read_trajectory
 
 
@@ -42,13 +42,27 @@ def test_another_format_replaces_the_first(tmp_path: Path) -> None:
     ]
 
 
-def test_a_foreign_summary_is_no_list_of_ours(tmp_path: Path) -> None:
-    """Names that would lead out of the directory are not followed."""
-    (tmp_path / "victim").write_text("mine")
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "summary.json").write_text(json.dumps({"files": ["../victim", 3]}))
-    write_plan(make_plan(), tmp_path / "out")
-    assert (tmp_path / "victim").read_text() == "mine"
+def test_a_summary_of_the_user_stays(tmp_path: Path) -> None:
+    (tmp_path / "summary.json").write_text("{}")
+    with pytest.raises(InputError, match=r"summary.json: was not written by planner"):
+        write_plan(make_plan(), tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["summary.json"]
+    assert "summary.json" in write_plan(make_plan(), tmp_path, force=True)
+    write_plan(make_plan(), tmp_path)
+
+
+def test_inputs_are_no_outputs(tmp_path: Path) -> None:
+    """Not even with --force; but a planned.ngc that is the program stays, and the rest is written."""
+    program, machine = tmp_path / "trajectory.parquet", tmp_path / "summary.json"
+    for given in (program, machine):
+        given.write_text("G1 X1")
+        with pytest.raises(InputError, match="read as input"):
+            check_places(tmp_path, [program, machine], file_format="parquet", plots=False, force=True)
+        given.unlink()
+    (tmp_path / "planned.ngc").write_text("G1 X1")
+    check_places(tmp_path, [tmp_path / "planned.ngc"], file_format="parquet", plots=False, force=False)
+    with pytest.raises(InputError, match=r"planned.ngc: was not written by planner"):
+        check_places(tmp_path, [program], file_format="parquet", plots=False, force=False)
 
 
 def test_summary_has_the_contract_s_keys() -> None:

@@ -31,6 +31,7 @@ PRICES = PriceList(
     tolerance=-1.5,
     saved={"velocity.x": 0.0, "acceleration.y": 0.0381, "jerk.y": 1e-5, "feed": 0.05, "tolerance": 0.0131},
     corners=DEAR,
+    ranges={"acceleration.y": (0.0381, 0.0381), "feed": (0.049, 0.051), "tolerance": (0.01, 0.0162)},
 )
 
 
@@ -49,6 +50,16 @@ def test_what_more_saves() -> None:
         ("10 µm more tolerance", "saves 0.0131 s"),
         ("10 µm more at line", "saves, in ms, 7: 4.4, 4: 2.2"),
     ]
+
+
+def test_a_hint_is_told_as_its_range() -> None:
+    hints = dataclasses.replace(PRICES, hints=("feed", "tolerance"))
+    assert price_rows(hints, 0.8)[:2] == [
+        ("10 % more saves", "feed 0.049 to 0.051 s, acceleration.y 0.0381 s; ranges are no more than a hint"),
+        ("10 µm more tolerance", "saves 0.01 to 0.016 s, no more than a hint"),
+    ]
+    elsewhere = dataclasses.replace(PRICES, hints=("jerk.y",))  # which stands in no table
+    assert price_rows(elsewhere, 0.8) == price_rows(PRICES, 0.8)
 
 
 def test_where_more_saves_nothing() -> None:
@@ -103,6 +114,8 @@ def test_the_summary() -> None:
     prices = said["prices"]
     assert prices["limits"] == PRICES.limits
     assert prices["saved_s"] == PRICES.saved
+    assert prices["saved_range_s"]["feed"] == [0.049, 0.051]
+    assert prices["hints"] == []
     assert (prices["more_limit"], prices["more_tolerance_mm"]) == (0.1, 0.01)
     assert [corner["line"] for corner in prices["corners"]] == [7, 4]
     assert prices["corners"][0]["position_mm"] == [1.0, 2.0, 3.0]
@@ -123,5 +136,6 @@ def test_a_real_plan() -> None:
     worth = max(
         (name for name in said["prices"]["saved_s"] if name != "tolerance"), key=said["prices"]["saved_s"].get
     )
+    assert set(said["prices"]["saved_range_s"]) == set(said["prices"]["saved_s"])
     assert f"10 % more saves {worth}" in " ".join(text(plan_table(plan)).split())
     assert "more saves" not in text(plan_table(planner.plan(program, machine, method="toppra")))

@@ -1,186 +1,278 @@
-"""A kill at any moment leaves the old set of files or the new one; files that are not ours stay."""
+"""A set of output files: whole or seen not to be, never in the place of a file that no run wrote."""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
-import time
+import threading
 from pathlib import Path
 
 import pytest
 
-from planner.report.replace import replacing
+from planner.errors import InputError
+from planner.report import replace
+from planner.report.replace import check_output, checksums, replacing, replacing_file
 
-linux_only = pytest.mark.skipif(sys.platform != "linux", reason="directories are exchanged on Linux only")
+linux_only = pytest.mark.skipif(sys.platform != "linux", reason="locks and signals of Linux")
 
-# Writes sets of three files without end; the third name changes from set to set, as formats do.
-WRITER = """
-import itertools, json, sys
-from pathlib import Path
-from planner.report.replace import replacing
-directory = Path(sys.argv[1])
-old = json.loads((directory / "summary.json").read_text())["files"]
-for run in itertools.count(int(sys.argv[2])):
-    names = ["summary.json", "trajectory.npz", f"other{run % 3}.csv"]
-    with replacing(directory, old) as new:
-        for name in names:
-            (new / name).write_text(json.dumps({"run_id": run, "files": names}))
-    old = names
-    print(run, flush=True)
-"""
-
-# The same, but killed before the n-th step it takes in the file system.
+# Writes a set over another, and is killed before the n-th step it takes in the file system.
 KILLED_AT_STEP = """
 import json, os, signal, sys
 from pathlib import Path
-from planner.report.replace import replacing
-directory, step, run = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
-names = ["summary.json", "trajectory.npz", "new.csv"]
+from planner.report.replace import checksums, replacing
+directory, first = Path(sys.argv[1]), int(sys.argv[2])
+names = ["trajectory.csv", "trajectory.meta.json", "toolpath.png"]
 def count(event, args):
     global step
-    if event in ("open", "os.rename", "os.link", "os.mkdir", "os.remove", "os.rmdir", "os.scandir", "os.listdir",
-                 "ctypes.dlsym", "ctypes.dlopen", "fcntl.flock", "shutil.rmtree", "os.chmod", "os.utime"):
+    if event in ("open", "os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.scandir", "os.listdir", "fcntl.flock", "shutil.rmtree"):
         step -= 1
         if step < 0:
             os.kill(os.getpid(), signal.SIGKILL)
-sys.addaudithook(count)
-with replacing(directory, ["summary.json", "trajectory.npz", "old.csv"]) as new:
-    for name in names:
-        (new / name).write_text(json.dumps({"run_id": run, "files": names}))
+for step in range(first, first + 12):  # a process for a dozen steps, since starting one takes longest
+    pid = os.fork()
+    if pid == 0:
+        sys.addaudithook(count)
+        with replacing(directory / str(step)) as new:
+            for name in names:
+                (new / name).write_text(json.dumps({"run_id": "2"}))
+            (new / "summary.json").write_text(json.dumps({"run_id": "2", "files": names, "sha256": checksums(new)}))
+        os._exit(0)
+    print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 """
 
 
-def write_set(directory: Path, run: int, names: list[str], previous: tuple[str, ...] = ()) -> None:
-    with replacing(directory, previous) as new:
-        for name in names:
-            (new / name).write_text(json.dumps({"run_id": run, "files": names}))
+def fill(new: Path, run: str, names: tuple[str, ...]) -> None:
+    for name in names:
+        (new / name).write_text(json.dumps({"run_id": run}))
+    said = {"run_id": run, "files": names, "sha256": checksums(new)}
+    (new / "summary.json").write_text(json.dumps(said))
 
 
-def consistent_run(directory: Path, foreign: tuple[str, ...] = ()) -> int:
-    """The run whose set is there, whole, and nothing else."""
-    read = {
-        file.name: json.loads(file.read_text()) for file in directory.iterdir() if file.name not in foreign
-    }
-    runs = {content["run_id"] for content in read.values()}
-    assert len(runs) == 1, {name: content["run_id"] for name, content in read.items()}
-    assert set(read) == set(read["summary.json"]["files"])
-    return runs.pop()
+def write_set(directory: Path, run: str, *names: str, force: bool = False) -> None:
+    with replacing(directory, force=force) as new:
+        fill(new, run, names or ("trajectory.npz",))
+
+
+def sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def read(file: Path) -> dict:
+    return json.loads(file.read_text())
+
+
+def whole_run(directory: Path) -> str | None:
+    """What a reader of the promise makes of a directory: the run whose set is there, None if it cannot tell.
+
+    The run_id of a trajectory (for CSV: of the file beside it) must be that of the summary.
+    """
+    try:
+        run = read(directory / "summary.json")["run_id"]
+        trajectory = next(
+            name for name in read(directory / "summary.json")["files"] if name.startswith("traj")
+        )
+        carrier = "trajectory.meta.json" if trajectory == "trajectory.csv" else trajectory
+        return run if read(directory / carrier)["run_id"] == run else None
+    except FileNotFoundError:
+        return None
 
 
 def leftovers(place: Path) -> list[Path]:
-    return [file for file in place.iterdir() if ".planner-" in file.name]
-
-
-@linux_only
-def test_killed_at_random_moments(tmp_path: Path) -> None:
-    directory = tmp_path / "out"
-    write_set(directory, 0, ["summary.json", "trajectory.npz", "other0.csv"])
-    notes = directory / "notes.txt"
-    notes.write_text("mine")
-    rng, seen = random.Random(7), set()
-    for attempt in range(12):
-        command = [sys.executable, "-c", WRITER, str(directory), str(1 + 3000 * attempt)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            assert process.stdout is not None
-            process.stdout.readline()  # it is at work now
-            time.sleep(rng.uniform(0.0, 0.02))
-            process.kill()
-        seen.add(consistent_run(directory, ("notes.txt",)))
-        assert notes.read_text() == "mine"
-    assert len(seen) == 12
-    write_set(
-        directory, -1, ["summary.json"], tuple(json.loads((directory / "summary.json").read_text())["files"])
-    )
-    assert not leftovers(tmp_path)
-    assert consistent_run(directory, ("notes.txt",)) == -1
+    return list(place.glob(".planner-*"))
 
 
 @linux_only
 def test_killed_before_every_step(tmp_path: Path) -> None:
-    """Old before the exchange, new after it, and both are seen; the next run removes what the killed one left."""
-    runs = []
-    for step in range(200):
-        directory = tmp_path / f"{step}" / "out"
-        write_set(directory, 1, ["summary.json", "trajectory.npz", "old.csv"])
-        (directory / "notes.txt").write_text("mine")
+    """The old set or the new one is there, or the run_id tells that it is neither; the next run cleans up without being forced."""
+    runs: list[str | None] = []
+    for first in range(0, 120, 12):
+        for step in range(first, first + 12):
+            write_set(tmp_path / str(step), "1", "trajectory.parquet", "profiles.png", "toolpath.png")
+            (tmp_path / str(step) / "notes.txt").write_text("mine")
         done = subprocess.run(
-            [sys.executable, "-c", KILLED_AT_STEP, str(directory), str(step), "2"], check=False
+            [sys.executable, "-c", KILLED_AT_STEP, str(tmp_path), str(first)],
+            capture_output=True,
+            text=True,
+            check=True,
         )
-        runs.append(consistent_run(directory, ("notes.txt",)))
-        assert (directory / "notes.txt").read_text() == "mine"
-        if done.returncode == 0:
+        codes = [int(code) for code in done.stdout.split()]
+        for step in range(first, first + 12):
+            directory = tmp_path / str(step)
+            run = whole_run(directory)
+            runs.append(run)
+            if run is not None:
+                said = read(directory / "summary.json")
+                assert all((directory / name).is_file() for name in said["files"])
+                assert all(sha256(directory / name) == said["sha256"][name] for name in said["files"])
+            assert (directory / "notes.txt").read_text() == "mine"
+            write_set(directory, "3")
+            assert whole_run(directory) == "3"
+            assert sorted(os.listdir(directory)) == ["notes.txt", "summary.json", "trajectory.npz"]
+        if codes[-1] == 0:
             break
-        assert done.returncode == -signal.SIGKILL
-        write_set(directory, 3, ["summary.json"], ("trajectory.npz", "old.csv", "new.csv"))
-        assert not leftovers(directory.parent)
-        assert consistent_run(directory, ("notes.txt",)) == 3
+        assert set(codes) <= {-signal.SIGKILL, 0}
     else:
         pytest.fail("the writer never finished")
-    assert runs == sorted(runs)
-    assert set(runs) == {1, 2}
+    seen = [run for k, run in enumerate(runs) if k == 0 or run != runs[k - 1]]
+    assert seen == ["1", None, "2"]
 
 
-def test_new_directory_with_parents(tmp_path: Path) -> None:
-    write_set(tmp_path / "a" / "b", 1, ["summary.json"])
-    assert consistent_run(tmp_path / "a" / "b") == 1
-    assert not leftovers(tmp_path / "a")
+def test_new_directory_with_parents_and_none_if_it_fails(tmp_path: Path) -> None:
+    write_set(tmp_path / "a" / "b", "1")
+    assert whole_run(tmp_path / "a" / "b") == "1"
+    with contextlib.suppress(ZeroDivisionError), replacing(tmp_path / "c" / "d"):
+        raise ZeroDivisionError
+    assert os.listdir(tmp_path) == ["a"]
 
 
 def test_the_old_set_goes_and_other_files_stay(tmp_path: Path) -> None:
     directory = tmp_path / "out"
-    write_set(directory, 1, ["summary.json", "old.csv"])
+    write_set(directory, "1", "trajectory.parquet", "profiles.png")
     (directory / "job.ngc").write_text("G1")
     (directory / "link").symlink_to("job.ngc")
-    inode = (directory / "job.ngc").stat().st_ino
-    write_set(directory, 2, ["summary.json", "new.csv"], ("summary.json", "old.csv"))
-    assert sorted(os.listdir(directory)) == ["job.ngc", "link", "new.csv", "summary.json"]
-    assert (directory / "job.ngc").stat().st_ino == inode
+    (directory / "keep").mkdir()
+    write_set(directory, "2", "trajectory.npz")
+    assert sorted(os.listdir(directory)) == ["job.ngc", "keep", "link", "summary.json", "trajectory.npz"]
     assert (directory / "link").readlink() == Path("job.ngc")
 
 
-def test_directory_with_directories_and_current_directory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.skipif(sys.platform == "win32", reason="modes and groups of Unix")
+def test_the_directory_keeps_inode_mode_and_group(tmp_path: Path) -> None:
     directory = tmp_path / "out"
-    (directory / "keep").mkdir(parents=True)
-    (directory / "keep" / "file").write_text("mine")
-    write_set(directory, 1, ["summary.json", "old.csv"])
-    monkeypatch.chdir(directory)
-    here = directory.stat().st_ino
-    write_set(Path("."), 2, ["summary.json", "new.csv"], ("summary.json", "old.csv"))
-    assert directory.stat().st_ino == here
-    assert sorted(os.listdir(directory)) == ["keep", "new.csv", "summary.json"]
-    assert (directory / "keep" / "file").read_text() == "mine"
-    assert not leftovers(directory)
-    assert not leftovers(tmp_path)
+    directory.mkdir()
+    if os.geteuid() == 0:
+        os.chown(directory, 0, 4711)
+    directory.chmod(0o2775)  # files of a group's directory belong to the group
+    before = directory.stat()
+    write_set(directory, "1")
+    write_set(directory, "2")
+    after = directory.stat()
+    for what in ("st_ino", "st_uid", "st_gid", "st_mode"):
+        assert getattr(after, what) == getattr(before, what)
+    assert (directory / "trajectory.npz").stat().st_gid == before.st_gid
 
 
 def test_a_failed_run_changes_nothing(tmp_path: Path) -> None:
     directory = tmp_path / "out"
-    write_set(directory, 1, ["summary.json"])
-    with contextlib.suppress(KeyboardInterrupt), replacing(directory, ("summary.json",)) as new:
+    write_set(directory, "1")
+    with contextlib.suppress(KeyboardInterrupt), replacing(directory) as new:
         (new / "summary.json").write_text("half")
         raise KeyboardInterrupt
-    assert consistent_run(directory) == 1
-    assert not leftovers(tmp_path)
+    assert whole_run(directory) == "1"
+    assert not leftovers(directory)
 
 
-def test_a_run_at_work_is_left_alone(tmp_path: Path) -> None:
+def test_temporaries_go_before_the_process_ends_at_once(tmp_path: Path) -> None:
+    with replacing(tmp_path / "new" / "out") as new, replacing_file(tmp_path / "f.csv") as file:
+        (new / "summary.json").write_text("half")
+        file.write_text("half")
+        replace.remove_temporaries()
+        assert os.listdir(tmp_path) == []
+        new.mkdir(parents=True)
+        fill(new, "1", ("trajectory.npz",))
+        file.write_text("whole")
+    assert whole_run(tmp_path / "new" / "out") == "1"
+
+
+@linux_only
+def test_a_second_run_waits_for_the_first(tmp_path: Path) -> None:
     directory = tmp_path / "out"
-    with replacing(directory) as first:
-        (first / "summary.json").write_text(json.dumps({"run_id": 1, "files": ["summary.json"]}))
-        write_set(directory, 2, ["summary.json"])
-        assert first.exists()
-    assert consistent_run(directory) == 1
+    with replacing(directory) as new:
+        fill(new, "1", ("trajectory.npz",))
+        second = threading.Thread(target=write_set, args=(directory, "2"))
+        second.start()
+        second.join(0.2)
+        assert second.is_alive()
+        assert new.exists()
+    second.join()
+    assert whole_run(directory) == "2"
 
 
-def test_a_file_in_the_way(tmp_path: Path) -> None:
+# ------------------------------------------------------------------------------------------ what no run wrote
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("summary.json", "mine"),
+        ("summary.json", '{"sha256": {}}'),
+        ("summary.json", "[" * 100_000),
+        ("trajectory.npz", "mine"),
+        ("trajectory.npz", ""),
+    ],
+)
+def test_a_file_of_the_user_is_not_overwritten(tmp_path: Path, name: str, content: str) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=r"was not written by planner.*--force"):
+        write_set(tmp_path, "1")
+    with pytest.raises(InputError, match="--force"):
+        check_output(tmp_path, [name])
+    assert os.listdir(tmp_path) == [name]
+    assert (tmp_path / name).read_text() == content
+    write_set(tmp_path, "1", force=True)
+    assert whole_run(tmp_path) == "1"
+
+
+def test_a_file_of_ours_that_was_edited_is_not_overwritten(tmp_path: Path) -> None:
+    write_set(tmp_path, "1", "planned.ngc", "trajectory.npz")
+    (tmp_path / "planned.ngc").write_text("G1 by hand")
+    with pytest.raises(InputError, match="changed since"):
+        write_set(tmp_path, "2", "planned.ngc", "trajectory.npz")
+    assert whole_run(tmp_path) == "1"
+    write_set(tmp_path, "2", "trajectory.npz")  # nor is it removed where the new set lacks it
+    assert (tmp_path / "planned.ngc").read_text() == "G1 by hand"
+
+
+def test_an_edited_summary_removes_nothing(tmp_path: Path) -> None:
+    write_set(tmp_path / "out", "1", "trajectory.npz")
+    victims = [tmp_path / "victim", tmp_path / "out" / "mine.txt", tmp_path / "out" / "profiles.png"]
+    for victim in victims:
+        victim.write_text("mine")
+    said = read(tmp_path / "out" / "summary.json")
+    named = {"../victim": "0", str(victims[0]): "0", "profiles.png": "0"}
+    named["mine.txt"] = sha256(tmp_path / "out" / "mine.txt")
+    said |= {"files": list(named), "sha256": said["sha256"] | named}
+    (tmp_path / "out" / "summary.json").write_text(json.dumps(said))
+    write_set(tmp_path / "out", "2", "trajectory.csv", "trajectory.meta.json")
+    assert all(victim.read_text() == "mine" for victim in victims)
+    assert not (tmp_path / "out" / "trajectory.npz").exists()
+
+
+def test_links_and_directories_are_not_ours(tmp_path: Path) -> None:
+    write_set(tmp_path / "out", "1")
+    (tmp_path / "elsewhere").write_bytes((tmp_path / "out" / "trajectory.npz").read_bytes())
+    (tmp_path / "out" / "trajectory.npz").unlink()
+    (tmp_path / "out" / "trajectory.npz").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="--force"):
+        write_set(tmp_path / "out", "2")
+    (tmp_path / "out" / "trajectory.npz").unlink()
+    (tmp_path / "out" / "trajectory.npz").mkdir()
+    with pytest.raises(InputError, match="is a directory"):
+        write_set(tmp_path / "out", "2", force=True)
+
+
+def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("a file")
-    with pytest.raises(NotADirectoryError):
-        write_set(tmp_path / "out", 1, ["summary.json"])
-    assert (tmp_path / "out").read_text() == "a file"
+    with pytest.raises(InputError, match="is a file, not a directory"):
+        write_set(tmp_path / "out", "1")
+    with pytest.raises(InputError, match="cannot be written"):
+        write_set(tmp_path / "out" / "deeper", "1")
+    with pytest.raises(InputError, match="cannot be written: File name too long"):
+        write_set(tmp_path / ("n" * 300), "1")
+    with pytest.raises(InputError, match="cannot be written"), replacing_file(tmp_path / "out" / "f.csv"):
+        pytest.fail("there is no such directory")
+    with (
+        pytest.raises(InputError, match="cannot be written: File name too long"),
+        replacing_file(tmp_path / ("n" * 300)) as new,
+    ):
+        new.write_text("1")
+    assert os.listdir(tmp_path) == ["out"]
+    name = "n" * 250  # what a file system takes, the place of a temporary takes, too
+    with replacing_file(tmp_path / name) as new:
+        new.write_text("1")
+    assert (tmp_path / name).read_text() == "1"

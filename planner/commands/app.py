@@ -1,0 +1,51 @@
+"""The command line: every command under its name."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from planner.commands.compare import compare
+from planner.commands.info import info
+from planner.commands.machine import init_file, list_machines, show_machine
+from planner.commands.plan import plan
+from planner.commands.pulses import pulses
+from planner.commands.verify import verify
+
+HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
+
+app = typer.Typer(
+    help="The fastest motion of an NC program within the limits of a machine, planned and verified.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings=HELP_OPTIONS,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from planner import __version__
+
+        typer.echo(f"planner {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="print the version")
+    ] = False,
+) -> None:
+    """The fastest motion of an NC program within the limits of a machine, planned and verified."""
+
+
+for command in (plan, compare, verify, info, pulses):
+    app.command()(command)
+
+machine_app = typer.Typer(help="Machine files.", no_args_is_help=True)
+machine_app.command("list")(list_machines)
+machine_app.command("show")(show_machine)
+machine_app.command("init")(init_file)
+app.add_typer(machine_app, name="machine")

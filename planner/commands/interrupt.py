@@ -1,0 +1,42 @@
+"""Ctrl-C ends the command at once, with exit code 130 and without half-written files.
+
+The handler does not raise KeyboardInterrupt: numba's dispatcher turns an exception that arrives while a kernel returns into a
+SystemError, and callbacks of C libraries and destructors swallow one. Leaving at once is safe, since a file takes its place only
+when it is written completely (report/replace.py); the temporaries are removed first. Python runs the handler between two of its
+instructions, so a running kernel is waited for, but nothing after it happens.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from contextlib import suppress
+from types import FrameType
+
+INTERRUPTED = 130  # exit code: 128 + SIGINT, what shells report
+CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # of a terminal, where a progress bar may be drawn
+
+
+def end_at_interrupts() -> None:
+    """Let Ctrl-C end the process, unless interrupts are ignored (jobs in a shell's background) or taken care of already."""
+    if (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    ):
+        signal.signal(signal.SIGINT, _end)
+
+
+def _end(_: int, __: FrameType | None) -> None:
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a second Ctrl-C does not wait
+        replace = sys.modules.get("planner.report.replace")
+        if replace is not None:
+            replace.remove_temporaries()
+        with suppress(OSError):
+            if os.isatty(2):
+                os.write(2, CLEAR_LINE_AND_SHOW_CURSOR)
+            os.write(2, b"interrupted\n")
+    finally:
+        os._exit(INTERRUPTED)

@@ -75,16 +75,16 @@ class BezierMethod(Method):
         motion = job.behind_filters(motion)
         made = job.deliver(motion)
         with job.stage("report"):
-            corners = _corner_table(motion, limits)
+            rounded = _corner_table(motion, limits)
         return job.plan(
             made,
             method="bezier",
             corner=self.corner.name,
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=f"{len(corners)} corners are run through, {int(stops.sum())} are faster as full stops",
+            sentence=f"{len(rounded)} corners are run through, {int(stops.sum())} are faster as full stops",
             grid_points=len(samples),
-            corners=corners,
+            rounded=rounded,
         )
 
 

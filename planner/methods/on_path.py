@@ -73,12 +73,12 @@ def plan_of_solution(
     prices: PriceList | None = None,
 ) -> Plan:
     """The plan of a solution and what was delivered of it, None unless solved."""
-    corners = grid = None
+    rounded = grid = None
     if made is not None:
         delivered = job.motion_of[made[0]]  # with the standstills that its samples need
         assert isinstance(delivered, Motion)
         with job.stage("report"):
-            corners = corner_table(best.samples, best.problem, best.solution)
+            rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, delivered.law)
         job.note(*path_notes(job.toolpath, best))
     return job.plan(
@@ -89,7 +89,7 @@ def plan_of_solution(
         status=best.solution.status,
         sentence="; ".join((best.solution.sentence, *best.notes)),
         grid_points=len(best.samples),
-        corners=corners,
+        rounded=rounded,
         grid=grid,
         prices=prices,
     )

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 from weakref import WeakKeyDictionary
@@ -55,7 +54,6 @@ class Job:
     machine: Machine
     toolpath: Toolpath
     stages: Stages
-    programmed: Toolpath | None = None
     noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
@@ -68,7 +66,7 @@ class Job:
     def with_share(self, share: float, seen: float) -> Job:
         """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
         of `seen` of their lengths [-]."""
-        machine, toolpath = self.real
+        machine = self.real[0]
         assert machine.fir is not None
         by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
         lag = machine.fir.phase_lag_max
@@ -195,11 +193,6 @@ class Method(ABC):
 
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
-    @property
-    def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
-        return True
-
     def plan(
         self,
         program: Program,
@@ -228,6 +221,11 @@ class Method(ABC):
         for share, seen in self.ways:
             best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
         return best
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        return True
 
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""

@@ -68,7 +68,6 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         corners=make_corners(turns=turns),
         after_filters=None,
         ringing=(),
-        after_filters=None,
         lost_after=None,
         notes=(),
         faults=()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 from weakref import WeakKeyDictionary
@@ -66,7 +67,7 @@ class Job:
     def with_share(self, share: float, seen: float) -> Job:
         """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
         of `seen` of their lengths [-]."""
-        machine = self.real[0]
+        machine, toolpath = self.real
         assert machine.fir is not None
         by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
         lag = machine.fir.phase_lag_max

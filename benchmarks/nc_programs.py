@@ -119,7 +119,7 @@ def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
             "not_limited": {name: check.ratio for name, check in verdict.limits.items() if not check.limited},
             "contour_mm": verdict.contour_error_mm,
             "vertex_mm": verdict.vertex_error_mm,
-            "corner_speed_ratio": plan.corners.worst_ratio() if plan.corners is not None else None,
+            "corner_speed_ratio": verdict.corners.worst_ratio,
         }
     pipe.send(row)
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from planner.arrays import Array, FloatArray, freeze
 from planner.kernels import njit
-from planner.search import last_not_after
+from planner.search import last_not_after, nearest
 from planner.trajectory import Trajectory
 
 # Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this share of it [-]; the better one is then good to rounding.
@@ -112,6 +112,28 @@ class AxisMotion:
             feed=feed,
             block=self.block[piece],
             line=self.line[piece],
+        )
+
+    def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
+        """The motion standing longer by `by` (n,) [s] at the ends of its pieces nearest to the times `at` (n,) [s], where it rests."""
+        before = nearest(np.append(self.t, self.end), at)
+        place = self.at(self.t[before], 1.0).position  # a piece begins there
+        later = np.zeros(len(self) + 1)
+        np.add.at(later, before, by)
+        later = np.cumsum(later)[:-1]
+        rest = {name: np.zeros_like(place) for name in ("velocity", "acceleration", "jerk")}
+        columns = {
+            name: np.insert(getattr(self, name), before, row, axis=0)
+            for name, row in ({"position": place} | rest).items()
+        }
+        segment = np.maximum(before - 1, 0)
+        return AxisMotion(
+            axes=self.axes,
+            t=np.insert(self.t + later, before, (self.t + later)[before] - by),
+            block=np.insert(self.block, before, self.block[segment]),
+            line=np.insert(self.line, before, self.line[segment]),
+            end=self.end + float(by.sum()),
+            **columns,
         )
 
 

@@ -133,10 +133,9 @@ def sample_path(
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
     if machine.normal_acceleration is not None:
         acceleration = np.minimum(acceleration, machine.normal_acceleration)
-    near = NEAR * float(path.toolpath.tolerance.max())
     where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
     if third_order:
-        where_calm = calm(path, table, (velocity, acceleration, jerk), near)
+        where_calm = calm(path, table, (velocity, acceleration, jerk))
     rows = cut_path(
         *table,
         path.legs.first,

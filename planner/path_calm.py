@@ -39,30 +39,28 @@ class Calm(NamedTuple):
     feed_sq: FloatArray
 
 
-def calm(
-    path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatArray, FloatArray], near: float
-) -> Calm:
-    """Where the path is calm; `limits` of velocity, acceleration and jerk (A,) each, `near` [mm] a change of the feed holds to either
-    side."""
+def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatArray, FloatArray]) -> Calm:
+    """Where the path is calm; `limits` of velocity, acceleration and jerk (A,) each."""
     velocity, acceleration, jerk = limits
     legs, spans = path.legs, table.spans
     bend, twist = _turning(*table, acceleration, jerk)
-    feed, place = path.toolpath.feed, legs.place
+    feed, place, passed = path.toolpath.feed, legs.place, path.passed
     of_leg = np.maximum.reduceat(feed, legs.first[:-1])
-    of_span = feed[np.clip(np.searchsorted(place, spans["begin"], side="right") - 1, 0, len(feed) - 1)]
+    ends = np.stack([spans["begin"], spans["begin"] + spans["width"]])
+    of_span = feed[np.clip(np.searchsorted(passed, ends, side="right") - 1, 0, len(feed) - 1)].max(axis=0)
     F = np.concatenate([of_leg, of_span])
     with np.errstate(invalid="ignore"):  # rapids: inf times 0
         lively = (velocity.min() < F) | (bend * F**2 > FREE_SHARE) | (twist * F**3 > FREE_SHARE)
     with np.errstate(divide="ignore"):
         feed_sq = np.minimum(1.0 / bend, twist ** (-2.0 / 3.0))
     joint = place[legs.first]
-    changes = place[1:-1][feed[1:] != feed[:-1]]
+    changes = passed[1:-1][feed[1:] != feed[:-1]]
     leg, span = lively[: len(legs)] & ~_replaced(path), spans[lively[len(legs) :]]
     alone = ~_inside(path)
     stretches = [
         np.stack([joint - path.d_in, joint + path.d_out], axis=1)[alone & (path.joint == Joint.CORNER)],
         np.stack([joint, joint], axis=1)[alone],
-        np.stack([changes - near, changes + near], axis=1),
+        np.stack([changes, changes], axis=1),
         np.stack([joint[:-1], joint[1:]], axis=1)[leg],
         np.stack([span["begin"], span["begin"] + span["width"]], axis=1),
     ]

@@ -1,8 +1,20 @@
-"""Search in ascending values, for kernels: numba compiles its own searchsorted slowly."""
+"""Search in ascending values; the kernels have their own, as numba compiles its searchsorted slowly."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from planner.arrays import Array, FloatArray
 from planner.kernels import njit
+
+
+def nearest(values: FloatArray, wanted: FloatArray) -> Array:
+    """(n,) indices of the ascending values (m,), m > 0, that are nearest to those wanted (n,); the first of equally near ones."""
+    above = np.clip(np.searchsorted(values, wanted), 1, max(len(values) - 1, 1))
+    below = np.minimum(above - 1, len(values) - 1)
+    above = np.minimum(above, len(values) - 1)
+    closer: Array = np.where(wanted - values[below] <= values[above] - wanted, below, above)
+    return np.asarray(np.searchsorted(values, values[closer]))
 
 
 @njit(cache=True, error_model="numpy")

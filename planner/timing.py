@@ -11,6 +11,7 @@ Samples lie at k dt and, last, at the end of the program, so the last period is 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
@@ -22,7 +23,7 @@ from planner.corners.elements import element_length, element_point, is_straight,
 from planner.errors import InputError
 from planner.kernels import njit
 from planner.path import PathSamples
-from planner.search import last_not_after
+from planner.search import last_not_after, nearest
 from planner.time_law import TimeLaw
 from planner.trajectory import Trajectory
 
@@ -61,6 +62,10 @@ class MotionInTime(Protocol):
         """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
         ...
 
+    def waiting(self, at: FloatArray, by: FloatArray) -> MotionInTime:
+        """The motion standing longer by `by` (n,) [s] where it comes to rest, at the ends `at` (n,) of pieces [s]."""
+        ...
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
@@ -82,6 +87,18 @@ class Motion:
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) [s]."""
         return _trajectory(self, times, dt)
+
+    def waiting(self, at: FloatArray, by: FloatArray) -> Motion:
+        """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to the times `at` (n,) [s]."""
+        law = self.law
+        still = np.flatnonzero(
+            np.append(law.run[1:] != law.run[:-1], True)
+        )  # a run's last piece is its standstill
+        more = np.zeros(len(law.t))
+        np.add.at(more, still[nearest(law.t[still], at)], by)
+        later = np.cumsum(more)
+        new = dataclasses.replace(law, t=law.t + (later - more), end=float(law.end + later[-1]))
+        return dataclasses.replace(self, law=new)
 
 
 def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:

@@ -13,6 +13,7 @@ from planner.methods.plan import GridHistory
 from planner.methods.prices import PriceList
 from planner.nc.reader import parse_program
 from planner.trajectory import Trajectory
+from planner.verify import CornerCheck
 
 SQUARE = "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n"
 
@@ -49,7 +50,7 @@ def trajectory_along(toolpath: Any, *, dt: float = 1e-3, time: float = 0.2) -> T
     )
 
 
-def make_verdict(*, passed: bool = True) -> Any:
+def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
     def check(ratio: float, limited: bool = True) -> Any:
         return SimpleNamespace(ratio=ratio, value=1.0, limit=1.0, limited=limited, line=3)
 
@@ -64,7 +65,11 @@ def make_verdict(*, passed: bool = True) -> Any:
         contour_error_mm=0.0123,
         vertex_error_mm=0.02,
         end_error_mm=0.0,
+        corners=make_corners(turns=turns),
+        after_filters=None,
         ringing=(),
+        lost_after=None,
+        notes=(),
         faults=()
         if passed
         else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),
@@ -78,19 +83,25 @@ def make_verdict(*, passed: bool = True) -> Any:
     )
 
 
-def make_corners() -> Any:
-    return SimpleNamespace(
-        line=np.array([3, 4, 5]),
-        theta=np.full(3, np.pi / 2),
-        d_in=np.full(3, 0.1),
-        d_out=np.full(3, 0.1),
-        tol_ap=np.full(3, 0.013),
-        kappa_max=np.full(3, 12.0),
-        feed_closed_form=np.full(3, 14.0),
-        feed_planned=np.array([14.0, 13.0, 7.0]),
-        limited_by=np.array(["normal_acceleration", "acceleration.x", "feed"]),
-        worst_ratio=lambda: 1.0,
-    )
+def make_corners(*, turns: bool = True) -> CornerCheck:
+    """Three corners of 90 degrees, at eq. 19, below it, and at a stop; or none."""
+    feed, own = np.array([14.0, 13.0, 0.0]), np.array([14.0, 20.0, np.inf])
+    columns = {
+        "line": np.array([3, 4, 5]),
+        "position": np.array([[10.0, 0.0, 0.0], [10.0, 10.0, 0.0], [0.0, 10.0, 0.0]]),
+        "theta": np.full(3, np.pi / 2),
+        "budget": np.full(3, 0.02),
+        "time": np.array([0.2, 0.4, 0.6]),
+        "feed_planned": feed,
+        "feed_closed_form": own,
+        "feed_paper": np.full(3, 10.0),
+        "feed_programmed": np.full(3, 50.0),
+        "speed_ratio": feed / own,
+        "miss": np.array([0.015, 0.01, 0.0]),
+        "chord_error": np.array([0.001, 0.001, 0.0]),
+        "budget_ratio": np.array([0.8, 0.55, 0.0]),
+    }
+    return CornerCheck(**(columns if turns else {name: column[:0] for name, column in columns.items()}))
 
 
 def make_plan(
@@ -99,7 +110,7 @@ def make_plan(
     machine: str = "mill",
     passed: bool = True,
     solved: bool = True,
-    rounded: bool = True,
+    turns: bool = True,
     prices: PriceList | None = None,
 ) -> Any:
     limits = load_machine(machine)
@@ -114,11 +125,11 @@ def make_plan(
         program=program,
         machine=limits,
         toolpath=toolpath,
-        corners=make_corners() if rounded else None,
+        corners=make_corners(turns=turns) if solved else None,
         status=SimpleNamespace(name="OPTIMAL" if solved else "INFEASIBLE"),
         sentence="solved" if solved else "no feed satisfies all limits; loosen the tolerance",
         trajectory=trajectory,
-        verdict=make_verdict(passed=passed) if solved else None,
+        verdict=make_verdict(passed=passed, turns=turns) if solved else None,
         stop_time=1.25,
         grid_points=40,
         grid=GridHistory(

@@ -34,6 +34,7 @@ LAYERS = (
     "planner.feedrate",
     "planner.fir",
     "planner.trajectory",
+    "planner.passing",
     "planner.time_law",
     "planner.timing",
     "planner.axis_motion",

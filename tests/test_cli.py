@@ -61,21 +61,21 @@ def test_plan_writes_and_exits_0(planned: Callable[..., None], job: Path, tmp_pa
     result = run("plan", job, "-o", tmp_path / "out", "--plot", "--corners")
     assert result.exit_code == 0, result.output
     assert "cycle time" in result.stdout
-    assert "normal_acceleration" in result.stdout  # the corner table
+    assert "feed / its own" in result.stdout  # the corner table
     files = {"profiles.png", "summary.json", "toolpath.png", "trajectory.parquet"}
     assert {file.name for file in (tmp_path / "out").iterdir()} == files
     assert all(str(tmp_path / "out" / name) in result.stdout for name in files)
 
 
 def test_that_there_are_no_corners_is_said(planned: Callable[..., None], job: Path) -> None:
-    planned(rounded=False)
-    assert "no rounded corners" in run("plan", job, "--corners").stdout
-    assert "no rounded corners" not in run("plan", job).stdout
+    planned(turns=False)
+    assert "no corners to list" in run("plan", job, "--corners").stdout
+    assert "no corners to list" not in run("plan", job).stdout
 
 
 def test_json_is_all_there_is_on_stdout(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
     planned()
-    result = run("plan", job, "--json", "-o", tmp_path / "out")
+    result = run("plan", job, "--json", "--quiet", "-o", tmp_path / "out")
     assert json.loads(result.stdout)["cycle_time_s"] == pytest.approx(0.8)
     assert result.stderr == ""
 
@@ -168,8 +168,20 @@ def test_verify_takes_the_recorded_machine(job: Path, tmp_path: Path) -> None:
     said = json.loads(result.stdout)
     assert said["machine"] == "router"
     assert said["contour_error_mm"] < 1e-9
-    assert said["notes"] == []
-    assert run("verify", path, job, "-m", "mill").exit_code == 0
+    assert said["tolerance_mm"] == 0.01
+    assert said["cycle_time_s"] == 6.0
+    assert said["notes"] == [
+        "the file says: machine router (taken)",
+        "the file says: tolerance 0.01 mm (taken)",
+    ]
+    other = run("verify", path, job, "-m", "mill")
+    assert other.exit_code == 0
+    assert "the file says: tolerance 0.01 mm (not taken, -m or --tolerance is given)" in other.stderr
+    assert ["tolerance", f"{load_machine('mill').tolerance:g}", "mm"] in [
+        row.split() for row in other.stdout.splitlines()
+    ]
+    assert ["cycle", "time", "6.0000", "s"] in [row.split() for row in other.stdout.splitlines()]
+    assert json.loads(run("verify", path, job, "--tolerance", "0.5", "--json").stdout)["tolerance_mm"] == 0.5
     unknown = run("verify", path, job, "--not-limited", "yerk")
     assert unknown.exit_code == 2
     assert "jerk" in unknown.stderr

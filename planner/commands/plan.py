@@ -24,7 +24,7 @@ from planner.commands.options import (
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
 from planner.errors import InputError, NotSolvedError
 
-NO_CORNERS = "no rounded corners to list: they lie on splines or are full stops (--corner bezier rounds each by itself)"
+NO_CORNERS = "no corners to list: the program turns nowhere without a stop"
 
 
 @guarded
@@ -48,7 +48,8 @@ def plan(
     rounds: Annotated[
         int | None,
         typer.Option(
-            min=0, help="of reshaping splines for optimal [default: as many as the size of the job lets pay]"
+            min=0,
+            help="of reshaping splines for optimal and toppra [default: as many as the size of the job lets pay]",
         ),
     ] = None,
     tolerance: ToleranceOption = None,
@@ -62,7 +63,7 @@ def plan(
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="write pictures into DIR (PNG)")] = False,
     corners: Annotated[
-        bool, typer.Option("--corners", help="print the corners next to their closed-form speed")
+        bool, typer.Option("--corners", help="list every programmed corner beside eq. 18-20")
     ] = False,
     force: ForceOption = False,
     quiet: QuietOption = False,
@@ -106,7 +107,7 @@ def plan(
 
         show(plan_table(result, said["notes"]))
         if corners:
-            show("", corner_table(result) or NO_CORNERS)
+            show("", (corner_table(result.corners) if result.corners is not None else None) or NO_CORNERS)
         for name in written:
             say(str(output / name) if output else name)
     if result.trajectory is None:

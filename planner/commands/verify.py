@@ -1,16 +1,27 @@
-"""`planner verify`: judge a trajectory file."""
+"""`planner verify`: judge a trajectory file.
+
+The command line says against what. Where it is silent, a file that `plan` wrote brings its machine and its tolerance, and that is
+said; with -m it is that machine's tolerance, unless the program (G64 P) or --tolerance has another. What a file says about limits it
+did not keep is reported and never believed.
+"""
 
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, QuietOption, ToleranceOption
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
 from planner.errors import InputError
+
+if TYPE_CHECKING:
+    from planner.machine import Machine
+    from planner.verify import Verdict
 
 
 @guarded
@@ -40,45 +51,119 @@ def verify(
 ) -> None:
     """Judge a trajectory against its program and a machine; it may come from anywhere."""
     from planner.geometry.build import toolpath_from_program
-    from planner.machine import load_machine, machine_from_dict
     from planner.nc.reader import read_program
-    from planner.report.export import verdict_summary
+    from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
     from planner.report.trajectory_file import read_trajectory
     from planner.verify import verify as judge
+    from planner.verify.axes import fit_axes
     from planner.verify.judge import NOT_LIMITED_NAMES
 
-    read = read_trajectory(trajectory)
-    recorded = read.metadata.get("machine")
-    if machine is None and recorded is not None:
-        limits = machine_from_dict(recorded, source=f"{trajectory} (recorded machine)")
-    else:
-        limits = load_machine(machine or DEFAULT_MACHINE)
-    recorded_tolerance = read.metadata.get("tolerance_mm")
-    if tolerance is None and isinstance(recorded_tolerance, float):
-        tolerance = recorded_tolerance
-    recorded_free = read.metadata.get("not_limited")
-    recorded_names = recorded_free if isinstance(recorded_free, list) else []
-    unjudged = tuple(recorded_names if not_limited is None else not_limited)
+    unjudged = tuple(not_limited or ())
     for name in unjudged:
         if name not in NOT_LIMITED_NAMES:
             raise InputError(
                 f"--not-limited {name}: there is no such limit; {', '.join(NOT_LIMITED_NAMES)} are"
             )
-    toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance)
+    read = read_trajectory(trajectory)
+    says = FileSays.of(read.metadata)
+    limits, from_file = _machine(machine, trajectory, says)
+    taken = says.tolerance if machine is None and tolerance is None else None
+    toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance if taken is None else taken)
+    if not len(toolpath):
+        raise InputError("the program moves nothing: there is nothing to judge", source=str(job))
+    motion, given, fitted = fit_axes(read.trajectory, read.given, toolpath)
     with ProgressBar(quiet=quiet) as progress:
         verdict = judge(
-            read.trajectory,
+            motion,
             toolpath,
             limits,
+            given=given,
             not_limited=unjudged,
             progress=lambda fraction: progress("verify", fraction),
         )
+    notes = [*read.notes, *fitted, *verdict.notes]
+    notes += [f"the file says: {text}" for text in says.sentences(from_file, taken is not None)]
+    notes += says.remedies(verdict, unjudged)
+    budgets = toolpath.tolerance
     if as_json:
-        say(json.dumps({**verdict_summary(verdict), "machine": limits.name, "notes": read.notes}, indent=2))
+        about = {
+            "corners": corner_summary(verdict.corners),
+            "machine": limits.name,
+            "tolerance_mm": float(budgets[0]) if (budgets == budgets[0]).all() else None,
+            "cycle_time_s": motion.cycle_time,
+            "notes": notes,
+        }
+        say(json.dumps({**verdict_summary(verdict), **about}, indent=2))
     else:
-        for note in read.notes:
+        for note in notes:
             say(f"note: {note}", err=True)
-        show(verdict_table(verdict, f"{trajectory} on {job}, machine {limits.name}"))
+        low, high = float(budgets.min()), float(budgets.max())
+        asked = {
+            "cycle time": f"{motion.cycle_time:.4f} s",
+            "tolerance": f"{low:g} mm" if low == high else f"{low:g} to {high:g} mm",
+        }
+        show(verdict_table(verdict, f"{trajectory} on {job}, machine {limits.name}", asked))
     if not verdict.passed:
         raise typer.Exit(FAILED)
+
+
+def _machine(machine: str | None, trajectory: Path, says: FileSays) -> tuple[Machine, bool]:
+    """The machine of the command line, else the one that the file brings, else the default; True if it is the file's."""
+    from planner.machine import load_machine, machine_from_dict
+
+    if machine is None and says.machine is not None:
+        return machine_from_dict(says.machine, source=f"{trajectory} (its own machine)"), True
+    return load_machine(machine or DEFAULT_MACHINE), False
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileSays:
+    """What a trajectory file says of itself: used where the command line is silent, reported always, and no reason to pass.
+
+    machine     : its machine, as in a machine file, or None
+    tolerance   : the tolerance it was planned with [mm], or None
+    not_limited : quantities that its plan did not limit
+    """
+
+    machine: dict[str, Any] | None
+    tolerance: float | None
+    not_limited: tuple[str, ...]
+
+    @classmethod
+    def of(cls, metadata: dict[str, Any]) -> FileSays:
+        """From a file's metadata, which may be anybody's: what is not of its kind is not there."""
+        machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
+        free = metadata.get("not_limited")
+        number = isinstance(tolerance, (int, float)) and not isinstance(tolerance, bool)
+        return cls(
+            machine=machine if isinstance(machine, dict) else None,
+            tolerance=float(tolerance) if number and 0.0 < tolerance < math.inf else None,  # type: ignore[arg-type,operator]
+            not_limited=tuple(name for name in free if isinstance(name, str))
+            if isinstance(free, list)
+            else (),
+        )
+
+    def sentences(self, machine_taken: bool, tolerance_taken: bool) -> list[str]:
+        """What it says, and whether that was taken."""
+        said = []
+        if self.machine is not None:
+            taken = "taken" if machine_taken else "not taken, -m is given"
+            said.append(f"machine {self.machine.get('name')} ({taken})")
+        if self.tolerance is not None:
+            taken = "taken" if tolerance_taken else "not taken, -m or --tolerance is given"
+            said.append(f"tolerance {self.tolerance:g} mm ({taken})")
+        if self.not_limited:
+            said.append(
+                f"not limited: {', '.join(self.not_limited)} (judged all the same, unless --not-limited)"
+            )
+        return said
+
+    def remedies(self, verdict: Verdict, unjudged: tuple[str, ...]) -> list[str]:
+        """For limits that are exceeded and that the file's plan did not keep."""
+        broken = {name.partition(".")[0] for name, check in verdict.limits.items() if check.broken}
+        return [
+            f"{name} is exceeded; the file says that its plan did not limit it: --not-limited {name} reports it without judging"
+            for name in self.not_limited
+            if name in broken and name not in unjudged
+        ]

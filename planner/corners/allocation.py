@@ -27,8 +27,12 @@ from planner.machine import Machine
 
 def error_rate(machine: Machine) -> float:
     """c [s2]: chord and filter error per unit of normal acceleration."""
-    filters = machine.fir.time_constants if machine.fir else ()
-    return machine.dt**2 / 8.0 + sum(T * T for T in filters) / 24.0
+    return machine.dt**2 / 8.0 + filter_rate(machine)
+
+
+def filter_rate(machine: Machine) -> float:
+    """sum T^2/24 [s2]: filter error per unit of acceleration."""
+    return sum(T * T for T in machine.fir.time_constants) / 24.0 if machine.fir else 0.0
 
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:

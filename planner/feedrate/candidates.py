@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.arrays import Array, FloatArray
 from planner.corners import kinematic as corner
-from planner.corners.allocation import error_rate
+from planner.corners.allocation import error_rate, filter_rate
 from planner.corners.sharing import share_legs
 from planner.feedrate.look_ahead import Legs, Passage, capped, needed
 from planner.feedrate.ramps import Kind
@@ -36,12 +36,12 @@ EASE_MIN = 1e-12  # speed^2 per length [mm/s2] that a corner counts with at leas
 def leg_limits(path: PathLegs, toolpath: Toolpath, machine: Machine) -> Legs:
     """Limits of the legs of a path of lines, and of arcs between full stops.
 
-    The acceleration a is at most the tolerance over dt^2/8: half a period before and after a full stop the motion is a dt^2/8 from the
-    vertex, and the chord between samples there cuts it off.
+    The acceleration a is at most the tolerance over the rate at which filters err: a full stop is rounded by them.
     """
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
-    tolerance = toolpath.tolerance[path.first]
-    a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / error_rate(machine))
+    if machine.fir is not None:
+        tolerance = toolpath.tolerance[path.first]
+        a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_rate(machine))
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     return Legs(length=path.length, v=share * v, a=share * a, j=share * j)
 

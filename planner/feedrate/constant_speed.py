@@ -17,7 +17,7 @@ import numpy as np
 
 from planner.arrays import Array, FloatArray
 from planner.constraints.assemble import feedrate_problem
-from planner.corners.allocation import error_rate
+from planner.corners.allocation import filter_rate
 from planner.corners.elements import element_point, to_arc_length
 from planner.feedrate.rest_to_rest import block_limits
 from planner.feedrate.stretches import Stretches
@@ -27,6 +27,8 @@ from planner.machine import Machine
 from planner.path import PathSamples
 
 PARTS = 4  # of a grid interval, for its samples
+# Limits along blocks that differ by less than this share are the same [-]: coordinates rounded to 1e-9 of a block's length.
+SAME = 1e-9
 QUANTITIES = ("acceleration", "jerk")
 
 
@@ -84,10 +86,11 @@ def stretches_of(
     run = np.searchsorted(samples.piece, at, side="right") - 1
     joint = np.where(element < 0, ~element, -1)
     limits = _block_limits(path.toolpath, machine)[:, samples.segment[at]]
-    other = (np.diff(limits) != 0).any(axis=0) & (joint[1:] < 0)
+    # Where a line is cut into blocks must not part it, and the directions of its blocks differ by rounding.
+    other = (np.abs(np.diff(limits)) > SAME * limits[:, 1:]).any(axis=0) & (joint[1:] < 0)
     change = (np.diff(run) != 0) | (np.diff(joint) != 0) | other
     first = np.insert(np.flatnonzero(change) + 1, 0, 0)
-    joint, run, (v, a, j) = joint[first], run[first], limits[:, first]
+    joint, run, (v, a, j) = joint[first], run[first], np.minimum.reduceat(limits, first, axis=1)
     begin = samples.s[at[first]]
     corner = joint >= 0
     bare = (corner[:-1] & corner[1:]) | ((np.diff(run) != 0) & (corner[:-1] | corner[1:]))
@@ -106,13 +109,12 @@ def stretches_of(
 
 
 def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """Limits v, a, j (3, M) along every segment.
-
-    Between samples dt apart a motion that turns at a vertex with the acceleration a bows by a dt^2/8: no more than the tolerance.
-    """
+    """Limits v, a, j (3, M) along every segment; a is at most the tolerance over the rate at which filters err: a full stop is rounded
+    by them."""
     v, a, j = block_limits(toolpath, machine)
-    resolved = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / error_rate(machine)
-    return np.stack([v, np.minimum(a, resolved), j])
+    if machine.fir is not None:
+        a = np.minimum(a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_rate(machine))
+    return np.stack([v, a, j])
 
 
 @njit(cache=True, error_model="numpy")

@@ -53,6 +53,10 @@ class BezierMethod(Method):
 
     ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return self.allocate
+
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):
@@ -71,16 +75,16 @@ class BezierMethod(Method):
         motion = job.behind_filters(motion)
         made = job.deliver(motion)
         with job.stage("report"):
-            corners = _corner_table(motion, limits)
+            rounded = _corner_table(motion, limits)
         return job.plan(
             made,
             method="bezier",
             corner=self.corner.name,
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=f"{len(corners)} corners are run through, {int(stops.sum())} are faster as full stops",
+            sentence=f"{len(rounded)} corners are run through, {int(stops.sum())} are faster as full stops",
             grid_points=len(samples),
-            corners=corners,
+            rounded=rounded,
         )
 
 

@@ -1,27 +1,15 @@
-"""The feed of each block of a program in a planned motion: what an F word per block can say of it.
+"""F words that let an ordinary control keep to a planned motion, and the time of each block in it.
 
-An ordinary control holds F in the middle of a block and puts its own ramps at the ends of it. What that asks of F depends on whether
-it has room for them. With v the highest planned feed in the block, and a what the axes' accelerations leave along it, a block is
+A control holds F in the middle of a block and puts its own ramps at the ends. Of the planned feed it is told an upper envelope: runs
+of blocks, each with the highest planned feed in it. Three things follow.
 
-* long, if the way from rest to v and to rest again fits in:  v^2/a <= length. Its F is v: the ramps are the control's.
-* dense, otherwise. Its F is the mean, its programmed length over its planned time: the feed changes from block to block, and the
-  F words are what keeps the control near the plan. Over dense blocks
+* Planned again, the program takes the planned time: the planned motion keeps all its F words, and nothing faster than it was there.
+* A control that can follow the plan is not slower than it; one without a jerk limit may be faster.
+* Blocks of a run share one F word. Controls join short blocks into one move only where F does not change between them (LinuxCNC's
+  naive CAM detector), and give every move a servo period at least.
 
-      sum of length / feed  =  their planned time
-
-  exactly, but for blocks whose quotient is above the programmed feed (the motion cuts corners, its path is shorter).
-
-Run by LinuxCNC 2.9 (axes at 100 mm/s and 2000 mm/s2, no jerk limit of its own, G64 P0.05 Q0) at the feeds of jerk-limited plans
-(2e5 mm/s3), the programs took so much longer than planned:
-
-    feeds                        pentagon   zig-zag   circle of chords   spiral of chords   relief
-    means                        19.4 %     18.1 %    0.7 %              -0.3 %              2.7 %
-    highest                       5.1 %      6.1 %    0.4 %              -3.2 %             -8.3 %
-    highest if long, else mean    5.1 %      6.1 %    0.7 %              -0.9 %             -1.4 %
-
-What remains on the long blocks is how that control rounds corners. Beside full stops the plan is so slow that short blocks are long
-too; there a control without a jerk limit gets ahead by some milliseconds. A feed for which trapezoids between the planned feeds at the
-joints take the planned time was tried too: 8.0, 11.7, 0.7, -0.6, -2.3 %.
+A run ends where the next block's highest feed is off by more than `SPREAD`, but not before `RUN_PERIODS` interpolation periods. The
+feed changes by little in less, and moves between two F words should last longer than a control's period.
 
 The motion passes a joint between two samples, k the last before it. Along the programmed path the joint divides the
 distance between the two samples; with g = the share of it that lies before the joint, v0 and v1 the feeds at both samples
@@ -37,34 +25,53 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.feedrate.rest_to_rest import block_limits
+from planner.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.trajectory import Trajectory
 
 # A highest feed within this share of the programmed one is the programmed one [-]: solvers stay a little away from their limits.
 SAME = 1e-3
+# F words are this much above the planned feed [-]: they are written rounded down to four digits.
+ABOVE = 1e-3
+# The highest feeds of a run's blocks differ by at most this [-], ...
+SPREAD = 0.5
+# ... unless it lasts less than so many interpolation periods.
+RUN_PERIODS = 20
 
 
 def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
-    """(blocks,) feed of each block [mm/s]; NaN for rapids and for blocks that move nowhere; inf where a dense block takes no
-    measurable time.
+    """(blocks,) feed of each block [mm/s]; NaN for rapids and for blocks that move nowhere.
 
     blocks : number of blocks of the program
     """
     joint = _joint_times(trajectory, toolpath)
     duration = _block_times(joint, toolpath)
-    mean = np.full(len(toolpath), np.inf)
-    np.divide(toolpath.length, duration, out=mean, where=duration > 0)
-    highest = _highest_feeds(trajectory, toolpath, joint)
-    _, acceleration, _ = block_limits(toolpath, machine)
-    long = highest**2 <= acceleration * toolpath.length
-    full = highest >= toolpath.feed * (1.0 - SAME)
-    feed = np.where(long, np.where(full, toolpath.feed, highest), mean)
+    highest = _highest_feeds(trajectory, toolpath, joint, duration)
+    cut = np.flatnonzero(~toolpath.rapid)
+    run = _runs(highest[cut], duration[cut], RUN_PERIODS * machine.dt)
+    cap = np.zeros(len(cut))  # of each run
+    np.maximum.at(cap, run, highest[cut])
+    cap = cap[run]
+    programmed = toolpath.feed[cut]
     feeds = np.full(blocks, np.nan)
-    feeds[toolpath.block[~toolpath.rapid]] = feed[~toolpath.rapid]
+    feeds[toolpath.block[cut]] = np.where(cap >= programmed * (1.0 - SAME), programmed, cap * (1.0 + ABOVE))
     return feeds
+
+
+def _runs(highest: FloatArray, duration: FloatArray, least: float) -> Array:
+    """(n,) the run of each block, from 0; `least` [s] as the module says."""
+    run = np.empty(len(highest), np.int64)
+    count, lasted = 0, 0.0
+    low = high = highest[0] if len(highest) else 0.0
+    for k, (feed, time) in enumerate(zip(highest.tolist(), duration.tolist(), strict=True)):
+        low, high = min(low, feed), max(high, feed)
+        if high > (1.0 + SPREAD) * low and lasted >= least:
+            count, lasted = count + 1, 0.0
+            low = high = feed
+        run[k] = count
+        lasted += time
+    return run
 
 
 def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
@@ -76,12 +83,24 @@ def _block_times(joint: FloatArray, toolpath: Toolpath) -> FloatArray:
     return np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
 
 
-def _highest_feeds(trajectory: Trajectory, toolpath: Toolpath, joint: FloatArray) -> FloatArray:
-    """(M,) highest planned feed on each segment, at its samples and, for segments between two samples, at its joints [mm/s]."""
-    passed = np.interp(joint, trajectory.t, trajectory.feed)
+def _highest_feeds(
+    trajectory: Trajectory, toolpath: Toolpath, joint: FloatArray, duration: FloatArray
+) -> FloatArray:
+    """(M,) highest planned feed on each segment [mm/s]: at its samples, half-way between them, as far as feeds and accelerations at
+    both tell, and at its joints. Its mean at least; twice that where both joints are passed at less than half of it, as between two
+    full stops without a sample: from rest to rest no jerk-limited motion is faster."""
+    t, feed = trajectory.t, trajectory.feed
+    passed = np.interp(joint, t, feed)
     highest = np.maximum(passed[:-1], passed[1:])
-    np.maximum.at(highest, np.searchsorted(toolpath.block, trajectory.block), trajectory.feed)
-    return highest
+    segment = np.searchsorted(toolpath.block, trajectory.block)
+    np.maximum.at(highest, segment, feed)
+    push = (trajectory.velocity * trajectory.acceleration).sum(axis=1)
+    push = np.divide(push, feed, out=np.zeros_like(feed), where=feed > 0)
+    half_way = (feed[1:] + feed[:-1]) / 2 + np.diff(t) / 8 * (push[:-1] - push[1:])
+    np.maximum.at(highest, segment[1:], half_way)
+    np.maximum.at(highest, segment[:-1], half_way)
+    mean = np.divide(toolpath.length, duration, out=np.zeros(len(toolpath)), where=duration > 0)
+    return np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean)
 
 
 def _joint_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:

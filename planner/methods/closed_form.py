@@ -1,10 +1,11 @@
-"""The plan against the papers: every corner's speed next to the error-allocation speed of paper 002, eq. (19), (20).
+"""Corners that a method rounds each by itself: their shape, and their speed next to eq. (19), (20) for this very shape.
 
     v = sqrt(X / kappa_max),    X = min(A, (eps - eps_ap) / (dt^2/8 + sum T^2/24))
 
 with A as in corners/allocation.py. The planned speed at the apex never exceeds it, and reaches it where normal acceleration or
 the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is largest between straight legs
-(PAPERS C); on arcs it is the curvature at the same place.
+(PAPERS C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners and for all
+methods, is the verifier's business (verify/error_allocation.py), which shares nothing with this.
 """
 
 from __future__ import annotations

@@ -48,6 +48,10 @@ class FirMethod(Method):
     def __post_init__(self) -> None:
         check_profile_filters(self.profile_filters)
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return not self.plain
+
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
             course = course_of(job.toolpath, job.machine, self.profile_filters)

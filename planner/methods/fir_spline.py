@@ -70,6 +70,10 @@ class FirSplineMethod(Method):
         if not 0 < self.phase_lag < np.inf:
             raise InputError(f"phase_lag = {self.phase_lag} rad; it must be positive and finite")
 
+    @property
+    def keeps_tolerance(self) -> bool:
+        return not self.plain
+
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
             stopping = job.toolpath if self.plain else self._with_stops(job.toolpath, job.machine)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,12 +17,14 @@ from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.passing import segments_at
-from planner.geometry.toolpath import Toolpath
+from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
+from planner.methods import periods
 from planner.methods.behind import kept
 from planner.methods.closed_form import CornerTable
 from planner.methods.notes import job_notes
 from planner.methods.pacing import TimedT
+from planner.methods.periods import settled
 from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
@@ -30,16 +34,21 @@ from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
 
 Delivered = tuple[Trajectory, Verdict]
+# A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
+# elsewhere, but what one phase may do to a corner is known after the first.
+PERIOD_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
     """A program on its way to a plan.
 
-    toolpath : the program's exact path, with its tolerances
-    stages   : the clock
-    judged   : machine and toolpath that the motion is kept to and judged by where it is planned with others (`with_share`), else None
-    noted    : what the method has said of what it gave up (`note`)
+    toolpath  : the path that is planned: the program's exact path, with its tolerances, or less of them (`with_share`,
+                methods/periods.py)
+    stages    : the clock
+    judged    : machine and toolpath that the motion is kept to and judged by where it is planned with others, else None
+    noted     : what the method has said of what it gave up (`note`)
+    motion_of : the motions of the trajectories delivered so far, as long as these live
     """
 
     program: Program
@@ -48,6 +57,7 @@ class Job:
     stages: Stages
     noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
+    motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
 
     @property
     def real(self) -> tuple[Machine, Toolpath]:
@@ -59,15 +69,16 @@ class Job:
         of `seen` of their lengths [-]."""
         machine, toolpath = self.real
         assert machine.fir is not None
-        lengths = tuple(
-            seen * np.sqrt(share) * T for T in machine.fir.time_constants
-        )  # T^2 over tolerance stays
-        return replace(
+        by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
+        lag = machine.fir.phase_lag_max
+        filters = {
+            "time_constants": tuple(by * T for T in machine.fir.time_constants),
+            "phase_lag_max": None if lag is None else by * lag,
+        }
+        return dataclasses.replace(
             self,
-            machine=machine.model_copy(
-                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
-            ),
-            toolpath=replace(toolpath, tolerance=share * toolpath.tolerance),
+            machine=machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)}),
+            toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
             judged=(machine, toolpath),
             noted=[],
         )
@@ -79,6 +90,10 @@ class Job:
     def note(self, *sentences: str) -> None:
         """Add to the notes of the plan: what was given up, with its first line and how often."""
         self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+
+    def afresh(self) -> Job:
+        """The job for another plan of it, with notes of its own."""
+        return dataclasses.replace(self, noted=[])
 
     @cached_property
     def stop_time(self) -> float:
@@ -94,13 +109,16 @@ class Job:
             return kept(motion, toolpath, machine)
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
-        """Sample a motion at the interpolation period and have it judged, between the samples too.
+        """Sample a motion at the interpolation period, with stops that its chords do not cut off (methods/periods.py), and have it
+        judged, between the samples too.
 
         seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
         """
         machine, toolpath = self.real
         with self.stage("sample"):
+            motion = self.settled(motion, not_limited)
             trajectory = self._named(sample_motion(motion, machine.dt))
+        self.motion_of[trajectory] = motion
         with self.stage("verify") as progress:
             verdict = verify(
                 trajectory,
@@ -113,16 +131,22 @@ class Job:
             )
         return trajectory, verdict
 
+    def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
+        """The motion as it is delivered: with the standstills that its samples need."""
+        machine, toolpath = self.real
+        return settled(motion, toolpath, machine, "jerk" not in not_limited)
+
     def _named(self, trajectory: Trajectory) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
         method's own blocks and a note."""
-        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
+        _, toolpath = self.real
+        segment = segments_at(toolpath, trajectory.position, trajectory.feed)
         if segment is None:
             self.note(
                 "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
             )
             return trajectory
-        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
+        return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
 
     def plan(
         self,
@@ -134,7 +158,7 @@ class Job:
         status: Status,
         sentence: str,
         grid_points: int,
-        corners: CornerTable | None = None,
+        rounded: CornerTable | None = None,
         grid: GridHistory | None = None,
         prices: PriceList | None = None,
     ) -> Plan:
@@ -151,7 +175,7 @@ class Job:
             sentence=sentence,
             trajectory=trajectory,
             verdict=verdict,
-            corners=corners,
+            rounded=rounded,
             grid=grid,
             stop_time=self.stop_time,
             grid_points=grid_points,
@@ -188,16 +212,40 @@ class Method(ABC):
             toolpath = toolpath_from_program(program, machine, tolerance)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
         require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
-        return self._fastest(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+        return self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
 
-    def _fastest(self, job: Job) -> Plan:
-        """The plan; for a machine with filters the fastest of those that are tried (`ways`)."""
-        best = self.plan_job(job)
+    def plan_best(self, job: Job) -> Plan:
+        """The plan of a job; for a machine with filters the fastest of those that are tried (`ways`)."""
+        best = self.plan_within_periods(job)
         if job.machine.fir is None or not best.solved:
             return best
         for share, seen in self.ways:
-            best = faster(best, self.plan_job(job.with_share(share, seen)))
+            best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
         return best
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        return True
+
+    def plan_within_periods(self, job: Job) -> Plan:
+        """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""
+        made = self.plan_job(job)
+        given, planned, (machine, programmed) = job, job.toolpath, job.real
+        for _ in range(PERIOD_ROUNDS):
+            if not self.keeps_tolerance or made.trajectory is None or _inside(made):
+                break
+            with job.stage("geometry"):
+                near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
+                less = periods.with_less_tolerance(planned, programmed, near, far)
+            if less is None:
+                break
+            planned = less
+            job = dataclasses.replace(given, toolpath=planned, judged=(machine, programmed), noted=[])
+            made = self.plan_job(job)
+        if job is given:
+            return made
+        return dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
@@ -211,3 +259,19 @@ def faster(plan: Plan, other: Plan) -> Plan:
     if plan.verdict.passed != other.verdict.passed:
         return plan if plan.verdict.passed else other
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _inside(made: Plan) -> bool:
+    """True if the motion's samples and chords keep the tolerance."""
+    return made.verdict is None or not (made.verdict.vertex.broken or made.verdict.contour.broken)
+
+
+def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
+    """What the period took from the corners, for the notes."""
+    stops = (planned.joint == Joint.STOP) & (programmed.joint != Joint.STOP)
+    less = (planned.tolerance < programmed.tolerance) & ~stops
+    first = programmed.line[np.flatnonzero(stops | less)[0] - 1]
+    return (
+        f"samples {made.machine.dt * 1e3:g} ms apart: corners planned with less of the tolerance {less.sum()}, full stops instead of "
+        f"corners {stops.sum()}, the first at the end of line {first}"
+    )

@@ -75,7 +75,7 @@ class KinematicMethod(Method):
             motion = _motion(course, job.toolpath.axes)
         made = job.deliver(job.behind_filters(motion))
         with job.stage("report"):
-            corners = _corner_table(course, job.machine)
+            rounded = _corner_table(course, job.machine)
         return job.plan(
             made,
             method="kinematic",
@@ -84,7 +84,7 @@ class KinematicMethod(Method):
             status=Status.OPTIMAL,
             sentence=_sentence(course),
             grid_points=len(course.path) + 1,
-            corners=corners,
+            rounded=rounded,
         )
 
     def _course(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Course:

@@ -25,7 +25,7 @@ from planner.nc.reader import read_program
 DEFAULT_MACHINE = "mill"
 REACHABILITY = "reachability"
 # Which methods use which setting of `plan`.
-USED_BY = {"corner": ("optimal", "toppra"), "solver": ("toppra",), "rounds": ("optimal",)}
+USED_BY = {"corner": ("optimal", "toppra"), "solver": ("toppra",), "rounds": ("optimal", "toppra")}
 METHODS = (
     "optimal",
     "toppra",
@@ -58,8 +58,8 @@ def plan(
     method    : a name of `METHODS`, or a method with settings of your own
     corner    : "auto", "spline", "bezier", "fir" or "kinematic", for "toppra" and "optimal" only; None for "auto"
     solver    : "reachability" or "toppra", for "toppra" only; None for "reachability"
-    rounds    : in which "optimal" reshapes splines ("auto", "spline") by what their motion pays for; None for as many as the size of
-                the job lets pay
+    rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
+                the size of the job lets pay
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
@@ -108,7 +108,7 @@ def _method(name: str, corner: str, solver: str, rounds: int | None) -> Method:
     if name == "optimal":
         return OptimalMethod(corner=corner, rounds=rounds)
     if name == "toppra":
-        return ToppraMethod(corner=corner, solver=solver)
+        return ToppraMethod(corner=corner, solver=solver, rounds=rounds)
     if name == "bezier":
         return BezierMethod()
     if name == "kinematic":

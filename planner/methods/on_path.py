@@ -66,29 +66,30 @@ def best_on_path(
 def plan_of_solution(
     job: Job,
     best: OnPath,
-    motion: Motion | None,
     made: Delivered | None,
     *,
     method: str,
     corner: str | CornerShape,
     prices: PriceList | None = None,
 ) -> Plan:
-    """The plan of a solution and the motion made of it, None for both unless solved."""
-    corners = grid = None
-    if motion is not None:
+    """The plan of a solution and what was delivered of it, None unless solved."""
+    rounded = grid = None
+    if made is not None:
+        delivered = job.motion_of[made[0]]  # with the standstills that its samples need
+        assert isinstance(delivered, Motion)
         with job.stage("report"):
-            corners = corner_table(best.samples, best.problem, best.solution)
-            grid = history(best.problem, best.solution, motion.law)
-        job.note(*path_notes(job.toolpath, best))
+            rounded = corner_table(best.samples, best.problem, best.solution)
+            grid = history(best.problem, best.solution, delivered.law)
+        job.note(*path_notes(job.toolpath, best), *best.notes)
     return job.plan(
         made,
         method=method,
         corner=corner if isinstance(corner, str) else corner.name,
         solver=best.solution.solver,
         status=best.solution.status,
-        sentence="; ".join((best.solution.sentence, *best.notes)),
+        sentence=best.solution.sentence,
         grid_points=len(best.samples),
-        corners=corners,
+        rounded=rounded,
         grid=grid,
         prices=prices,
     )

@@ -63,7 +63,7 @@ class OptimalMethod(Method):
         return fastest(
             plan,
             job,
-            lambda corner: self._on_corner(job, corner),
+            self._on_corner,
             lambda path, coarser: self._on_path(path, job.machine, job.stages, finer=coarser),
         )
 
@@ -99,7 +99,7 @@ class OptimalMethod(Method):
                 with job.stage("report"):
                     by_site = _site_prices(best)
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
-        return plan_of_solution(job, best, motion, made, method="optimal", corner=corner, prices=prices)
+        return plan_of_solution(job, best, made, method="optimal", corner=corner, prices=prices)
 
     def _again(self, job: Job) -> Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]:
         """The motion of another problem on the same grid, None if there is none."""

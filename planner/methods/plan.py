@@ -15,7 +15,7 @@ from planner.methods.closed_form import CornerTable
 from planner.methods.prices import PriceList
 from planner.nc.program import Program
 from planner.trajectory import Trajectory
-from planner.verify import Verdict
+from planner.verify import CornerCheck, Verdict
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,7 +52,7 @@ class Plan:
     method, corner, solver : what was used; corner is None where the method rounds no corners
     status, sentence       : how it ended
     trajectory, verdict    : None unless solved
-    corners                : each corner next to its closed-form speed, or None
+    rounded                : the corners that the method rounds each by itself, next to their closed-form speed, or None
     grid                   : the profile at the grid points, or None
     prices                 : what the limits cost, or None where the solver does not tell
     stop_time              : time if every block ran from rest to rest [s], dwells included
@@ -71,7 +71,7 @@ class Plan:
     sentence: str
     trajectory: Trajectory | None
     verdict: Verdict | None
-    corners: CornerTable | None
+    rounded: CornerTable | None
     grid: GridHistory | None
     stop_time: float
     grid_points: int
@@ -83,6 +83,11 @@ class Plan:
     def solved(self) -> bool:
         """True if there is a trajectory."""
         return self.trajectory is not None
+
+    @property
+    def corners(self) -> CornerCheck | None:
+        """Eq. 18-20 at every programmed corner, as the verdict found them; None unless solved."""
+        return self.verdict.corners if self.verdict is not None else None
 
     def require(self) -> Plan:
         """Return self, or raise NotSolvedError with the sentence."""

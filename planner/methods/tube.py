@@ -1,17 +1,20 @@
-"""Method `tube`: geometry and feed found together, anywhere inside the tolerance: the physical limit, for short jobs.
+"""Method `tube`: geometry and feed found together, anywhere inside the tolerance; for short jobs.
 
 All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (tube/nlp.py), so
-nothing is given away between the two; what is still lost against the true limit is the step (5e-5) and what a better local optimum
-would gain. It takes about a second per corner where the others take milliseconds, hence `LEGS_MAX`.
+nothing is given away between the two. What is found is the best motion near the one from which the search starts, with no certificate
+that there is no better one elsewhere. It takes about a second per corner where the others take milliseconds, hence `LEGS_MAX`.
 
 1. The path falls into courses between full stops, each a problem of its own (tube/course.py).
-2. Method `optimal` makes the motion from which the search starts (tube/guess.py).
+2. Methods of `starts` make motions from which the search begins (tube/guess.py): the first one's, and where that does not lead to a
+   faster one the next one's.
 3. ipopt finds the motion; it is integrated exactly and slowed down by what rounding exceeds (tube/motion.py).
+4. Where no search ends faster than the first start, its motion stays, course by course (tube/splice.py): the plan is never slower.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,67 +24,64 @@ from planner.axis_motion import AxisMotion
 from planner.errors import InputError
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
-from planner.methods.job import Job, Method
+from planner.methods.job import Delivered, Job, Method
 from planner.methods.optimal import OptimalMethod
+from planner.methods.periods import missed
 from planner.methods.plan import Plan
 from planner.methods.stages import Stages
 from planner.nc.program import Program
-from planner.trajectory import Trajectory
+from planner.passing import passing_times, standstills
+from planner.timing import MotionInTime, in_chunks
+from planner.trajectory import Trajectory, joined
 from planner.tube.course import Course, courses_of
 from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of
 from planner.tube.nlp import TubeNLP
+from planner.tube.splice import Part, Spliced
 
 # A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
 # 7 s, one of 400 two minutes and 0.44 GB.
 LEGS_MAX = 500
 # The start is sampled at this share of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
-# Of the start, what is slower than this share of its fastest counts as standing [-].
-STANDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
 class TubeMethod(Method):
-    """The free optimum inside the tolerance.
+    """The best motion inside the tolerance near those of other methods.
 
-    start  : the method whose motion the search starts from
+    starts : methods whose motions the search starts from; the first one's is what the plan is never slower than
     solver : settings of the search
     """
 
-    start: OptimalMethod = field(default_factory=lambda: OptimalMethod(corner="bezier"))
+    starts: tuple[Method, ...] = field(
+        default_factory=lambda: (OptimalMethod(), OptimalMethod(corner="bezier"))
+    )
     solver: TubeNLP = field(default_factory=TubeNLP)
 
     def plan_job(self, job: Job) -> Plan:
-        toolpath = job.toolpath
         with job.stage("geometry"):
-            courses = list(courses_of(toolpath, job.machine))
+            courses = list(courses_of(job.toolpath, job.machine))
             _check_size(courses, job.program)
         with job.stage("start"):
-            start = self.start.plan_job(_often_sampled(job))
-        status, sentence = start.status, start.sentence
-        steps: list[Steps] = []
-        places: list[FloatArray] = []
+            starts = _Starts(self.starts, job)
+            first = next(iter(starts), None)
+        found: list[_Found] = []
         with job.stage("solve") as report:
-            for done, course in enumerate(courses):
-                if start.trajectory is None:
-                    break
-                window, vertex_time = _passed(course, start.trajectory, toolpath)
-                guess = guess_from(course, window, vertex_time)
-                solution = self.solver.solve(course, guess)
-                if solution.h is None or solution.place is None:
-                    status = solution.status
-                    sentence = f"lines {_lines(course, toolpath)}: {solution.sentence}"
-                    break
-                if not steps or solution.status is Status.ACCEPTABLE:  # the worse one stands for all courses
-                    status, sentence = solution.status, solution.sentence
-                steps.append(steps_of(course, guess, solution))
-                places.append((solution.place[:-1] + solution.place[1:]) / 2)
-                report((done + 1) / len(courses))
-        made = None
-        if start.trajectory is not None and len(steps) == len(courses):
-            made = job.deliver(job.behind_filters(_motion(courses, steps, places, toolpath)))
-            sentence += f"; {start.method} with corner {start.corner}, its start, took {start.trajectory.cycle_time:.6g} s"
+            for k, course in enumerate(courses if first else ()):
+                found.append(self._search(k, course, starts))
+                report((k + 1) / len(courses))
+        if first is None:
+            failed = starts.failed[0]
+            return self._plan(job, None, failed.status, f"no motion to start from: {failed.sentence}", 0)
+        made, kept, why = _delivered(job, first, found)
+        status, sentence = _said(job, first, found, kept, why)
+        grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.plan.grid_points
+        return self._plan(job, made, status, sentence, grid_points)
+
+    def _plan(
+        self, job: Job, made: Delivered | None, status: Status, sentence: str, grid_points: int
+    ) -> Plan:
         return job.plan(
             made,
             method="tube",
@@ -89,8 +89,99 @@ class TubeMethod(Method):
             solver=repr(self.solver),
             status=status,
             sentence=sentence,
-            grid_points=sum(len(part.h) + 1 for part in steps),
+            grid_points=grid_points,
         )
+
+    def _search(self, k: int, course: Course, starts: _Starts) -> _Found:
+        """What the search along course k leads to from one start after the other, until it is faster than the first start."""
+        least, why = np.inf, []
+        for start in starts:
+            least = min(least, start.lasting(k)) if start is starts.made[0] else least
+            guess = guess_from(course, *start.window(k, course))
+            solution = self.solver.solve(course, guess)
+            if solution.h is None or solution.place is None:
+                why.append(solution.sentence)
+                continue
+            steps = steps_of(course, guess, solution)
+            if steps.h.sum() >= least:
+                why.append("the search did not end faster than its start")
+                continue
+            place = (solution.place[:-1] + solution.place[1:]) / 2
+            return _Found(course, solution.status, solution.sentence, steps, place)
+        return _Found(course, Status.ACCEPTABLE, why[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """How the search along a course ended; the steps and the places of their middles [mm], None where the start stays."""
+
+    course: Course
+    status: Status
+    sentence: str
+    steps: Steps | None = None
+    place: FloatArray | None = None
+
+
+class _Start:
+    """A motion from which the search begins, and where in it the courses are."""
+
+    def __init__(self, plan: Plan, motion: MotionInTime, job: Job):
+        acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
+        period = max(START_PERIOD * float((acceleration / jerk).min()), motion.end / START_SAMPLES)
+        even = np.arange(0.0, motion.end, period)
+        edges = np.append(motion.t, motion.end)
+        self.plan, self.motion = plan, motion
+        self.seen = joined(list(in_chunks(motion, period, np.concatenate([even, edges]))))
+        self.times = passing_times(self.seen, job.toolpath)
+        self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
+
+    def lasting(self, k: int) -> float:
+        """Time along course k [s]."""
+        return float(self.arrival[k + 1] - self.departure[k])
+
+    def part(self, k: int) -> Part:
+        """The motion along course k, with the standstill before it, and the one at the end of the job."""
+        begin = self.arrival[k] if k else 0.0
+        last = k + 2 == len(self.arrival)
+        return Part(
+            motion=self.motion,
+            begin=float(begin),
+            end=self.motion.end if last else float(self.arrival[k + 1]),
+        )
+
+    def window(self, k: int, course: Course) -> tuple[Trajectory, FloatArray]:
+        """The motion along course k, and when it passes the course's vertices (R+1,) [s]."""
+        begin, end = self.departure[k], self.arrival[k + 1]
+        inside = np.searchsorted(self.seen.t, [begin, end])
+        window = slice(inside[0], inside[1] + 1)
+        columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
+        part = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
+        t = np.clip(self.times[course.first], begin, end)
+        t[[0, -1]] = begin, end
+        # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
+        seen = np.append(np.diff(t) > 0, True)
+        seen[1:-1] &= t[1:-1] < end
+        return part, np.interp(course.offset, course.offset[seen], t[seen])
+
+
+class _Starts:
+    """The motions of the starting methods, made when they are asked for."""
+
+    def __init__(self, methods: tuple[Method, ...], job: Job):
+        self.made: list[_Start] = []
+        self.failed: list[Plan] = []
+        self._methods, self._job = list(methods), job
+
+    def __iter__(self) -> Iterator[_Start]:
+        yield from list(self.made)
+        while self._methods:
+            own_clock = dataclasses.replace(self._job, stages=Stages(), noted=[])
+            plan = self._methods.pop(0).plan_best(own_clock)
+            if plan.trajectory is None:
+                self.failed.append(plan)
+                continue
+            self.made.append(_Start(plan, own_clock.motion_of[plan.trajectory], self._job))
+            yield self.made[-1]
 
 
 def _check_size(courses: list[Course], program: Program) -> None:
@@ -103,58 +194,92 @@ def _check_size(courses: list[Course], program: Program) -> None:
         )
 
 
-def _often_sampled(job: Job) -> Job:
-    """The job with a period short enough to see every phase of the start, and a clock of its own."""
-    acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
-    period = max(START_PERIOD * float((acceleration / jerk).min()), job.stop_time / START_SAMPLES)
-    machine = job.machine.model_copy(update={"dt": min(job.machine.dt, period)})
-    return dataclasses.replace(job, machine=machine, stages=Stages(), noted=[])
+def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered, list[int], str]:
+    """The motions found, and the start's where there are none; on which courses it stays, and why on those where one was found: a
+    motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
+    start = first.plan.trajectory, first.plan.verdict
+    assert start[0] is not None
+    assert start[1] is not None
+    kept, why = [k for k, one in enumerate(found) if one.steps is None], ""
+    filtered = job.real[0].fir is not None  # what goes on between two stops is felt behind them
+    if filtered and kept:
+        kept = list(range(len(found)))
+    while len(kept) < len(found):
+        motion = Spliced(
+            parts=tuple(
+                first.part(k) if k in kept else _part(job.toolpath, found[k]) for k in range(len(found))
+            )
+        )
+        made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
+        passed = made[1].passed or not start[1].passed
+        if passed and made[0].cycle_time <= start[0].cycle_time:
+            return made, kept, why
+        why = "what was found there is slower with its standstills" if passed else made[1].faults[0]
+        missed = set() if filtered else _missed(job, motion, found) - set(kept)
+        kept = sorted(missed | set(kept)) if missed else list(range(len(found)))
+    return (start[0], start[1]), kept, why
 
 
-def _passed(course: Course, start: Trajectory, toolpath: Toolpath) -> tuple[Trajectory, FloatArray]:
-    """The part of the start that runs a course from rest to rest, and when it passes the course's vertices (R+1,) [s]."""
-    begins = np.append(toolpath.block, toolpath.block[-1] + 1)[course.first]
-    sample = np.searchsorted(start.block, begins)
-    moving = sample[0] + np.flatnonzero(start.feed[sample[0] : sample[-1]] > STANDING * start.feed.max())
-    window = slice(max(moving[0] - 1, 0), moving[-1] + 2)
-    columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
-    part = dataclasses.replace(start, **{name: getattr(start, name)[window] for name in columns})
-    t = start.t[np.minimum(sample, len(start) - 1)].copy()
-    t[[0, -1]] = part.t[[0, -1]]
-    # Blocks so short that no sample falls on them share the time of their neighbours.
-    seen = np.append(np.diff(t) > 0, True)
-    return part, np.interp(course.offset, course.offset[seen], t[seen])
+def _missed(job: Job, motion: MotionInTime, found: list[_Found]) -> set[int]:
+    """The courses on which chords between samples miss vertices by more than the tolerance."""
+    machine, toolpath = job.real
+    _, far = missed(motion, toolpath, machine.dt)
+    over = np.flatnonzero(far > toolpath.tolerance)
+    return {
+        k
+        for k, one in enumerate(found)
+        if ((over > one.course.first[0]) & (over < one.course.first[-1])).any()
+    }
 
 
-def _motion(
-    courses: list[Course], steps: list[Steps], places: list[FloatArray], toolpath: Toolpath
-) -> AxisMotion:
-    """The motions along all courses, one after the other, with the dwells between them; places: of every step's middle [mm]."""
-    along = np.append(0.0, np.cumsum(toolpath.length))
-    h, segment = [], []
-    columns: dict[str, list[FloatArray]] = {"position": [], "velocity": [], "acceleration": [], "jerk": []}
-    for course, part, place in zip(courses, steps, places, strict=True):
-        first, last = course.first[0], course.first[-1]
-        standing = int(toolpath.dwell[first] > 0)  # a step without motion before the others
-        h += [toolpath.dwell[[first] * standing], part.h]
-        inside = np.searchsorted(along[first + 1 : last], along[first] + place, side="right")
-        segment += [[first] * standing, first + inside]
-        for name, column in columns.items():
-            whole = np.zeros((standing + len(part.h), len(toolpath.axes)))
-            if name == "position":
-                whole += toolpath.start[first]
-            whole[standing:, course.axis] = getattr(part, name)
-            column.append(whole)
-    t = np.append(0.0, np.cumsum(np.concatenate(h)))
-    of: Array = np.concatenate(segment).astype(np.int64)
-    return AxisMotion(
+def _said(job: Job, first: _Start, found: list[_Found], kept: list[int], why: str) -> tuple[Status, str]:
+    """Status and sentence: of the worst search, and where the start stays."""
+    took = [one for k, one in enumerate(found) if k not in kept]
+    worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
+    text = worst.sentence if worst else "no motion faster than the start's was found"
+    start = first.plan
+    assert start.trajectory is not None
+    text += f"; {start.method}{f' with corner {start.corner}' if start.corner else ''}, its start, took "
+    text += f"{start.trajectory.cycle_time:.6g} s"
+    if kept:
+        course = found[kept[0]].course
+        why = why or found[kept[0]].sentence
+        text += (
+            f" and stays on {len(kept)} of {len(found)} stretches between full stops, the first on lines "
+            f"{_lines(course, job.toolpath)}: {why}"
+        )
+    return worst.status if worst and not kept else Status.ACCEPTABLE, text
+
+
+def _part(toolpath: Toolpath, found: _Found) -> Part:
+    """The steps along a course as a motion, with the dwell before it, and the one at the end of the job."""
+    course, steps = found.course, found.steps
+    assert steps is not None
+    assert found.place is not None
+    first, last = course.first[0], course.first[-1]
+    before = toolpath.dwell[first]
+    behind = toolpath.dwell[last] if last == len(toolpath) else 0.0
+    standing = int(before > 0)  # a step without motion before the others
+    along = np.append(0.0, np.cumsum(toolpath.length[first:last]))
+    inside = np.searchsorted(along[1:-1], found.place, side="right")
+    segment: Array = np.append([first] * standing, first + inside).astype(np.int64)
+    columns = {}
+    for name in ("position", "velocity", "acceleration", "jerk"):
+        whole = np.zeros((standing + len(steps.h), len(toolpath.axes)))
+        if name == "position":
+            whole += toolpath.start[first]
+        whole[standing:, course.axis] = getattr(steps, name)
+        columns[name] = whole
+    t = np.append(0.0, np.cumsum(np.append([before] * standing, steps.h)))
+    motion = AxisMotion(
         axes=toolpath.axes,
         t=t[:-1],
-        block=toolpath.block[of],
-        line=toolpath.line[of],
-        end=float(t[-1] + toolpath.dwell[-1]),
-        **{name: np.concatenate(column) for name, column in columns.items()},
+        block=toolpath.block[segment],
+        line=toolpath.line[segment],
+        end=float(t[-1] + behind),
+        **columns,
     )
+    return Part(motion=motion, begin=0.0, end=motion.end)
 
 
 def _lines(course: Course, toolpath: Toolpath) -> str:

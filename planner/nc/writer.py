@@ -1,9 +1,9 @@
 """Writing a program back with other feeds: F words are put in or replaced, every other byte stays as it is.
 
-An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it.
-So every block that gets a feed gets an F word of its own, in those units. A block that keeps its programmed feed is
-left alone as long as the F word in force is the source's; once one of ours is in force, the programmed feed is written
-out there. F words on lines without a feed move (alone on a line, beside G0) stay, they are what the source says.
+An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it. One is written where
+a block's feed is not the one in force, in those units, and where the source has one on the block's line its number is replaced. A block
+that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. F words
+on lines without a feed move (alone on a line, beside G0) stay, they are what the source says.
 
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
 up to 0.1 % longer than asked.
@@ -30,7 +30,6 @@ SAME_FEED = 1e-6
 
 _F, _G = ord("F"), ord("G")
 _NUMBER = re.compile(rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*")
-_OURS, _THEIRS = 1, 2  # whose F word a row has
 
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
@@ -59,16 +58,33 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, *, block_delete:
     wanted = np.maximum(asked[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
-    restored = ~slower & (f_word[row] < 0) & ~_source_rules(len(words.line), f_word, row[slower])[row]
-    edits = [
-        _edit(words, int(r), int(f_word[r]), round_down(value))
-        for r, value in zip(row[slower], wanted[slower], strict=True)
-    ]
-    edits += [
-        _edit(words, int(r), -1, np.format_float_positional(value, trim="-"))
-        for r, value in zip(row[restored], programmed[restored], strict=True)
-    ]
-    return _spliced(source, sorted(edits))
+    return _spliced(source, _edits(words, f_word, unit, row, np.where(slower, wanted, np.nan), programmed))
+
+
+def _edits(
+    words: Words, f_word: Array, unit: FloatArray, row: Array, wanted: FloatArray, programmed: FloatArray
+) -> list[Edit]:
+    """The F words to write on the rows (n,) of the feed moves, in the order of the source.
+
+    wanted, programmed : (n,) numbers in each row's units; wanted is NaN where the programmed one holds
+    """
+    edits: list[Edit] = []
+    texts: dict[float, str] = {}
+    move = np.full(len(f_word), -1)
+    move[row] = np.arange(len(row))
+    in_force = 0.0  # [mm per minute]
+    for r in np.flatnonzero((f_word >= 0) | (move >= 0)).tolist():
+        k, word, number = int(move[r]), int(f_word[r]), ""
+        if k >= 0 and not math.isnan(wanted[k]):
+            value = float(wanted[k])
+            number = texts.get(value) or texts.setdefault(value, round_down(value))
+        elif k >= 0 and word < 0:
+            number = np.format_float_positional(programmed[k], trim="-")
+        given = float(number or words.value[word]) * unit[r]
+        if number and (word >= 0 or abs(given - in_force) > SAME_FEED * in_force):
+            edits.append(_edit(words, r, word, number))
+        in_force = given
+    return edits
 
 
 def round_down(value: float) -> str:
@@ -113,14 +129,6 @@ def _f_in_force(words: Words, f_word: Array, unit: FloatArray) -> FloatArray:
     last = np.maximum.accumulate(np.where(f_word >= 0, rows, -1))
     given = words.value[f_word[last]] * (unit[last] / unit)
     return np.where(last >= 0, given, np.nan)
-
-
-def _source_rules(rows: int, f_word: Array, ours: Array) -> Array:
-    """(R,) whether the F word in force is the source's, when the rows `ours` get one of ours."""
-    mark = np.where(f_word >= 0, _THEIRS, 0)
-    mark[ours] = _OURS
-    last = np.maximum.accumulate(np.where(mark > 0, np.arange(rows), -1))
-    return (last < 0) | (mark[last] == _THEIRS)
 
 
 def _edit(words: Words, row: int, f_word: int, number: str) -> Edit:

@@ -47,6 +47,8 @@ class Row:
     worst         : by quantity: worst ratio to its limit and which of the limits that is ("jerk.y")
     free          : quantities that this method does not limit
     contour_error, vertex_error : [mm]
+    corner_ratio  : the largest of eq. 18-19 at the programmed corners, None without corners
+    gain          : median speed there over eq. 20 of the paper's corner, None where that says nothing
     ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
     planning_time : computing time without reading, sampling and verification [s]
     summary       : the plan's `summary.json`
@@ -60,6 +62,8 @@ class Row:
     free: tuple[str, ...] = ()
     contour_error: float | None = None
     vertex_error: float | None = None
+    corner_ratio: float | None = None
+    gain: float | None = None
     ringing: float | None = None
     planning_time: float | None = None
     summary: dict[str, Any] | None = None
@@ -90,6 +94,8 @@ def row_of_plan(method: str, plan: Plan) -> Row:
         free=tuple(verdict_summary(verdict)["not_limited"]),
         contour_error=verdict.contour_error_mm,
         vertex_error=verdict.vertex_error_mm,
+        corner_ratio=_known(verdict.corners.worst_ratio),
+        gain=_known(verdict.corners.gains()[0]),
         ringing=_ringing(verdict),
         planning_time=planning,
         summary=summary(plan),
@@ -131,7 +137,8 @@ def comparison_table(rows: list[Row], title: str) -> Group:
     ):
         table.add_column(name, justify="right", no_wrap=True)
     rings = any(row.ringing is not None for row in rows)
-    for name in ("contour\nµm", "corners\nµm", *(["rings\nµm"] if rings else []), "planning\ns"):
+    law = ("eq. 18-19\nat most", "over\neq. 20")
+    for name in ("contour\nµm", "corners\nµm", *law, *(["rings\nµm"] if rings else []), "planning\ns"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     said = []
@@ -143,6 +150,8 @@ def comparison_table(rows: list[Row], title: str) -> Group:
             *(_worst(row, quantity) for quantity in shown),
             _number(row.contour_error, ".4g", MICROMETRE),
             _number(row.vertex_error, ".4g", MICROMETRE),
+            "-" if row.corner_ratio is None else ratio_text(row.corner_ratio),
+            _number(row.gain, ".3f"),
             *([_number(row.ringing, ".4g", MICROMETRE)] if rings else []),
             _number(row.planning_time, ".3f"),
             Text(row.outcome, style="green" if row.passed else "bold red"),
@@ -174,6 +183,8 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
                 "not_limited": list(row.free),
                 "contour_error_mm": row.contour_error,
                 "vertex_error_mm": row.vertex_error,
+                "corner_ratio": row.corner_ratio,
+                "gain": row.gain,
                 "ringing_mm": row.ringing,
                 "planning_time_s": row.planning_time,
                 "summary": row.summary,
@@ -190,12 +201,13 @@ def comparison_csv(rows: list[Row]) -> str:
     write = csv.writer(out, lineterminator="\n")
     limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
     head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
-    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "ringing_mm", "planning_time_s", "sentence"]
+    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain", "ringing_mm"]
+    tail += ["planning_time_s", "sentence"]
     write.writerow([*head, *limits, *tail])
     for row in rows:
         worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
         first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
-        errors = [row.contour_error, row.vertex_error, row.ringing]
+        errors = [row.contour_error, row.vertex_error, row.corner_ratio, row.gain, row.ringing]
         last = [" ".join(row.free), *errors, row.planning_time, row.sentence]
         write.writerow([*first, *worst, *last])
     return out.getvalue()
@@ -250,6 +262,10 @@ def _worst(row: Row, quantity: str) -> str:
     ratio, name = row.worst[quantity]
     text = f"{ratio_text(ratio)} {name.partition('.')[2]}".rstrip()
     return f"({text})" if quantity in row.free else text
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _number(value: float | None, form: str, unit: float = 1.0) -> str:

@@ -24,16 +24,17 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.errors import InputError
 from planner.report.optimum import optimum_summary
-from planner.report.planned import LeftOut, planned_program
+from planner.report.planned import LeftOut, planned_notes, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
 if TYPE_CHECKING:
     from planner.methods.plan import Plan
     from planner.nc.info import ProgramInfo
-    from planner.verify import Verdict
+    from planner.verify import CornerCheck, Verdict
 
 PLANNED = "planned.ngc"
+NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
 PACKAGES = ("numpy", "scipy", "numba", "toppra", "ruckig", "pyarrow")
 
 
@@ -97,7 +98,7 @@ def check_places(
 
 def summary(plan: Plan) -> dict[str, Any]:
     """The plan in numbers, ready for JSON: what `planner plan --json` prints."""
-    verdict, corners = plan.verdict, plan.corners
+    verdict = plan.verdict
     return _plain(
         {
             "program": plan.program.source,
@@ -111,12 +112,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "stop_time_s": plan.stop_time,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
             "verdict": verdict_summary(verdict) if verdict is not None else None,
-            "corners": {
-                "count": len(corners.line) if corners is not None else 0,
-                "worst_speed_ratio": corners.worst_ratio()
-                if corners is not None and len(corners.line)
-                else None,
-            },
+            "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,
             **optimum_summary(plan.grid, plan.prices),
             "blocks": len(plan.program),
             "grid_points": plan.grid_points,
@@ -130,6 +126,11 @@ def summary(plan: Plan) -> dict[str, Any]:
 def verdict_summary(verdict: Verdict) -> dict[str, Any]:
     """A verdict in numbers: worst ratio per limit, errors, faults."""
     return _plain({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
+
+
+def corner_summary(corners: CornerCheck) -> dict[str, Any]:
+    """Eq. 18-20 at the programmed corners in numbers."""
+    return _plain(corners.summary())
 
 
 def _not_limited(verdict: Verdict) -> list[str]:
@@ -173,11 +174,12 @@ def versions() -> dict[str, str]:
 
 
 def _planned(plan: Plan, directory: Path) -> tuple[bytes | None, list[str]]:
-    """The re-timed program, or None and a note that says why there is none."""
+    """The re-timed program, or None, and notes on it."""
     if _is_source(plan, directory / PLANNED):
         return None, [f"{PLANNED} is the program that was planned, and stays as it is"]
     try:
-        return planned_program(plan), []
+        text = planned_program(plan)
+        return text, planned_notes(plan, text)
     except LeftOut as why:
         return None, [f"{PLANNED} is left out: {why}"]
 

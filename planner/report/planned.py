@@ -1,4 +1,4 @@
-"""`planned.ngc`: the program of a plan with the planned feed of every block, read back before it is given out.
+"""`planned.ngc`: the program of a plan with its planned feeds as F words, read back before it is given out.
 
 An NC program stays as it is but for its F words. A plotter file is written anew as an NC program.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.errors import InputError
-from planner.methods.block_feeds import block_feeds
+from planner.methods.block_feeds import block_feeds, block_times
 from planner.nc.dialects import is_plotter_file
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
@@ -28,6 +28,8 @@ _MOTION = (
 )  # fmt: skip
 
 
+# Where more than this share of the blocks last less than a period, a control is better off with the original [-].
+MANY_SHORT = 0.5
 # A path that was written with seven decimals and read back is off by less than this [mm].
 SAME_PATH = 1e-6
 
@@ -37,7 +39,7 @@ class LeftOut(Exception):
 
 
 def planned_program(plan: Plan) -> bytes:
-    """The plan's program file with an F word per block. Raises LeftOut where that cannot be.
+    """The plan's program file with an F word where the planned feed changes. Raises LeftOut where that cannot be.
 
     The file must still be the one that was planned, and the result must read back as the same motion: a line that
     would grow too long, for example, gives no file rather than a wrong one.
@@ -57,6 +59,28 @@ def planned_program(plan: Plan) -> bytes:
     if not _reads_as(text, plan, feeds=False):
         raise LeftOut(f"{source} with F words does not read back as the same motion")
     return text
+
+
+def planned_notes(plan: Plan, text: bytes) -> list[str]:
+    """Where a control is as well off with the program as it was."""
+    assert plan.trajectory is not None
+    if _is_source(plan, text):
+        return ["planned.ngc is the program as it was: no block is planned to be slower than its F word"]
+    lasting = block_times(plan.trajectory, plan.toolpath)[~plan.toolpath.rapid]
+    short = int((lasting < plan.machine.dt).sum())
+    if short <= MANY_SHORT * len(lasting):
+        return []
+    return [
+        f"planned.ngc: {short:,} of {len(lasting):,} blocks last less than a period of {plan.machine.dt * 1e3:g} ms; a control that "
+        "joins or looks ahead over such blocks is better off with the original: F words can only slow it down"
+    ]
+
+
+def _is_source(plan: Plan, text: bytes) -> bool:
+    try:
+        return Path(plan.program.source).read_bytes() == text
+    except (OSError, ValueError):
+        return False
 
 
 def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:

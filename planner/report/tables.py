@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from planner.methods.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
-    from planner.verify import Ringing, Verdict
+    from planner.verify import CornerCheck, Ringing, Verdict
 
-CORNERS_SHOWN = 12  # rows of the corner table; a terminal's page holds them together with the plan's table
+CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.corners` has them all
 FAULTS_SHOWN = 8
 NOTES_SHOWN = 8
 
@@ -42,11 +42,6 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
             )
     if plan.verdict is not None:
         _add_verdict(table, plan.verdict)
-    if plan.corners is not None and len(plan.corners.line):
-        table.add_row(
-            "corners",
-            f"{len(plan.corners.line):,}; fastest {ratio_text(plan.corners.worst_ratio())} of eq. 19-20",
-        )
     if plan.grid is not None:
         table.add_row("held by", held_by_text(plan.grid))
     if plan.prices is not None and plan.trajectory is not None:
@@ -60,46 +55,44 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
-def verdict_table(verdict: Verdict, title: str) -> Group:
-    """A verdict by itself."""
+def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
+    """A verdict by itself; before it what was asked, name and text."""
     table = _pairs()
+    for name, text in (asked or {}).items():
+        table.add_row(name, text)
     _add_verdict(table, verdict)
     return _titled(title, table)
 
 
-def corner_table(plan: Plan) -> Table | None:
-    """The corners that come closest to the speed of the closed form; None without corners."""
-    corners = plan.corners
-    if corners is None or not len(corners.line):
+def corner_table(corners: CornerCheck) -> Table | None:
+    """Eq. 18-20 at every programmed corner, of many those that come closest to them; None without corners."""
+    if not len(corners):
         return None
-    ratio = corners.feed_planned / corners.feed_closed_form
-    worst = np.argsort(-ratio, kind="stable")[:CORNERS_SHOWN]
-    shown = f"the {len(worst)} fastest of " if len(worst) < len(ratio) else ""
-    table = Table(title=f"{shown}{len(ratio):,} corners", title_justify="left", box=None, pad_edge=False)
+    closest = np.maximum(corners.speed_ratio, corners.budget_ratio)
+    worst = np.argsort(-closest, kind="stable")[:CORNERS_SHOWN]  # NaN, not looked at, comes last
+    shown = f"the {len(worst):,} closest to eq. 18-19 of " if len(worst) < len(corners) else ""
+    table = Table(title=f"{shown}{len(corners):,} corners", title_justify="left", box=None, pad_edge=False)
     for name in (
         "line",
-        "theta\ndeg",
-        "d in\nmm",
-        "d out\nmm",
-        "eps_ap\nµm",
-        "kappa\n1/mm",
-        "eq. 19-20\nmm/s",
-        "planned\nmm/s",
+        "angle\ndeg",
+        "feed\nmm/s",
+        "eq. 19\nfeed / its own",
+        "eq. 18\nerror / budget",
+        "eq. 20\nmm/s",
+        "feed /\neq. 20",
     ):
         table.add_column(name, justify="right")
-    table.add_column("limited by")
     for k in sorted(worst):
-        table.add_row(
-            str(corners.line[k]),
-            f"{np.rad2deg(corners.theta[k]):.2f}",
-            f"{corners.d_in[k]:.4f}",
-            f"{corners.d_out[k]:.4f}",
-            f"{corners.tol_ap[k] / MICROMETRE:.2f}",
-            f"{corners.kappa_max[k]:.4g}",
-            f"{corners.feed_closed_form[k]:.3f}",
+        known = (
             f"{corners.feed_planned[k]:.3f}",
-            str(corners.limited_by[k]),
+            ratio_text(corners.speed_ratio[k]),
+            ratio_text(corners.budget_ratio[k]),
+            f"{corners.feed_paper[k]:.3f}",
+            f"{corners.gain[k]:.3f}",
         )
+        angle = f"{np.rad2deg(corners.theta[k]):.2f}"
+        unknown = ("not looked at", "-", "-", known[3], "-")
+        table.add_row(str(corners.line[k]), angle, *(known if corners.looked[k] else unknown))
     return table
 
 
@@ -185,12 +178,13 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         )
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
-    table.add_row("contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm")
-    table.add_row("corners missed by", f"{verdict.vertex_error_mm / MICROMETRE:.3f} µm")
+    table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
+    table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
     if (after := verdict.after_filters) is not None:
-        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm))
-        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm))
+        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))
+        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm, verdict))
     table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
+    table.add_row("corners", verdict.corners.sentence())
     for mode in verdict.ringing:
         table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
     if verdict.passed:
@@ -211,6 +205,13 @@ def _ringing_text(mode: Ringing) -> str:
         )
 
     return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
+
+
+def _micrometres(distance: float | None, verdict: Verdict) -> str:
+    """A distance [mm], or why it is not known."""
+    if distance is None:
+        return f"not known: lost after line {verdict.lost_after}" if verdict.lost_after else "not known"
+    return f"{distance / MICROMETRE:.3f} µm"
 
 
 def _by_quantity(verdict: Verdict) -> dict[str, list]:
@@ -255,7 +256,3 @@ def _pairs() -> Table:
 def _titled(title: str, *parts: RenderableType) -> Group:
     # not the table's own title, which is folded to the table's width
     return Group(Text(title, style="bold"), *parts)
-
-
-def _micrometres(error: float | None) -> str:
-    return "not known" if error is None else f"{error / MICROMETRE:.3f} µm"

@@ -10,7 +10,8 @@ NumPy (`.npz`: one array per column). Metadata (machine, tolerance, units, versi
 Parquet schema under the key `planner`, in the NPZ array `metadata`, and for CSV, which has no place for it,
 in `trajectory.meta.json` beside it; always as JSON.
 
-`read_trajectory` reads them back, and files made elsewhere: only `t` and the positions are required.
+`read_trajectory` reads them back, and files made elsewhere: only `t` and the positions are required. Positions may also be one NumPy
+array (T, n) that is named by its axes, `xyz`. Columns of other names are left alone.
 """
 
 from __future__ import annotations
@@ -29,8 +30,13 @@ from planner.arrays import Array, FloatArray
 from planner.errors import InputError
 from planner.files import require_ending
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.report.digits import on_grid, rounding
 from planner.trajectory import Trajectory
+from planner.verify.given import DERIVATIVES, Given
 
+KNOWN = {"t", "s", "feed", "line", "block"} | {
+    prefix + axis for prefix in ("", "v", "a", "j") for axis in LINEAR_AXES + ROTARY_AXES
+}
 Format = Literal["parquet", "csv", "npz"]
 FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")
 CSV_METADATA = ".meta.json"  # takes the place of the suffix .csv
@@ -113,11 +119,13 @@ class TrajectoryFile:
     """A trajectory as read from a file.
 
     trajectory : the samples
+    given      : which columns were delivered, and to how many digits
     metadata   : what the file says about itself; empty for files made elsewhere
     notes      : columns the file lacks and how they were filled, one sentence each
     """
 
     trajectory: Trajectory
+    given: Given
     metadata: dict[str, Any]
     notes: tuple[str, ...]
 
@@ -125,8 +133,8 @@ class TrajectoryFile:
 def read_trajectory(path: str | Path) -> TrajectoryFile:
     """Read a trajectory file, ours or made elsewhere.
 
-    Required are `t` [s] and one column per axis, at least x and y. Missing velocities, accelerations and
-    jerks are divided differences of what is there, at rest before the first and after the last sample; `s` is
+    Required are `t` [s] and one column per axis, at least one. Missing velocities, accelerations and jerks are
+    divided differences of what is there, at rest before the first and after the last sample; `s` is
     the length of the polyline through the samples, `feed` the speed; `line` and `block` become 0 and -1,
     "unknown".
 
@@ -148,11 +156,31 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
         raise InputError("cannot be read: its metadata are nested too deep", source=str(path)) from None
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
         raise InputError(f"cannot be read: {fault}", source=str(path)) from fault
-    columns = {name: _numbers(path, name, column) for name, column in given.items()}
-    trajectory, notes = _assemble(str(path), columns)
+    columns = {}
+    for name, column in _one_by_one(given).items():
+        word = name.strip().lower()
+        if word in KNOWN:
+            columns[word] = _numbers(path, name, column)
+    trajectory, digits, notes = _assemble(str(path), columns, tuple(given))
     return TrajectoryFile(
-        trajectory=trajectory, metadata=about if isinstance(about, dict) else {}, notes=notes
+        trajectory=trajectory, given=digits, metadata=about if isinstance(about, dict) else {}, notes=notes
     )
+
+
+def _one_by_one(given: dict[str, Any]) -> dict[str, Any]:
+    """The columns, with an array (T, n) that is named by n axes taken apart."""
+    columns: dict[str, Any] = {}
+    for name, column in given.items():
+        letters = name.strip().lower()
+        if (
+            np.ndim(column) == 2
+            and np.shape(column)[1] == len(letters) > 1
+            and set(letters) <= {*LINEAR_AXES, *ROTARY_AXES}
+        ):
+            columns |= {letter: column[:, k] for k, letter in enumerate(letters)}
+        else:
+            columns[name] = column
+    return columns
 
 
 def _read_parquet(path: Path) -> tuple[dict[str, Any], str]:
@@ -199,30 +227,22 @@ def _numbers(path: Path, name: str, column: Any) -> Array:
     return column
 
 
-def _assemble(source: str, given: dict[str, Array]) -> tuple[Trajectory, tuple[str, ...]]:
-    columns = {name.strip().lower(): column for name, column in given.items()}
+def _assemble(
+    source: str, columns: dict[str, Array], found: tuple[str, ...]
+) -> tuple[Trajectory, Given, tuple[str, ...]]:
+    """The trajectory of the known columns; `found` are the names of all that the file has."""
     axes = tuple(axis for axis in LINEAR_AXES + ROTARY_AXES if axis in columns)
-    for name in ("t", "x", "y"):
-        if name not in columns:
-            raise InputError(
-                f"column '{name}' is missing; found are {', '.join(given) or 'none'}; needed are t [s] and "
-                "the positions x, y, ... [mm, rotary axes rad]",
-                source=source,
-            )
+    if "t" not in columns or not axes:
+        missing = "column 't' is missing" if "t" not in columns else "there is no column of an axis"
+        raise InputError(
+            f"{missing}; found are {', '.join(found) or 'none'}; needed are t [s] and "
+            "the positions x, y, ... [mm, rotary axes rad]",
+            source=source,
+        )
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         raise InputError(f"the columns differ in length: {lengths}", source=source)
-    t = columns["t"] - columns["t"][:1]
-    if len(t) < 2:
-        raise InputError(f"{len(t)} samples; at least 2 are needed", source=source)
-    late = np.flatnonzero(np.diff(t) < TIME_STEP_MIN)
-    if len(late):
-        raise InputError(
-            f"column 't', row {late[0] + 2}: times must increase by at least {TIME_STEP_MIN:g} s",
-            source=source,
-        )
-
-    notes = []
+    t, time_rounding, end_rounding, notes = _times(source, columns["t"])
     levels = [np.stack([columns[axis] for axis in axes], axis=1).astype(np.float64)]
     order_of = [0]  # order of the last level that the file holds, to differentiate from
     for prefix, word in (("v", "velocity"), ("a", "acceleration"), ("j", "jerk")):
@@ -255,7 +275,32 @@ def _assemble(source: str, given: dict[str, Array]) -> tuple[Trajectory, tuple[s
         jerk=jerk,
         **rest,
     )
-    return trajectory, tuple(notes)
+    delivered = Given(
+        columns=tuple(DERIVATIVES[level - 1] for level in order_of[1:]),
+        position_rounding=tuple(rounding(columns[axis]) for axis in axes),
+        time_rounding=time_rounding,
+        end_rounding=end_rounding,
+    )
+    return trajectory, delivered, tuple(notes)
+
+
+def _times(source: str, given: Array) -> tuple[FloatArray, float, float, list[str]]:
+    """Times from 0 [s], what of their rounding remains for all and for the last (digits.py), and notes on it."""
+    if len(given) < 2:
+        raise InputError(f"{len(given)} samples; at least 2 are needed", source=source)
+    late = np.flatnonzero(np.diff(given.astype(np.float64)) < TIME_STEP_MIN)
+    if len(late):
+        raise InputError(
+            f"column 't', row {late[0] + 2}: times must increase by at least {TIME_STEP_MIN:g} s",
+            source=source,
+        )
+    t, written, time_rounding, end_rounding = on_grid(given)
+    notes = []
+    if time_rounding:
+        notes.append(f"times are good to {time_rounding:.2g} s, and not those of one period")
+    elif np.abs(t - (given.astype(np.float64) - float(given[0]))).max() > TIME_STEP_MIN:
+        notes.append(f"times are good to {written:.2g} s, and taken as k x {t[1]:.9g} s")
+    return t, time_rounding, end_rounding, notes
 
 
 _LEVELS = ("positions", "velocity", "acceleration")

@@ -13,6 +13,9 @@ sharp each check is:
     given.py      what of a trajectory was delivered, and how exactly
     filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
+    error_allocation.py
+                  eq. 18-20 at every programmed corner, on the motion's own curvature
+    corners.py    the record of that
     ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
     judge.py      `verify` itself
@@ -20,9 +23,10 @@ sharp each check is:
 The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are never looked at.
 """
 
+from planner.verify.corners import CornerCheck
 from planner.verify.given import Given
 from planner.verify.judge import verify
 from planner.verify.ringing import Ringing
 from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
 
-__all__ = ["AfterFilters", "Given", "LimitCheck", "Ringing", "Verdict", "verify"]
+__all__ = ["AfterFilters", "CornerCheck", "Given", "LimitCheck", "Ringing", "Verdict", "verify"]

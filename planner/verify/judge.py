@@ -11,7 +11,7 @@ from planner.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.trajectory import Trajectory
-from planner.verify import contour, findings, samples
+from planner.verify import contour, error_allocation, findings, samples
 from planner.verify.dense import Comparison
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES, Look
@@ -103,10 +103,22 @@ def verify(
     faults += findings.stop_faults(looks, toolpath, pieces)
     after = after_filters(trajectory, motion, toolpath, machine, pieces)
     faults += after.faults if after is not None else ()
+    corners = error_allocation.check_corners(
+        trajectory,
+        looks,
+        pieces,
+        toolpath,
+        machine,
+        motion=motion if len(looks) > 1 else None,
+        limits=limits,
+        judged="acceleration" not in not_limited,
+    )
+    faults += error_allocation.faults(corners, toolpath.axes)
     return Verdict(
         passed=not faults,
         limits=checks,
         contour=contour_check,
+        corners=corners,
         vertex=apart.vertex_check(toolpath),
         contour_error_mm=contour_error,
         vertex_error_mm=vertex_error,

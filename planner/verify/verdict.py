@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.arrays import FloatArray, freeze
+from planner.verify.corners import CornerCheck
 from planner.verify.pieces import RATIO_ROUNDING
 from planner.verify.ringing import Ringing
 
@@ -71,6 +72,7 @@ class Verdict:
     limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
     contour          : the motion's worst distance from the path as far as it could be followed, against the budget there
     vertex           : the worst distance of a programmed vertex from the motion, of those that are known, against the budget there
+    corners          : eq. 18-20 at the programmed corners
     contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if it
                        could not be followed
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
@@ -90,6 +92,7 @@ class Verdict:
     limits: dict[str, LimitCheck]
     contour: LimitCheck
     vertex: LimitCheck
+    corners: CornerCheck
     contour_error_mm: float | None
     vertex_error_mm: float | None
     end_error_mm: float

@@ -143,9 +143,9 @@ def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed
     made = plan(corner_job(theta, axes, seed), limits, method="kinematic")
     missed, bow = made.verdict.vertex_error_mm, 1e4 * limits.dt**2 / 8
     assert missed <= limits.tolerance
-    if not len(made.corners):
+    if not len(made.rounded):
         assert missed <= bow
-    elif made.corners.limited_by[0] == "tolerance":
+    elif made.rounded.limited_by[0] == "tolerance":
         assert missed >= limits.tolerance * (1 - 2e-3) - bow
 
 
@@ -156,8 +156,8 @@ def test_the_optimum_misses_the_vertex_by_the_share_of_its_rounding(theta, axes,
     limits = machine(seed, dt=1e-4)
     for method in ("optimal", "toppra"):
         made = plan(corner_job(theta, axes, seed), limits, method=method, corner="bezier")
-        assume(len(made.corners))
-        share, bow = made.corners.tol_ap[0], 1e4 * limits.dt**2 / 8
+        assume(len(made.rounded))
+        share, bow = made.rounded.tol_ap[0], 1e4 * limits.dt**2 / 8
         assert share * (1 - 1e-6) <= made.verdict.vertex_error_mm <= share + bow
 
 

@@ -61,7 +61,7 @@ def closed_form(theta: FloatArray, eps_ap: float, X: float, sigma2: float) -> Fl
 def test_corners_have_the_speed_of_equations_19_and_20(sigma2):
     """eps_ch = A Ts^2/8 = 0.02, eps_ap = 0.03. With eq. (16) as printed, d = 4 eps cos, the first corner would be 1.6 times as slow."""
     made = bezier(TEN_TIMES, paper_machine(), corner=BezierCorner(sigma2=sigma2))
-    corners = made.corners
+    corners = made.rounded
     assert len(corners) >= 1
     np.testing.assert_allclose(corners.tol_ap, 0.03, rtol=3e-4)
     expected = closed_form(corners.theta, 0.03, A_MAX, sigma2)
@@ -73,7 +73,7 @@ def test_corners_have_the_speed_of_equations_19_and_20(sigma2):
 
 def test_the_speed_is_constant_from_one_end_of_a_corner_to_the_other():
     made = bezier(TEN_TIMES, paper_machine(dt=1e-4))
-    t, corners = made.trajectory, made.corners
+    t, corners = made.trajectory, made.rounded
     for vertex, d, feed in zip(
         made.toolpath.end[corners.line - 1], corners.d_in, corners.feed_planned, strict=True
     ):
@@ -88,9 +88,9 @@ def test_without_allocation_the_errors_add_up_to_more_than_the_tolerance():
     machine = paper_machine()
     sharing, alone = bezier(TEN_TIMES, machine), BezierMethod(allocate=False).plan(TEN_TIMES, machine)
     assert sharing.verdict.vertex_error_mm <= EPS
-    np.testing.assert_allclose(alone.corners.tol_ap, EPS, rtol=3e-4)
+    np.testing.assert_allclose(alone.rounded.tol_ap, EPS, rtol=3e-4)
     np.testing.assert_allclose(
-        alone.corners.feed_closed_form, closed_form(alone.corners.theta, EPS, A_MAX, 0.9), rtol=3e-4
+        alone.rounded.feed_closed_form, closed_form(alone.rounded.theta, EPS, A_MAX, 0.9), rtol=3e-4
     )
     assert not alone.verdict.passed
     assert EPS * 1.2 < alone.verdict.vertex_error_mm <= EPS + A_MAX * TS**2 / 8
@@ -103,8 +103,8 @@ def test_rounding_and_chord_error_add_up_to_the_tolerance_at_the_vertex(theta, e
     """Eq. (18) at the joint: the curve misses the vertex by eps_ap, the middle of a chord there by kappa v^2 dt^2/8 more."""
     machine = paper_machine(tolerance=eps, dt=dt, jerk=1e9)
     made = bezier(one_corner(theta), machine)
-    assume(len(made.corners) == 1)
-    corner = made.corners
+    assume(len(made.rounded) == 1)
+    corner = made.rounded
     chord = corner.kappa_max[0] * corner.feed_planned[0] ** 2 * dt**2 / 8
     assert corner.tol_ap[0] + chord <= eps * (1 + 1e-9)
     if corner.limited_by[0] == "normal_acceleration":
@@ -115,11 +115,25 @@ def test_rounding_and_chord_error_add_up_to_the_tolerance_at_the_vertex(theta, e
 def test_other_weights_are_faster_by_the_root_of_sigma2():
     """PAPERS C.G3: in the G3 family kappa_max is sigma2 times the printed pair's."""
     printed, better = (bezier(TEN_TIMES, paper_machine(), corner=BezierCorner(sigma2=s)) for s in (1.0, 0.9))
-    both = np.intersect1d(printed.corners.line, better.corners.line)
+    both = np.intersect1d(printed.rounded.line, better.rounded.line)
     assert len(both)
-    gain = [c.feed_planned[np.isin(c.line, both)] for c in (better.corners, printed.corners)]
+    gain = [c.feed_planned[np.isin(c.line, both)] for c in (better.rounded, printed.rounded)]
     np.testing.assert_allclose(gain[0] / gain[1], np.sqrt(1 / 0.9), rtol=2e-3)
     assert better.trajectory.cycle_time < printed.trajectory.cycle_time
+
+
+@given(seed=st.integers(0, 10**6), dims=st.integers(2, 3))
+@settings(max_examples=10)
+def test_cutting_straight_lines_changes_nothing(seed, dims):
+    """Where a CAM system cuts a line into blocks is no place of the motion: the look-ahead must not see it."""
+    rng = np.random.default_rng(seed)
+    program = problems.random_polyline(rng, blocks=int(rng.integers(2, 8)), dimensions=dims, shortest=0.3)
+    points = np.vstack([program.start, program.end])
+    cuts = [np.append(np.sort(rng.uniform(0.05, 0.95, rng.integers(0, 5))), 1.0) for _ in program.end]
+    pieces = [a + q[:, None] * (b - a) for a, b, q in zip(points[:-1], points[1:], cuts, strict=True)]
+    machine = problems.machine(tolerance=10 ** rng.uniform(-2, -0.7), jerk=10 ** rng.uniform(4, 5.5))
+    whole, cut = (bezier(problems.polyline(p), machine) for p in (points, np.vstack([points[:1], *pieces])))
+    assert cut.trajectory.cycle_time == pytest.approx(whole.trajectory.cycle_time, rel=2e-6)
 
 
 # --- motions ------------------------------------------------------------------------------------------------------------------
@@ -143,9 +157,9 @@ def test_times_of_the_shared_jobs():
 def test_a_corner_is_run_through_only_where_that_is_faster():
     """At 90 degrees a stop is faster, at 10 degrees the corner is; PAPERS 003: the largest corner speed is not time-optimal."""
     sharp, shallow = bezier(one_corner(np.pi / 2)), bezier(one_corner(np.deg2rad(5)))
-    assert len(sharp.corners) == 0
+    assert len(sharp.rounded) == 0
     assert sharp.trajectory.cycle_time == pytest.approx(sharp.stop_time, rel=1e-6)
-    assert len(shallow.corners) == 1
+    assert len(shallow.rounded) == 1
     assert shallow.trajectory.cycle_time < 0.95 * shallow.stop_time
 
 
@@ -184,4 +198,4 @@ def test_no_tolerance_for_blending_means_the_plan_of_stop():
 def test_it_has_a_name_and_reports_its_corners():
     made = plan(TEN_TIMES, paper_machine(), method="bezier")
     assert (made.method, made.corner, made.solver) == ("bezier", "bezier", "look-ahead")
-    assert made.sentence.startswith(f"{len(made.corners)} corners are run through")
+    assert made.sentence.startswith(f"{len(made.rounded)} corners are run through")

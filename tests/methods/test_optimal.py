@@ -24,7 +24,8 @@ def test_jobs_are_verified_with_their_jerk_limited(name, corner):
     assert all(check.limited for check in plan.verdict.limits.values())
     bound = planner.plan(JOBS[name], MACHINE, method="toppra", corner=corner)
     assert bound.trajectory.cycle_time * (1 - 2e-3) <= plan.trajectory.cycle_time <= plan.stop_time
-    assert plan.corners.worst_ratio() <= 1 + 1e-9
+    assert plan.rounded.worst_ratio() <= 1 + 1e-9
+    assert plan.corners.held == len(plan.corners) > 0
 
 
 @pytest.mark.parametrize(("corner", "expected"), [("bezier", 0.989), ("auto", 0.9605)])
@@ -62,14 +63,14 @@ def test_isolated_corners_are_passed_at_the_closed_form_s_speed(dt, tolerance, n
     theta = np.abs(TURNS)
     smaller = 2.5 * CLOSE  # corners use a little less than (20) lets them, so that they can close legs
 
-    corners = isolated_corners(1e7, dt, tolerance, normal).corners
+    corners = isolated_corners(1e7, dt, tolerance, normal).rounded
     np.testing.assert_allclose(corners.tol_ap, tolerance - rate * share, rtol=smaller)
     speed = np.sqrt(share / kappa_max(corners.d_in, theta, SIGMA2))
     np.testing.assert_allclose(corners.feed_closed_form, speed, rtol=smaller)
     np.testing.assert_allclose(corners.feed_planned, speed * np.sqrt(1.0 - CURVATURE_MARGIN), rtol=smaller)
     assert (corners.limited_by == holds).all()
 
-    tight = isolated_corners(500.0, dt, tolerance, normal).corners
+    tight = isolated_corners(500.0, dt, tolerance, normal).rounded
     np.testing.assert_allclose(tight.feed_closed_form, speed, rtol=smaller)
     assert (tight.feed_planned < 0.97 * speed).all()
     assert all(name.startswith("jerk.") for name in tight.limited_by)

@@ -127,8 +127,16 @@ def test_the_programmed_feed_is_brought_back() -> None:
     """A block that keeps its feed says so once ours is in force; in its own units; then source words rule again."""
     source = b"G1 X1 F6000\nX2\nG20\nX3\nX4 F60\nX5\n"
     text = check(source, np.array([10.0, np.nan, np.inf, np.nan, 1e6]))
+    assert text == b"G1 X1 F600\nX2 F6000\nG20\nX3\nX4 F60\nX5\n"
+    text = check(source, np.array([10.0, 20.0, np.inf, np.nan, 1e6]))
     first = 6000 / 25.4
-    assert text == f"G1 X1 F600\nX2 F6000\nG20\nX3 F{first!r}\nX4 F60\nX5\n".encode()
+    assert text == f"G1 X1 F600\nX2 F1200\nG20\nX3 F{first!r}\nX4 F60\nX5\n".encode()
+
+
+def test_a_feed_in_force_is_not_written_again() -> None:
+    source = b"G1 X1 F6000\nX2\nG0 X3\nG1 X4\nG20\nX5\nX6 F100\n"
+    text = check(source, np.array([10.0, 10.0, np.nan, 10.0, 10.0, 10.0]))
+    assert text == b"G1 X1 F600\nX2\nG0 X3\nG1 X4\nG20\nX5\nX6 F23.62\n"
 
 
 def test_a_feed_on_a_rapid_rules_what_follows() -> None:

@@ -72,7 +72,18 @@ def test_summary_has_the_contract_s_keys() -> None:
     assert said["verdict"]["passed"] is True
     assert said["verdict"]["limits"]["velocity.x"] == 0.5
     assert set(said["verdict"]) >= {"contour_error_mm", "vertex_error_mm", "end_error_mm"}
-    assert said["corners"] == {"count": 3, "worst_speed_ratio": 1.0}
+    assert said["corners"] == {
+        "count": 3,
+        "not_looked_at": 0,
+        "held": 3,
+        "worst_speed_ratio": 1.0,
+        "worst_budget_ratio": 0.8,
+        "stopped_at": 1,
+        "gain": pytest.approx(1.35),
+        "gain_min": pytest.approx(1.3),
+        "gain_max": pytest.approx(1.4),
+        "gain_count": 2,
+    }
     assert set(said) >= {"method", "corner", "blocks", "grid_points", "timings_s", "versions"}
     assert set(said["versions"]) >= {"planner", "python", "numpy"}
 
@@ -83,6 +94,7 @@ def test_summary_of_an_unsolved_plan() -> None:
     said = json.loads(json.dumps(summary(plan), allow_nan=False))
     assert said["cycle_time_s"] is None
     assert said["verdict"] is None
+    assert said["corners"] == {"count": 0, "worst_speed_ratio": None}
     assert said["stop_time_s"] is None
     assert "loosen" in said["sentence"]
 

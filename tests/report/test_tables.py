@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from hand_made import make_plan
+import pytest
+from hand_made import make_corners, make_plan
 from rich.console import Console, RenderableType
 
 from planner.machine import builtin_machines, load_machine
 from planner.nc.faults import Fault
 from planner.nc.info import describe
 from planner.report.tables import corner_table, info_table, machines_table, plan_table
+from planner.verify import CornerCheck
 
 
 def text(table: RenderableType | None) -> str:
@@ -27,6 +29,8 @@ def test_plan() -> None:
     assert "x 0.5, y 1.000001" in said
     assert "x 3.5  (not limited by this method)" in said
     assert "12.300 µm" in said
+    assert "eq. 18-20 hold at 3 of 3 corners, at most 1.0000; passed 1.35 times as fast as eq. 20" in said
+    assert "median of the 2 run through where it lies below the feed); 1 stopped at" in said
     assert "passed" in said
 
 
@@ -43,12 +47,40 @@ def test_unsolved_plan() -> None:
 
 
 def test_corners() -> None:
-    said = text(corner_table(make_plan()))
-    assert "90.00" in said
-    assert "normal_acceleration" in said
-    plan = make_plan()
-    plan.corners.line = np.zeros(0)
-    assert corner_table(plan) is None
+    said = text(corner_table(make_corners()))
+    assert [line.split()[:3] for line in said.splitlines()[-3:]] == [
+        ["3", "90.00", "14.000"],
+        ["4", "90.00", "13.000"],
+        ["5", "90.00", "0.000"],
+    ]
+    assert "1.400" in said  # over eq. 20
+    assert corner_table(make_corners(turns=False)) is None
+    assert "turns nowhere" in text(plan_table(make_plan(turns=False)))
+
+
+def test_a_corner_that_was_not_looked_at_is_listed() -> None:
+    columns = {name: np.array(column) for name, column in vars(make_corners()).items() if name != "judged"}
+    for name in (
+        "time",
+        "feed_planned",
+        "feed_closed_form",
+        "speed_ratio",
+        "miss",
+        "chord_error",
+        "budget_ratio",
+    ):
+        columns[name][1] = np.nan
+    corners = CornerCheck(**columns)
+    assert "not looked at" in text(corner_table(corners))
+    assert corners.sentence().endswith("1 could not be looked at")
+    assert (corners.count, corners.not_looked_at, corners.held) == (2, 1, 2)
+
+
+def test_of_many_corners_those_closest_to_the_law_are_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planner.report.tables.CORNERS_SHOWN", 2)
+    said = text(corner_table(make_corners()))
+    assert "the 2 closest to eq. 18-19 of 3 corners" in said
+    assert [line.split()[0] for line in said.splitlines()[-2:]] == ["3", "4"]
 
 
 def test_machines() -> None:

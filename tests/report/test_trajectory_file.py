@@ -123,7 +123,7 @@ def columns(**change: object) -> dict[str, object]:
     ("change", "said"),
     [
         ({"t": None}, "column 't' is missing"),
-        ({"y": None}, "column 'y' is missing"),
+        ({"x": None, "y": None}, "no column of an axis"),
         ({"x": np.array([0.0, np.nan, 1, 2, 3])}, "column 'x', row 2: nan"),
         ({"vx": np.array([0.0, 1, 2, 3, np.inf])}, "column 'vx', row 5: inf"),
         ({"x": np.zeros(4)}, "differ in length"),
@@ -164,3 +164,24 @@ def test_missing_file_and_unknown_format(tmp_path: Path) -> None:
         read_trajectory(tmp_path / "none.xlsx")
     with pytest.raises(ValueError, match="unknown format"):
         write_trajectory(tmp_path / "none.xlsx", TRAJECTORY)
+
+
+def test_an_array_named_by_its_axes_is_taken_apart_and_other_columns_are_left_alone(tmp_path: Path) -> None:
+    t, xyz = np.arange(5) * 1e-3, np.random.default_rng(0).normal(size=(5, 3))
+    np.savez(tmp_path / "run.npz", t=t - 0.003, xyz=xyz, vel=t, state=np.array(list("abcde")))
+    read = read_trajectory(tmp_path / "run.npz")
+    assert read.trajectory.axes == ("x", "y", "z")
+    assert np.array_equal(read.trajectory.position, xyz)
+    assert read.trajectory.t == pytest.approx(t, abs=1e-15)
+    assert read.given.columns == ()
+
+
+def test_what_is_delivered_is_known(tmp_path: Path) -> None:
+    p, v = TRAJECTORY.position, TRAJECTORY.velocity
+    np.savez(tmp_path / "v.npz", t=TRAJECTORY.t, x=p[:, 0], vx=v[:, 0], jx=v[:, 0])
+    assert read_trajectory(tmp_path / "v.npz").given.columns == ("velocity", "jerk")
+    write_trajectory(tmp_path / "all.csv", TRAJECTORY)
+    given = read_trajectory(tmp_path / "all.csv").given
+    assert given.columns == ("velocity", "acceleration", "jerk")
+    assert not given.position_rounding.any()
+    assert given.time_rounding == given.end_rounding == 0.0

@@ -1,0 +1,72 @@
+"""A trajectory brought to the axes of a program: what neither moves may be missing on either side."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.errors import InputError
+from planner.geometry.toolpath import Toolpath
+from planner.trajectory import Trajectory
+from planner.verify.given import DERIVATIVES, Given
+from planner.verify.matching import STILL
+
+
+def fit_axes(
+    trajectory: Trajectory, given: Given, toolpath: Toolpath
+) -> tuple[Trajectory, Given, tuple[str, ...]]:
+    """The trajectory and what is given of it, with the program's axes in its order, and what was done, in sentences.
+
+    An axis of the program that it does not move may be missing: it stands where the program has it. An axis that the program does not
+    have may be there if it stands still, and is left out.
+
+    Raises InputError for an axis that the program moves and the trajectory lacks, and for one that the trajectory moves and the
+    program does not have.
+    """
+    if trajectory.axes == toolpath.axes:
+        return trajectory, given, ()
+    notes = []
+    for k, letter in enumerate(trajectory.axes):
+        if letter not in toolpath.axes:
+            moved = float(np.ptp(trajectory.position[:, k]))
+            if moved > STILL:
+                raise InputError(
+                    f"the trajectory moves {letter} by {moved:.6g}, an axis that the program and its machine do not have "
+                    f"({' '.join(toolpath.axes)})"
+                )
+            notes.append(f"{letter} stands still; the program and its machine do not have it")
+    samples = len(trajectory)
+    columns: dict[str, list[FloatArray]] = {name: [] for name in ("position", *DERIVATIVES)}
+    rounding = np.zeros(len(toolpath.axes))
+    for k, letter in enumerate(toolpath.axes):
+        if letter in trajectory.axes:
+            own = trajectory.axes.index(letter)
+            for name, column in columns.items():
+                column.append(getattr(trajectory, name)[:, own])
+            rounding[k] = given.position_rounding[own] if len(given.position_rounding) else 0.0
+            continue
+        stands = _standing(toolpath, k)
+        if stands is None:
+            raise InputError(
+                f"column '{letter}' is missing: the program moves {letter}; found are the axes {' '.join(trajectory.axes)}"
+            )
+        notes.append(f"{letter} is missing, and stands at {stands:g} as in the program")
+        for name, column in columns.items():
+            column.append(np.full(samples, stands if name == "position" else 0.0))
+    fitted = dataclasses.replace(
+        trajectory,
+        axes=toolpath.axes,
+        **{name: np.stack(column, axis=1) for name, column in columns.items()},  # type: ignore[arg-type]
+    )
+    return fitted, dataclasses.replace(given, position_rounding=rounding), tuple(notes)
+
+
+def _standing(toolpath: Toolpath, axis: int) -> float | None:
+    """Where the axis stands [mm], or None if the program moves it."""
+    place = float(toolpath.start[0, axis])
+    arcs = toolpath.arcs
+    still = (toolpath.start[:, axis] == place).all() and (toolpath.end[:, axis] == place).all()
+    flat = not any(getattr(arcs, name)[:, axis].any() for name in ("e1", "e2", "drift"))
+    return place if still and flat else None

@@ -106,6 +106,10 @@ class ShapedMotion:
             axes=base.axes, dt=dt, t=times, block=at_mean["block"], line=at_mean["line"], **means
         )
 
+    def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:
+        """The motion standing longer by `by` (n,) [s] where all copies have come to rest, at the times `at` (n,) [s]."""
+        return ShapedMotion(self.motion.waiting(at - self.shaper.length, by), self.shaper)
+
     @cached_property
     def _ends(self) -> tuple[Trajectory, Trajectory]:
         first, last = (self.motion.at(np.array([time]), 1.0) for time in (0.0, self.motion.end))

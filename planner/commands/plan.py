@@ -52,6 +52,12 @@ def plan(
             help="of reshaping splines for optimal and toppra [default: as many as the size of the job lets pay]",
         ),
     ] = None,
+    shaped: Annotated[
+        bool,
+        typer.Option(
+            "--shaped", help="set points that leave the machine's [[modes]] at rest; for optimal and toppra"
+        ),
+    ] = False,
     tolerance: ToleranceOption = None,
     output: Annotated[
         Path | None,
@@ -89,6 +95,7 @@ def plan(
             corner=corner and corner.value,
             rounds=rounds,
             solver=solver and solver.value,
+            shaped=shaped,
             tolerance=tolerance,
             progress=progress,
         )

@@ -26,6 +26,7 @@ from planner.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.methods.pacing import Runs, Timed, TimedT, paced, runs_of
+from planner.timing import MotionInTime
 from planner.verify.filtered import look_behind, motion_asked
 from planner.verify.pieces import pieces_of, widened
 
@@ -73,17 +74,18 @@ class Behind:
     """The measuring of motions along one path behind one machine's filters."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine):
-        assert machine.fir is not None
         self.toolpath, self.machine = toolpath, machine
-        self.filters = Filters(machine.fir.time_constants)
         self.tolerance = float(toolpath.tolerance.min())
         self.pieces = pieces_of(toolpath)
         self._wide = widened(self.pieces, WIDER)
+        if machine.fir is None:
+            return  # `errors` of the motion itself can be asked for
+        self.filters = Filters(machine.fir.time_constants)
         weights = self.filters.step(self.filters.delay * np.arange(CELLS + 1) / CELLS)
         self._weights = np.diff(weights)
 
     def errors(
-        self, motion: Timed, filters: tuple[float, ...]
+        self, motion: MotionInTime, filters: tuple[float, ...]
     ) -> tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]:
         """Of the contour: times, ratios and pieces where large (n,); of the vertices: ratio and time (N+1,)."""
         kept: list[tuple[FloatArray, FloatArray, Array]] = []

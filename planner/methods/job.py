@@ -29,6 +29,7 @@ from planner.methods.plan import GridHistory, Plan
 from planner.methods.prices import PriceList
 from planner.methods.stages import Progress, Stages
 from planner.nc.program import Program
+from planner.shaping import ShapedMotion
 from planner.timing import MotionInTime, require_samples, sample_motion
 from planner.trajectory import Trajectory
 from planner.verify import Verdict, verify
@@ -164,6 +165,7 @@ class Job:
     ) -> Plan:
         """The record of the job with what was delivered, None if it could not be solved; for the rest see `Plan`."""
         trajectory, verdict = made or (None, None)
+        self._note_ringing(trajectory, method)
         return Plan(
             method=method,
             corner=corner,
@@ -183,6 +185,15 @@ class Job:
             notes=(*job_notes(self.program, *self.real), *self.noted),
             timings=self.stages.timings,
         )
+
+    def _note_ringing(self, trajectory: Trajectory | None, method: str) -> None:
+        """Say so where vibration modes are excited; method fir makes its filters as long as leaves them at rest."""
+        shaped = trajectory is None or isinstance(self.motion_of.get(trajectory), ShapedMotion)
+        if self.machine.modes and not shaped and method != "fir":
+            can = "--shaped does" if method in ("optimal", "toppra") else "optimal and toppra can: --shaped"
+            self.note(
+                f"method {method} does not shape its set points for the machine's vibration modes; {can}"
+            )
 
 
 class Method(ABC):

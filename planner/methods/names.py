@@ -25,7 +25,12 @@ from planner.nc.reader import read_program
 DEFAULT_MACHINE = "mill"
 REACHABILITY = "reachability"
 # Which methods use which setting of `plan`.
-USED_BY = {"corner": ("optimal", "toppra"), "solver": ("toppra",), "rounds": ("optimal", "toppra")}
+USED_BY = {
+    "corner": ("optimal", "toppra"),
+    "solver": ("toppra",),
+    "rounds": ("optimal", "toppra"),
+    "shaped": ("optimal", "toppra"),
+}
 METHODS = (
     "optimal",
     "toppra",
@@ -48,6 +53,7 @@ def plan(
     corner: str | None = None,
     solver: str | None = None,
     rounds: int | None = None,
+    shaped: bool = False,
     tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
@@ -60,16 +66,21 @@ def plan(
     solver    : "reachability" or "toppra", for "toppra" only; None for "reachability"
     rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
                 the size of the job lets pay
+    shaped    : deliver set points that leave the machine's vibration modes at rest, for "toppra" and "optimal" only
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
     Raises InputError naming file, line and column, and for a setting that the method does not use. A problem that could not be
     solved is the plan's status; `Plan.require` turns it into an exception.
     """
-    _check_used(method, corner, solver, rounds)
+    _check_used(method, corner=corner, solver=solver, rounds=rounds, shaped=shaped or None)
     if isinstance(method, str):
         method = _method(
-            method, AUTO if corner is None else corner, REACHABILITY if solver is None else solver, rounds
+            method,
+            AUTO if corner is None else corner,
+            REACHABILITY if solver is None else solver,
+            rounds,
+            shaped,
         )
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
@@ -82,9 +93,8 @@ def plan(
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 
-def _check_used(method: str | Method, corner: str | None, solver: str | None, rounds: int | None) -> None:
+def _check_used(method: str | Method, **given: str | int | None) -> None:
     """Raise InputError for a setting that the method would ignore."""
-    given = {"corner": corner, "solver": solver, "rounds": rounds}
     for setting, users in USED_BY.items():
         if given[setting] is None or method in users:
             continue
@@ -96,19 +106,21 @@ def _check_used(method: str | Method, corner: str | None, solver: str | None, ro
             raise InputError(
                 f"{setting} = {given[setting]}: method {method} does not use it; it is for {' and '.join(users)}"
             )
-    if rounds is not None and corner not in (None, AUTO, SPLINE):
-        raise InputError(f"rounds = {rounds}: they reshape splines, and corner {corner} has none")
+    if given["rounds"] is not None and given["corner"] not in (None, AUTO, SPLINE):
+        raise InputError(
+            f"rounds = {given['rounds']}: they reshape splines, and corner {given['corner']} has none"
+        )
 
 
-def _method(name: str, corner: str, solver: str, rounds: int | None) -> Method:
+def _method(name: str, corner: str, solver: str, rounds: int | None, shaped: bool) -> Method:
     if solver not in SOLVERS:
         raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
     if rounds is not None and rounds < 0:
         raise InputError(f"{rounds} rounds; it must be 0 or more")
     if name == "optimal":
-        return OptimalMethod(corner=corner, rounds=rounds)
+        return OptimalMethod(corner=corner, rounds=rounds, shaped=shaped)
     if name == "toppra":
-        return ToppraMethod(corner=corner, solver=solver, rounds=rounds)
+        return ToppraMethod(corner=corner, solver=solver, rounds=rounds, shaped=shaped)
     if name == "bezier":
         return BezierMethod()
     if name == "kinematic":

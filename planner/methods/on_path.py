@@ -19,6 +19,7 @@ from planner.methods.notes import path_notes
 from planner.methods.plan import Plan
 from planner.methods.prices import PriceList
 from planner.methods.reshape import OnPath
+from planner.shaping import ShapedMotion
 from planner.timing import Motion
 
 CORNERS = (AUTO, SPLINE, "bezier", "fir", "kinematic")
@@ -76,6 +77,8 @@ def plan_of_solution(
     rounded = grid = None
     if made is not None:
         delivered = job.motion_of[made[0]]  # with the standstills that its samples need
+        if isinstance(delivered, ShapedMotion):
+            delivered = delivered.motion  # what the solution is of
         assert isinstance(delivered, Motion)
         with job.stage("report"):
             rounded = corner_table(best.samples, best.problem, best.solution)

@@ -30,6 +30,7 @@ from planner.methods.plan import Plan
 from planner.methods.prices import MORE_TOLERANCE, SitePrices, price_list
 from planner.methods.reshape import OnPath, tube_prices
 from planner.methods.rivals import fastest
+from planner.methods.shaped import shaped_plan
 from planner.methods.slowing import within_limits, without_seen_excess
 from planner.methods.stages import Stages
 from planner.path import RESOLUTION, sample_path
@@ -48,15 +49,27 @@ class OptimalMethod(Method):
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : a solver of third order
     rounds : of reshaping splines (methods/reshape.py); None for as many as the size of the job lets pay
+    shaped : deliver set points that leave the machine's vibration modes at rest (methods/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: JerkLimited = field(default_factory=JerkLimited)
     rounds: int | None = None
+    shaped: bool = False
 
     ways = ((0.5, 1.0), (0.1, 1.0))
 
     def plan_job(self, job: Job) -> Plan:
+        if self.shaped:
+            # reshaping makes paths for the motion as it is planned, not for the one behind the shaper
+            plain = dataclasses.replace(self, rounds=self.rounds or 0)
+            return shaped_plan(
+                job,
+                lambda job: plain._best(job, self.corner),
+                self.solver.solve,
+                method="optimal",
+                corner=self.corner,
+            )
         plan = self._on_corner(job, self.corner)
         if self.corner != AUTO:
             return plan
@@ -70,17 +83,7 @@ class OptimalMethod(Method):
     def _on_corner(self, job: Job, corner: str | CornerShape) -> Plan:
         """The plan with corners rounded like that, or splines."""
         machine = job.machine
-        with job.stage("geometry"):
-            shape = corner_shape(corner, machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
-            path = round_corners(job.toolpath, machine, shape, blend_tangents=True)
-        best = best_on_path(
-            job,
-            path,
-            corner,
-            lambda path, finer: self._on_path(path, machine, job.stages, finer=finer),
-            blend_tangents=True,
-            rounds=self.rounds,
-        )
+        best = self._best(job, corner)
         motion = made = prices = None
         if best.solution.solved:
             with job.stage("solve"):
@@ -100,6 +103,20 @@ class OptimalMethod(Method):
                     by_site = _site_prices(best)
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)
         return plan_of_solution(job, best, made, method="optimal", corner=corner, prices=prices)
+
+    def _best(self, job: Job, corner: str | CornerShape) -> OnPath:
+        """The time-optimal motion with corners rounded like that, or on splines."""
+        with job.stage("geometry"):
+            shape = corner_shape(corner, job.machine, job.toolpath, bezier=BezierCorner(sigma2=SIGMA2))
+            path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
+        return best_on_path(
+            job,
+            path,
+            corner,
+            lambda path, finer: self._on_path(path, job.machine, job.stages, finer=finer),
+            blend_tangents=True,
+            rounds=self.rounds,
+        )
 
     def _again(self, job: Job) -> Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]:
         """The motion of another problem on the same grid, None if there is none."""

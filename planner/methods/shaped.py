@@ -123,14 +123,19 @@ class _Settling:
 
     def __init__(self, job: Job, shaper: Shaper, jerk: bool):
         self.job, self.shaper = job, shaper
-        self.behind = Behind(job.toolpath, job.machine)
-        self.filters = job.machine.fir.time_constants if job.machine.fir else ()
+        machine = job.real[0]
+        self.behind = Behind(job.toolpath, machine)
+        self.filters = machine.fir.time_constants if machine.fir else ()
         # Between two samples D bows by up to this [mm], which the path between the samples does not have.
         self.bow = (
             job.machine.dt**2 / 8.0 * np.linalg.norm(job.machine.limits("acceleration", job.toolpath.axes))
         )
-        quantities = ("velocity", "acceleration", "jerk") if jerk else ("velocity", "acceleration")
-        self.limits = {name: job.machine.limits(name, job.toolpath.axes) for name in quantities}
+        self.limits = {
+            "velocity": job.machine.limits("velocity", job.toolpath.axes),
+            "acceleration": job.machine.limits("acceleration", job.toolpath.axes),
+        }
+        if jerk:
+            self.limits["jerk"] = job.machine.limits("jerk", job.toolpath.axes)
         self.feed = np.full(int(job.toolpath.block[-1]) + 1, np.inf)
         self.feed[job.toolpath.block] = job.toolpath.feed
 
@@ -268,5 +273,5 @@ def shaped_plan(
             sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
         )  # fmt: skip
     made = job.deliver(found.delivered, not_limited)
-    plan = plan_of_solution(job, found.planned, found.motion, made, method=method, corner=corner)
+    plan = plan_of_solution(job, found.planned, made, method=method, corner=corner)
     return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

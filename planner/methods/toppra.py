@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.costates import second_order_multipliers
+from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
@@ -22,6 +23,7 @@ from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.reshape import OnPath
 from planner.methods.second_order import second_order
+from planner.methods.shaped import shaped_plan
 from planner.methods.slowing import without_seen_excess
 from planner.path import RESOLUTION, sample_path
 from planner.time_law import law_of_solution
@@ -40,17 +42,23 @@ class ToppraMethod(Method):
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
     rounds : of reshaping splines (methods/reshape.py); None for as many as the size of the job lets pay
+    shaped : deliver set points that leave the machine's vibration modes at rest (methods/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: str | FeedrateSolver = "reachability"
     rounds: int | None = None
+    shaped: bool = False
 
     ways = ((0.5, 1.0), (0.1, 1.0))
 
-    def plan_job(self, job: Job) -> Plan:
+    @property
+    def _solver(self) -> FeedrateSolver:
+        return SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
+
+    def _best(self, job: Job) -> OnPath:
+        """The time-optimal motion of a job, and the path that it is on."""
         machine = job.machine
-        solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
         with job.stage("geometry"):
             shape = corner_shape(self.corner, machine, job.toolpath)
             path = round_corners(job.toolpath, machine, shape)
@@ -59,20 +67,37 @@ class ToppraMethod(Method):
             with job.stage("geometry"):
                 samples = sample_path(path, machine, None if finer == 1.0 else RESOLUTION * finer)
             with job.stage("solve"):
-                planned = second_order(path, samples, machine, solver)
+                if (
+                    self.shaped
+                ):  # limits become smaller in places on straight stretches too, which one interval cannot say
+                    samples = refine_for_jerk(samples, machine)
+                planned = second_order(path, samples, machine, self._solver)
                 if not planned.solution.solved:
                     return planned
                 multipliers = second_order_multipliers(planned.problem, planned.solution)
                 solution = dataclasses.replace(planned.solution, multipliers=multipliers)
                 return dataclasses.replace(planned, solution=solution)
 
-        best = best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=self.rounds)
+        return best_on_path(job, path, self.corner, on_path, blend_tangents=False, rounds=self.rounds)
+
+    def plan_job(self, job: Job) -> Plan:
+        if self.shaped:
+            plain = dataclasses.replace(self, rounds=self.rounds or 0)
+            return shaped_plan(
+                job,
+                plain._best,
+                self._solver.solve,
+                method="toppra",
+                corner=self.corner,
+                not_limited=("jerk",),
+            )
+        best = self._best(job)
         motion = made = None
         if best.solution.solved:
             motion = Motion(samples=best.samples, law=law_of_solution(best.samples, best.solution))
 
             def again(planned: OnPath, problem: FeedrateProblem) -> tuple[OnPath, Motion] | None:
-                other = dataclasses.replace(planned, problem=problem, solution=solver.solve(problem))
+                other = dataclasses.replace(planned, problem=problem, solution=self._solver.solve(problem))
                 if not other.solution.solved:
                     return None
                 return other, Motion(

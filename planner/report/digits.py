@@ -61,7 +61,7 @@ def on_grid(t: Array) -> tuple[FloatArray, float, float, float]:
     dt = _roundest(times[1:-1], error * (1 + 1e-6))
     if dt is None:
         return times, error, error, error
-    grid = np.arange(len(t)) * dt
+    grid: FloatArray = np.arange(len(t), dtype=np.float64) * dt
     if abs(times[-1] - grid[-1]) <= min(error * (1 + 1e-6), 0.5 * dt):
         return grid, error, 0.0, 0.0
     grid[-1] = times[-1]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 from weakref import WeakKeyDictionary
@@ -42,7 +43,8 @@ PERIOD_ROUNDS = 8
 class Job:
     """A program on its way to a plan.
 
-    toolpath  : the program's exact path, with its tolerances, or less of them (`with_share`, methods/periods.py)
+    toolpath  : the path that is planned: the program's exact path, with its tolerances, or less of them (`with_share`,
+                methods/periods.py)
     stages    : the clock
     judged    : machine and toolpath that the motion is kept to and judged by where it is planned with others, else None
     noted     : what the method has said of what it gave up (`note`)
@@ -65,18 +67,19 @@ class Job:
     def with_share(self, share: float, seen: float) -> Job:
         """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
         of `seen` of their lengths [-]."""
-        machine = self.real[0]
+        machine, toolpath = self.real
         assert machine.fir is not None
-        lengths = tuple(
-            seen * np.sqrt(share) * T for T in machine.fir.time_constants
-        )  # T^2 over tolerance stays
-        return replace(
+        by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
+        lag = machine.fir.phase_lag_max
+        filters = {
+            "time_constants": tuple(by * T for T in machine.fir.time_constants),
+            "phase_lag_max": None if lag is None else by * lag,
+        }
+        return dataclasses.replace(
             self,
-            machine=machine.model_copy(
-                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
-            ),
-            toolpath=replace(self.toolpath, tolerance=share * self.toolpath.tolerance),
-            judged=self.real,
+            machine=machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)}),
+            toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
+            judged=(machine, toolpath),
             noted=[],
         )
 
@@ -87,6 +90,10 @@ class Job:
     def note(self, *sentences: str) -> None:
         """Add to the notes of the plan: what was given up, with its first line and how often."""
         self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+
+    def afresh(self) -> Job:
+        """The job for another plan of it, with notes of its own."""
+        return dataclasses.replace(self, noted=[])
 
     @cached_property
     def stop_time(self) -> float:
@@ -109,7 +116,7 @@ class Job:
         """
         machine, toolpath = self.real
         with self.stage("sample"):
-            motion = settled(motion, toolpath, machine, "jerk" not in not_limited)
+            motion = self.settled(motion, not_limited)
             trajectory = self._named(sample_motion(motion, machine.dt))
         self.motion_of[trajectory] = motion
         with self.stage("verify") as progress:
@@ -124,16 +131,22 @@ class Job:
             )
         return trajectory, verdict
 
+    def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
+        """The motion as it is delivered: with the standstills that its samples need."""
+        machine, toolpath = self.real
+        return settled(motion, toolpath, machine, "jerk" not in not_limited)
+
     def _named(self, trajectory: Trajectory) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
         method's own blocks and a note."""
-        segment = segments_at(self.toolpath, trajectory.position, trajectory.feed)
+        _, toolpath = self.real
+        segment = segments_at(toolpath, trajectory.position, trajectory.feed)
         if segment is None:
             self.note(
                 "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
             )
             return trajectory
-        return replace(trajectory, block=self.toolpath.block[segment], line=self.toolpath.line[segment])
+        return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
 
     def plan(
         self,
@@ -199,9 +212,16 @@ class Method(ABC):
             toolpath = toolpath_from_program(program, machine, tolerance)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
         require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
-        return self.plan_within_periods(
-            Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
-        )
+        return self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+
+    def plan_best(self, job: Job) -> Plan:
+        """The plan of a job; for a machine with filters the fastest of those that are tried (`ways`)."""
+        best = self.plan_within_periods(job)
+        if job.machine.fir is None or not best.solved:
+            return best
+        for share, seen in self.ways:
+            best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
+        return best
 
     @property
     def keeps_tolerance(self) -> bool:
@@ -210,7 +230,7 @@ class Method(ABC):
 
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""
-        made = self._fastest(job)
+        made = self.plan_job(job)
         given, planned, (machine, programmed) = job, job.toolpath, job.real
         for _ in range(PERIOD_ROUNDS):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
@@ -221,20 +241,11 @@ class Method(ABC):
             if less is None:
                 break
             planned = less
-            job = replace(given, toolpath=planned, judged=given.real, noted=[])
-            made = self._fastest(job)
+            job = dataclasses.replace(given, toolpath=planned, judged=(machine, programmed), noted=[])
+            made = self.plan_job(job)
         if job is given:
             return made
-        return replace(made, notes=(*made.notes, _said(made, programmed, planned)))
-
-    def _fastest(self, job: Job) -> Plan:
-        """The plan; for a machine with filters the fastest of those that are tried (`ways`)."""
-        best = self.plan_job(job)
-        if job.machine.fir is None or not best.solved:
-            return best
-        for share, seen in self.ways:
-            best = faster(best, self.plan_job(job.with_share(share, seen)))
-        return best
+        return dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:

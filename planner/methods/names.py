@@ -58,8 +58,8 @@ def plan(
     method    : a name of `METHODS`, or a method with settings of your own
     corner    : "auto", "spline", "bezier", "fir" or "kinematic", for "toppra" and "optimal" only; None for "auto"
     solver    : "reachability" or "toppra", for "toppra" only; None for "reachability"
-    rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many
-                as the size of the job lets pay
+    rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
+                the size of the job lets pay
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 

@@ -176,7 +176,7 @@ class _Starts:
         yield from list(self.made)
         while self._methods:
             own_clock = dataclasses.replace(self._job, stages=Stages(), noted=[])
-            plan = self._methods.pop(0).plan_within_periods(own_clock)
+            plan = self._methods.pop(0).plan_best(own_clock)
             if plan.trajectory is None:
                 self.failed.append(plan)
                 continue
@@ -222,8 +222,9 @@ def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered,
 
 def _missed(job: Job, motion: MotionInTime, found: list[_Found]) -> set[int]:
     """The courses on which chords between samples miss vertices by more than the tolerance."""
-    _, far = missed(motion, job.real[1], job.machine.dt)
-    over = np.flatnonzero(far > job.real[1].tolerance)
+    machine, toolpath = job.real
+    _, far = missed(motion, toolpath, machine.dt)
+    over = np.flatnonzero(far > toolpath.tolerance)
     return {
         k
         for k, one in enumerate(found)

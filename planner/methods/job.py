@@ -55,7 +55,6 @@ class Job:
     machine: Machine
     toolpath: Toolpath
     stages: Stages
-    programmed: Toolpath | None = None
     noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
@@ -91,6 +90,10 @@ class Job:
     def note(self, *sentences: str) -> None:
         """Add to the notes of the plan: what was given up, with its first line and how often."""
         self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+
+    def afresh(self) -> Job:
+        """The job for another plan of it, with notes of its own."""
+        return dataclasses.replace(self, noted=[])
 
     @cached_property
     def stop_time(self) -> float:
@@ -191,11 +194,6 @@ class Method(ABC):
 
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
-    @property
-    def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
-        return True
-
     def plan(
         self,
         program: Program,
@@ -224,6 +222,11 @@ class Method(ABC):
         for share, seen in self.ways:
             best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
         return best
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        return True
 
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""

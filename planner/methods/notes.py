@@ -30,8 +30,13 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     toolpath : the program's own
     best     : the path and its solved motion
     """
-    notes = list(best.notes)
+    notes: list[str] = []
     path, at = best.path, best.path.legs.first
+    added = (path.joint == Joint.STOP) & (toolpath.joint[at] != Joint.STOP)
+    if added.any():
+        notes.append(
+            _at(toolpath, at[added], "full stop", "where no smooth curve was found inside the tolerance")
+        )
     on_spline = np.zeros(len(path.joint), bool)
     for first, last in zip(path.spline.joint_first, path.spline.joint_last, strict=True):
         on_spline[first : last + 1] = True

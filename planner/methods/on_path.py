@@ -80,7 +80,7 @@ def plan_of_solution(
         with job.stage("report"):
             rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, delivered.law)
-        job.note(*path_notes(job.toolpath, best))
+        job.note(*path_notes(job.toolpath, best), *best.notes)
     return job.plan(
         made,
         method=method,

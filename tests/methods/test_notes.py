@@ -66,8 +66,10 @@ def test_what_a_path_gives_up_is_noted() -> None:
 
     whole = solved([])
     assert path_notes(toolpath, whole) == []
-    assert path_notes(toolpath, solved([2])) == []  # whoever puts in full stops says so:
-    assert path_notes(toolpath, dataclasses.replace(whole, notes=("2 full stops",))) == ["2 full stops"]
+    assert path_notes(toolpath, solved([2])) == [
+        "line 3: a full stop where no smooth curve was found inside the tolerance"
+    ]
+    assert path_notes(toolpath, solved([2, 4]))[0].startswith("line 3: the first of 2 full stops")
 
     still = np.flatnonzero(whole.samples.segment == 3)[1]
     feed_sq = whole.solution.feed_sq.copy()

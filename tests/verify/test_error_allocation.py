@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motions import JERK_FREE, Asked, Moves, chain, machine, polyline, rounded, sample, stay
+from motions import JERK_FREE, Asked, Moves, chain, changed, machine, polyline, rounded, sample, stay
 
 from planner.machine import machine_from_dict
-from planner.verify import error_allocation, verify
+from planner.report.trajectory_file import divided_difference
+from planner.verify import Given, error_allocation, verify
 
 AXES = {
     letter: {"velocity": 500.0, "acceleration": a, "jerk": 1e9}
@@ -232,3 +233,29 @@ def test_half_of_the_closed_form_would_fail_motions_that_use_it(monkeypatch):
     after = judged(rounded(points, 0.04, feed), points)
     assert laws_broken(after)
     assert after.corners.worst_speed_ratio == pytest.approx(np.sqrt(2) * before.corners.worst_speed_ratio)
+
+
+@pytest.mark.parametrize("digits", [None, 6, 4])
+def test_accelerations_from_positions_break_the_law_only_if_the_motion_does(digits):
+    """Divided differences are means of the acceleration; the digits that positions are written with are taken off, not the law."""
+    points, theta = bent(np.deg2rad(60.0)), np.deg2rad(60.0)
+    inward = np.array([-np.sin(theta / 2), np.cos(theta / 2), 0.0])
+    limit = np.sqrt((BOX @ inward).max() * arc_of(theta, 0.04))
+    rounding = np.full(3, 0.5 * 10.0**-digits) if digits else ()
+    for share in (0.9999999, 1.6):
+        given = sample(rounded(points, 0.04, share * limit), 0.001)
+        position = given.position if digits is None else np.round(given.position, digits)
+        velocity, acceleration, jerk = (divided_difference(given.t, position, order) for order in (1, 2, 3))
+        bare = changed(given, position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
+        verdict = verify(
+            bare,
+            program(points),
+            UNEQUAL,
+            given=Given(columns=(), position_rounding=rounding),
+            not_limited=JERK_FREE,
+        )
+        assert verdict.corners.count == 1
+        # of 1780 mm/s2 4 r / h^2 is 3.5 for six digits, 350 for four; it is in there once and taken off once
+        assert verdict.corners.speed_ratio[0] > share * {None: 0.99, 6: 0.98, 4: 0.6}[digits]
+        broken = any(fault.startswith("eq. 19") for fault in verdict.faults)
+        assert broken == (share > 1)

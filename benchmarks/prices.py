@@ -25,6 +25,7 @@ import planner
 from benchmarks import problems
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.machine import Machine, load_machine
+from planner.methods.plan import Plan
 from planner.methods.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE, WORTH
 from planner.methods.savings import more_of
 from planner.nc.program import Program
@@ -86,6 +87,12 @@ def with_more(program: Program, machine: Machine, name: str) -> tuple[Program, M
     return dataclasses.replace(program, feed=program.feed * (1.0 + MORE_LIMIT)), machine
 
 
+def time_of(plan: Plan) -> float:
+    """The cycle time of a solved plan [s]."""
+    assert plan.trajectory is not None
+    return plan.trajectory.cycle_time
+
+
 def compared(
     name: str, program: Program, machine: Machine, corner: str, among: tuple[str, ...] = ()
 ) -> dict[str, Any]:
@@ -93,7 +100,8 @@ def compared(
     began = time.process_time()
     plan = planner.plan(program, machine, method="optimal", corner=corner).require()
     took = time.process_time() - began
-    prices, cycle_time = plan.prices, plan.trajectory.cycle_time
+    prices, cycle_time = plan.prices, time_of(plan)
+    assert prices is not None, "a plan by optimal has prices"
     rows = []
     for limit, saved in prices.saved.items():
         if among and limit not in among:
@@ -101,7 +109,7 @@ def compared(
         if limit not in ("feed", "tolerance") and saved < WORTH * cycle_time:
             continue
         again = planner.plan(*with_more(program, machine, limit), method="optimal", corner=corner).require()
-        found = cycle_time - again.trajectory.cycle_time
+        found = cycle_time - time_of(again)
         least, most = prices.ranges[limit]
         room = HINT_LEAST * cycle_time
         hint = limit in prices.hints
@@ -120,7 +128,7 @@ def compared(
                 "found_s": found,
                 "ratio": saved / found if found else float("nan"),
                 "right": bool(right),
-                "passed": again.verdict.passed,
+                "passed": again.verdict is not None and again.verdict.passed,
             }
         )
         print(f"{name} {corner} {limit}: {saved:.4g} [{least:.4g}, {most:.4g}] found {found:.4g}", flush=True)

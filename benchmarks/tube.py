@@ -1,4 +1,4 @@
-"""How far is the optimum on rounded corners from the physical limit? Every corner shape against method `tube`.
+"""How far is the optimum on rounded corners from what method `tube` finds? Every corner shape against it.
 
     python -m benchmarks.tube [--resume]
 

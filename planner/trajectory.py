@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def joined(chunks: list[Trajectory]) -> Trajectory:
     """Chunks in order as one trajectory; a sample that a chunk shares with the one before counts once."""
     names = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
     fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])
         for name in names
     }

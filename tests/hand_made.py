@@ -66,8 +66,8 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         vertex_error_mm=0.02,
         end_error_mm=0.0,
         corners=make_corners(turns=turns),
-        ringing=(),
         after_filters=None,
+        ringing=(),
         lost_after=None,
         notes=(),
         faults=()

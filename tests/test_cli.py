@@ -75,7 +75,7 @@ def test_that_there_are_no_corners_is_said(planned: Callable[..., None], job: Pa
 
 def test_json_is_all_there_is_on_stdout(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
     planned()
-    result = run("plan", job, "--json", "-o", tmp_path / "out")
+    result = run("plan", job, "--json", "--quiet", "-o", tmp_path / "out")
     assert json.loads(result.stdout)["cycle_time_s"] == pytest.approx(0.8)
     assert result.stderr == ""
 

@@ -142,7 +142,7 @@ def test_a_row_says_what_the_verdict_says(answers: Callable[..., list[str]], job
 
 def test_a_line_of_progress_per_method(answers: Callable[..., list[str]], job: Path) -> None:
     answers(fir=InputError("no"))
-    result = run(job, "--method", "stop,fir,bezier")
+    result = run(job, "--method", "stop,fir,bezier", "--quiet")
     assert result.stderr == "stop: 0.8000 s, passed\nfir: refused\nbezier: 0.8000 s, passed\n"
 
 
@@ -249,6 +249,13 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_work(
     assert result.exit_code == 2
     assert result.stderr.startswith(str(tmp_path / name))
     assert asked == []
+
+
+def test_a_method_that_uses_up_the_memory_is_a_row(answers: Callable[..., list[str]], job: Path) -> None:
+    answers(fir=MemoryError("Unable to allocate 428. MiB"))
+    result = run(job, "--method", "stop,fir")
+    assert result.exit_code == 0
+    assert "fir: the memory is used up (Unable to allocate 428. MiB); split" in result.stdout
 
 
 @pytest.mark.parametrize("name", ["c.json", "c.csv"])

@@ -18,7 +18,16 @@ from planner.commands.options import (
     QuietOption,
     ToleranceOption,
 )
-from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, ProgressBar, guarded, say, show
+from planner.commands.terminal import (
+    BAD_INPUT,
+    FAILED,
+    NOT_SOLVED,
+    ProgressBar,
+    guarded,
+    memory_used_up,
+    say,
+    show,
+)
 from planner.errors import InputError, NotSolvedError
 
 if TYPE_CHECKING:
@@ -99,7 +108,7 @@ def parse_methods(text: str) -> list[str]:
 def _run(method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool) -> Row:
     """Plan with one method and say on standard error how it went."""
     from planner import plan
-    from planner.report.comparison import refused, row_of_plan
+    from planner.report.comparison import Row, refused, row_of_plan
 
     with ProgressBar(quiet=quiet) as progress:
         try:
@@ -113,6 +122,8 @@ def _run(method: str, program: Program, machine: Machine, tolerance: float | Non
             row = row_of_plan(method, made)
         except (InputError, NotSolvedError) as fault:
             row = refused(method, fault)
+        except MemoryError as fault:
+            row = Row(method=method, outcome="not solved", sentence=memory_used_up(fault))
     took = "" if row.cycle_time is None else f" {row.cycle_time:.4f} s,"
     say(f"{method}:{took} {row.outcome}", err=True)
     return row

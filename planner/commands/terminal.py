@@ -68,7 +68,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             say(f"not solved: {fault}", err=True)
             raise typer.Exit(NOT_SOLVED) from None
         except MemoryError as fault:
-            say(f"not solved: the memory is used up ({fault or 'no more is given'}); {MORE_MEMORY}", err=True)
+            say(f"not solved: {memory_used_up(fault)}", err=True)
             raise typer.Exit(NOT_SOLVED) from None
         except KeyboardInterrupt:
             say("interrupted", err=True)
@@ -92,7 +92,10 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-MORE_MEMORY = "split the program, or use --corner spline or a faster --method (kinematic, stop)"
+def memory_used_up(fault: MemoryError) -> str:
+    """What to say, and what to do."""
+    said = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
+    return f"{said}; split the program, or use --corner spline or a faster --method (kinematic, stop)"
 
 
 def say(text: str, *, err: bool = False) -> None:

@@ -50,12 +50,12 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
     highest = _highest_feeds(trajectory, toolpath, joint, duration)
     cut = np.flatnonzero(~toolpath.rapid)
     run = _runs(highest[cut], duration[cut], RUN_PERIODS * machine.dt)
-    cap = np.maximum.reduceat(highest[cut], np.flatnonzero(np.diff(run, prepend=-1)))[run] if len(cut) else []
+    cap = np.zeros(len(cut))  # of each run
+    np.maximum.at(cap, run, highest[cut])
+    cap = cap[run]
     programmed = toolpath.feed[cut]
     feeds = np.full(blocks, np.nan)
-    feeds[toolpath.block[cut]] = np.where(
-        cap >= programmed * (1.0 - SAME), programmed, np.multiply(cap, 1.0 + ABOVE)
-    )
+    feeds[toolpath.block[cut]] = np.where(cap >= programmed * (1.0 - SAME), programmed, cap * (1.0 + ABOVE))
     return feeds
 
 

@@ -7,7 +7,7 @@ jerks are low: stretches are compared in the order of what they could gain by po
 
 A run of which one place gets no spline, because the curve leaves the tolerance there, has no certificate or has a cusp where the path
 turns back within the tolerance, would keep its single corners as a whole: the motion stops there instead, and the run is two. What
-still gets none after some rounds is fenced off by two full stops, and keeps its single corners alone. `given_up` says all of it.
+still gets none after some rounds is fenced off by two full stops, and keeps its single corners alone.
 """
 
 from __future__ import annotations
@@ -67,9 +67,14 @@ def on_spline(
     given = rounded
     with stages.stage("geometry"):
         rounded, shape = splined_with_stops(rounded, machine, blend_tangents)
+    notes: tuple[str, ...] = ()
     if not shape.laid.fits.any():
-        return dataclasses.replace(usual(given), notes=given_up(rounded, rounded, shape))
-    notes = given_up(given, rounded, shape)
+        if runs := len(shape.laid.fits):
+            line = _line(rounded, int(rounded.legs.first[shape.runs.joint_first[0]]))
+            notes = (
+                f"line {line}: no spline was found inside the tolerance, here and on all {runs} runs of corners",
+            )
+        return dataclasses.replace(usual(given), notes=notes)
     shape, best = reshaped(rounded, shape, usual, rounds, stages)
     if auto:
         with stages.stage("solve"):
@@ -78,9 +83,9 @@ def on_spline(
         shape, best, left = _with_corners(rounded, shape, best, usual, corners)
         if len(left):
             line = _line(rounded, int(rounded.legs.first[rounded_stops(rounded)[left[0] + 1]]))
-            notes += (
-                f"single corners were not compared on {len(left)} stretches between full stops, the first up to line {line}: "
-                f"their grids would have some {corners.points[left].sum():.2g} points",
+            notes = (
+                f"line {line}: single corners were not compared on {len(left)} stretches between full stops, of which the first ends "
+                f"here: their grids would have some {corners.points[left].sum():.2g} points",
             )
         small = of_given.points.sum() <= COMPARED_POINTS
         if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
@@ -107,25 +112,6 @@ def splined_with_stops(
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
         shape = spline_shape(rounded, machine)
     return rounded, shape
-
-
-def given_up(given: SmoothPath, rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
-    """Sentences on what splines did not do: full stops that `given` did not have, and runs that keep their single corners."""
-    said = []
-    stops = np.flatnonzero((rounded.toolpath.joint == Joint.STOP) & (given.toolpath.joint != Joint.STOP))
-    if len(stops):
-        said.append(
-            f"{len(stops)} full stops where no curve fits inside the tolerance, the first after line {_line(rounded, stops[0])}"
-        )
-    lost = np.flatnonzero(~shape.laid.fits)
-    if len(lost):
-        corners = int((shape.runs.joint_last - shape.runs.joint_first + 1)[lost].sum())
-        first = rounded.legs.first[shape.runs.joint_first[lost[0]]]
-        said.append(
-            f"{corners} corners are rounded one by one because no curve through them fits inside the tolerance, "
-            f"the first after line {_line(rounded, first)}"
-        )
-    return tuple(said)
 
 
 def _line(path: SmoothPath, joint: int) -> int:

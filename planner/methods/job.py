@@ -55,7 +55,6 @@ class Job:
     machine: Machine
     toolpath: Toolpath
     stages: Stages
-    programmed: Toolpath | None = None
     noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
@@ -70,14 +69,15 @@ class Job:
         of `seen` of their lengths [-]."""
         machine, toolpath = self.real
         assert machine.fir is not None
-        lengths = tuple(
-            seen * np.sqrt(share) * T for T in machine.fir.time_constants
-        )  # T^2 over tolerance stays
+        by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
+        lag = machine.fir.phase_lag_max
+        filters = {
+            "time_constants": tuple(by * T for T in machine.fir.time_constants),
+            "phase_lag_max": None if lag is None else by * lag,
+        }
         return dataclasses.replace(
             self,
-            machine=machine.model_copy(
-                update={"fir": machine.fir.model_copy(update={"time_constants": lengths})}
-            ),
+            machine=machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)}),
             toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
             judged=(machine, toolpath),
             noted=[],
@@ -90,6 +90,10 @@ class Job:
     def note(self, *sentences: str) -> None:
         """Add to the notes of the plan: what was given up, with its first line and how often."""
         self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+
+    def afresh(self) -> Job:
+        """The job for another plan of it, with notes of its own."""
+        return dataclasses.replace(self, noted=[])
 
     @cached_property
     def stop_time(self) -> float:
@@ -190,11 +194,6 @@ class Method(ABC):
 
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
-    @property
-    def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
-        return True
-
     def plan(
         self,
         program: Program,
@@ -223,6 +222,11 @@ class Method(ABC):
         for share, seen in self.ways:
             best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
         return best
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        return True
 
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job so that the chords between its samples keep the tolerance too (methods/periods.py)."""

@@ -25,7 +25,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
 
 
 def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
-    """What a motion on a smooth path gave up: full stops that the program does not ask for, corners that are not rounded, splines.
+    """What a motion on a smooth path gave up: what its splines did, corners that are not rounded, full stops of the solver.
 
     toolpath : the program's own
     best     : the path and its solved motion
@@ -35,9 +35,7 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     added = (path.joint == Joint.STOP) & (toolpath.joint[at] != Joint.STOP)
     if added.any():
         notes.append(
-            _at(
-                toolpath, at[added], "full stop", "where the smooth path would turn back within the tolerance"
-            )
+            _at(toolpath, at[added], "full stop", "where no smooth curve was found inside the tolerance")
         )
     on_spline = np.zeros(len(path.joint), bool)
     for first, last in zip(path.spline.joint_first, path.spline.joint_last, strict=True):
@@ -48,16 +46,6 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     lost = _standstills(best)
     if len(lost):
         notes.append(_at(toolpath, lost, "full stop", "where the solver did not converge"))
-    if best.shape is not None and not best.shape.laid.fits.all():
-        runs, fits = best.shape.runs, best.shape.laid.fits
-        notes.append(
-            _at(
-                toolpath,
-                at[runs.joint_first[~fits]],
-                "stretch",
-                f"of {len(fits)} on single corners: no spline was found inside the tolerance, or they are faster",
-            )
-        )
     return notes
 
 

@@ -80,14 +80,14 @@ def plan_of_solution(
         with job.stage("report"):
             rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, delivered.law)
-        job.note(*path_notes(job.toolpath, best))
+        job.note(*path_notes(job.toolpath, best), *best.notes)
     return job.plan(
         made,
         method=method,
         corner=corner if isinstance(corner, str) else corner.name,
         solver=best.solution.solver,
         status=best.solution.status,
-        sentence="; ".join((best.solution.sentence, *best.notes)),
+        sentence=best.solution.sentence,
         grid_points=len(best.samples),
         rounded=rounded,
         grid=grid,

@@ -63,7 +63,7 @@ class OptimalMethod(Method):
         return fastest(
             plan,
             job,
-            lambda corner: self._on_corner(job, corner),
+            self._on_corner,
             lambda path, coarser: self._on_path(path, job.machine, job.stages, finer=coarser),
         )
 

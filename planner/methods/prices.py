@@ -47,7 +47,7 @@ from planner.methods.corner_prices import (
     corner_prices,
     sums,
 )
-from planner.methods.savings import Change, Thinned, more_of, thinned
+from planner.methods.savings import Change, more_of, thinned
 from planner.path import PathSamples
 
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-]
@@ -194,14 +194,16 @@ class _Savings:
     def all(self, by_share: dict[str, float], tolerance: float | None) -> dict[str, Saving]:
         """Of `MORE_LIMIT` more of every limit, and of `MORE_TOLERANCE` more tolerance where that is a change of corners; from the
         prices dT/d(ln limit) and dT/d(tolerance)."""
-        slope = by_share | ({"tolerance": MORE_TOLERANCE * tolerance} if "tolerance" in self.changes else {})
+        slope = dict(by_share)
+        if tolerance is not None and "tolerance" in self.changes:
+            slope["tolerance"] = MORE_TOLERANCE * tolerance
         straight = {name: self._straight(name, price) for name, price in slope.items()}
         worth = [name for name in slope if abs(straight[name]) >= WORTH * self.solution.cycle_time]
-        part: Thinned | None = None
-        if worth:
-            part = thinned(self.samples, self.problem, self.solution, self.machine, len(worth))
         found = {name: Saving(*sorted((0.0, most))) for name, most in straight.items()}
-        for name in worth if part is not None else ():
+        part = thinned(self.samples, self.problem, self.solution, self.machine, len(worth)) if worth else None
+        if part is None:
+            return found
+        for name in worth:
             solved = part.saves(self.changes[name], 1.0 if name == "tolerance" else MORE_LIMIT, slope[name])
             if solved is not None:
                 other = solved if part.rounds_again and not part.sampled else straight[name]

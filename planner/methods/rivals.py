@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.methods.geometry import corner_bounds
@@ -36,22 +37,24 @@ FASTER = 1e-6  # less is the same time [-]
 def fastest(
     plan: Plan,
     job: Job,
-    on_corner: Callable[[str], Plan],
+    on_corner: Callable[..., Plan],
     on_path: Callable[[SmoothPath, float], OnPath],
 ) -> Plan:
     """The plan, or a rival that passes its verdict in less time, or while the plan does not; its sentence says which.
 
-    on_corner : plans the job on a corner shape, by its name
+    on_corner : plans a job on a corner shape, `corner`, by its name
     on_path   : solves the feedrate problem on a path, on a grid of so many times the usual resolution
     """
     best = plan
     if job.stop_time < _time(best):
-        best = _better(best, StopMethod().plan_job(job), "full stops at all blocks take less time")
+        best = _better(best, _alone(job, StopMethod().plan_job), "full stops at all blocks take less time")
     if plan.grid_points <= RIVAL_POINTS:
         for name in _chances(best, job, on_path):
-            best = _better(best, on_corner(name), f"{name} corners take less time")
+            on_shape = _alone(job, partial(on_corner, corner=name))
+            best = _better(best, on_shape, f"{name} corners take less time")
             if name == "kinematic":
-                best = _better(best, KinematicMethod().plan_job(job), "method kinematic takes less time")
+                kinematic = _alone(job, KinematicMethod().plan_job)
+                best = _better(best, kinematic, "method kinematic takes less time")
     if best is plan:
         return plan
     return dataclasses.replace(best, method=plan.method, corner=plan.corner, timings=job.stages.timings)
@@ -71,6 +74,11 @@ def _chances(best: Plan, job: Job, on_path: Callable[[SmoothPath, float], OnPath
         coarse = on_path(path, COARSER).solution
         if coarse.solved and coarse.cycle_time + dwell < CHANCE * _time(best):
             yield name
+
+
+def _alone(job: Job, plan: Callable[[Job], Plan]) -> Plan:
+    """A plan that does not say what another one gave up."""
+    return plan(dataclasses.replace(job, noted=[]))
 
 
 def _time(plan: Plan) -> float:

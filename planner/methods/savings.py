@@ -202,7 +202,10 @@ def _windows(piece: Array, kept: Array, most: int) -> tuple[Array, Array, bool]:
         edges = np.unique(
             np.concatenate([[begin, begin + WINDOW], start[(start > begin) & (start < begin + WINDOW)]])
         )
-        chosen += [np.arange(a, b) for a, b in pairwise(edges) if b - a > CELLS_MIN]
+        whole = np.isin(edges, start)  # parts of pieces need room to start and stop
+        for (a, b), ends in zip(pairwise(edges), pairwise(whole), strict=True):
+            if all(ends) or b - a > CELLS_MIN:
+                chosen.append(np.arange(a, b))
     sizes = np.cumsum([0, *(len(part) for part in chosen)])
     return sizes, kept[np.concatenate(chosen)], True
 

@@ -176,7 +176,7 @@ class _Starts:
         yield from list(self.made)
         while self._methods:
             own_clock = dataclasses.replace(self._job, stages=Stages(), noted=[])
-            plan = self._methods.pop(0).plan_within_periods(own_clock)
+            plan = self._methods.pop(0).plan_best(own_clock)
             if plan.trajectory is None:
                 self.failed.append(plan)
                 continue
@@ -201,18 +201,21 @@ def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered,
     assert start[0] is not None
     assert start[1] is not None
     kept, why = [k for k, one in enumerate(found) if one.steps is None], ""
+    filtered = job.real[0].fir is not None  # what goes on between two stops is felt behind them
+    if filtered and kept:
+        kept = list(range(len(found)))
     while len(kept) < len(found):
         motion = Spliced(
             parts=tuple(
                 first.part(k) if k in kept else _part(job.toolpath, found[k]) for k in range(len(found))
             )
         )
-        made = job.deliver(motion)
+        made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
         passed = made[1].passed or not start[1].passed
         if passed and made[0].cycle_time <= start[0].cycle_time:
             return made, kept, why
         why = "what was found there is slower with its standstills" if passed else made[1].faults[0]
-        missed = _missed(job, motion, found) - set(kept)
+        missed = set() if filtered else _missed(job, motion, found) - set(kept)
         kept = sorted(missed | set(kept)) if missed else list(range(len(found)))
     return (start[0], start[1]), kept, why
 

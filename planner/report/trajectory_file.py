@@ -169,7 +169,7 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
 
 def _one_by_one(given: dict[str, Any]) -> dict[str, Any]:
     """The columns, with an array (T, n) that is named by n axes taken apart."""
-    columns = {}
+    columns: dict[str, Any] = {}
     for name, column in given.items():
         letters = name.strip().lower()
         if (

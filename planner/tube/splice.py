@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.arrays import FloatArray
+from planner.axis_motion import AxisMotion
 from planner.timing import MotionInTime
 from planner.trajectory import Trajectory, joined
 
@@ -80,6 +81,18 @@ class Spliced:
                 columns[name][over] = 0.0
             chunks.append(dataclasses.replace(seen, t=asked, **columns))
         return joined(chunks)
+
+    def whole(self) -> AxisMotion:
+        """As one motion; every part has to be all of a motion that is given axis by axis."""
+        motions = [part.motion for part in self.parts if isinstance(part.motion, AxisMotion)]
+        assert len(motions) == len(self.parts)
+        names = ("position", "velocity", "acceleration", "jerk", "block", "line")
+        return AxisMotion(
+            axes=motions[0].axes,
+            t=np.concatenate([begin + m.t for m, begin in zip(motions, self.begin, strict=False)]),
+            end=self.end,
+            **{name: np.concatenate([getattr(m, name) for m in motions]) for name in names},
+        )
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Spliced:
         """The motion standing longer by `by` (n,) [s] where it comes to rest, at the times `at` (n,) [s]."""

@@ -58,7 +58,7 @@ def filtered(
     before = sum(int(np.ceil(T / h)) for T in filters)
     count = int(np.ceil((end + sum(filters)) / h)) + 1
     for first in range(0, count, CHUNK):
-        t = h * np.arange(first - before, min(first + CHUNK, count))
+        t = h * np.arange(first - before, min(first + CHUNK, count), dtype=np.float64)
         inside = np.clip(t, 0.0, end)
         place, of = np.unique(inside, return_inverse=True)
         x, v = (column[of] for column in at(place))

@@ -167,8 +167,11 @@ def scan(
                 _keep(worst, sample, alone + NORMAL, normal - taken_off, normal_max, k, DIFFERENCE)
         if k > first:
             allowed = max(feed_max[k], feed_max[k - 1])
-            rounding = math.sqrt(float(axes)) * error[1]
-            _keep(worst, sample, alone + FEED, max(step / period - rounding, 0.0), allowed, k, DIFFERENCE)
+            rounding_sq = 0.0
+            for axis in range(axes):
+                rounding_sq += error_before[axis, 1] ** 2 if linear[axis] else 0.0
+            value = max(step / period - math.sqrt(rounding_sq), 0.0)
+            _keep(worst, sample, alone + FEED, value, allowed, k, DIFFERENCE)
             _keep(worst, sample, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
     return travelled
 

@@ -21,7 +21,7 @@ from planner.arrays import FloatArray
 from planner.trajectory import Trajectory
 
 PER_PIECE = 4  # cells; the planner's own places are three a piece
-PER_PERIOD = 2  # cells; two neighbouring times are then less than one period apart
+PER_PERIOD = 2  # cells: chords between neighbouring times last less than a period, and cut no corner more than the machine's do
 SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the rounding of a position in it
 CELLS = 100_000  # looked at together: 30 MB for three axes
 
@@ -52,15 +52,19 @@ def look(motion: Motion, dt: float, seed: int) -> Iterator[Trajectory]:
     cells = np.maximum(PER_PIECE, np.ceil(PER_PERIOD * lasting / dt)).astype(np.int64)
     cells[lasting <= SHORTEST_PIECE] = 0
     last = np.cumsum(cells)  # the number of cells up to the end of each piece
-    seen = -np.inf
-    for first in range(0, int(last[-1]), CELLS):
-        cell = np.arange(first, min(first + CELLS, int(last[-1])))
-        piece = np.searchsorted(last, cell, side="right")
-        place = (cell - last[piece] + cells[piece] + draw.random(len(cell))) / cells[piece]
-        ends = [[0.0]] if not first else [], [[motion.end]] if cell[-1] + 1 == last[-1] else []
-        times = np.minimum(begin[piece] + lasting[piece] * place, motion.end)
-        times = np.unique(np.concatenate([*ends[0], times, *ends[1]]))
-        times = times[times > seen]
+    width = lasting / np.maximum(cells, 1)
+    seen, total = -np.inf, int(last[-1])
+    for first in range(0, total, CELLS):
+        beyond = min(first + CELLS, total)
+        low, high = np.searchsorted(last, [first, beyond - 1], side="right")
+        part = slice(low, high + 1)  # the pieces of these cells
+        before = last[part] - cells[part]
+        here = np.minimum(last[part], beyond) - np.maximum(before, first)  # how many cells of each
+        place = np.arange(first, beyond) - np.repeat(before, here) + draw.random(beyond - first)
+        times = np.repeat(begin[part], here) + np.repeat(width[part], here) * place
+        times = np.concatenate([[0.0] if not first else [], times, [motion.end] if beyond == total else []])
+        times = np.maximum.accumulate(np.clip(times, 0.0, motion.end))
+        times = times[np.diff(times, prepend=seen) > 0.0]
         if len(times):
             seen = times[-1]
             yield motion.at(times, dt)

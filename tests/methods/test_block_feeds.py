@@ -111,7 +111,7 @@ def test_a_block_without_a_sample_is_not_held_up() -> None:
 def test_a_block_that_reaches_the_programmed_feed_keeps_it() -> None:
     """Solvers end a little below it; an F word for that would say nothing."""
     program = parse_program("G1 X50 F3000\nX0 F2000\n", MACHINE)
-    made = plan(program, MACHINE)
+    made = OptimalMethod(corner="bezier").plan(program, MACHINE)
     assert made.trajectory.feed.max() < program.feed.max()
     np.testing.assert_array_equal(feeds_of(made), program.feed)
 
@@ -136,7 +136,7 @@ def circle(radius: float, chords: int) -> str:
 def test_planned_again_the_program_takes_the_planned_time(text: str, words: int) -> None:
     machine = MACHINE.model_copy(update={"tolerance": 0.02})
     source = f"G21 G90 G17 F6000\n{text}M2\n".encode()
-    method = OptimalMethod(corner="spline")
+    method = OptimalMethod(corner="spline", rounds=8)
     made = method.plan(parse_program(source, machine), machine)
     result = retimed(source, made.program, feeds_of(made))
     assert result.count(b"F") <= words

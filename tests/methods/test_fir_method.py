@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import problems
 from planner.errors import InputError
-from planner.filters import residual_vibration
+from planner.filters import damped_period, residual_vibration
 from planner.machine import Mode
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
@@ -106,3 +106,20 @@ def test_it_has_a_name():
     made = plan(JOBS["pentagon"], MACHINE, method="fir")
     assert (made.method, made.corner, made.solver) == ("fir", "fir", "pulses")
     assert "corners are waited at" in made.sentence
+
+
+def test_the_plain_mode_overlaps_corners_between_two_feeds_by_their_geometric_mean():
+    """PAPERS: eq. (14) with V = sqrt(V1 V2) is safe where the feeds differ; the overlap is what the corner saves of the delay."""
+    program = problems.polyline([[0, 0], [20, 0], [20, 10]], feed=np.array([100.0, 25.0]))
+    made = FirMethod(plain=True, profile_filters=(0.05, 0.03)).plan(program, problems.machine(dt=1e-4))
+    overlap = (24 * 0.05 * 0.03 * 0.05 / (np.sqrt(100.0 * 25.0) * np.sin(np.pi / 4))) ** (1 / 3)
+    assert overlap < 2 * 0.03  # the cubic branch
+    assert made.trajectory.cycle_time == pytest.approx(20 / 100 + 10 / 25 + 2 * 0.08 - overlap, abs=2e-4)
+
+
+def test_the_period_of_a_damped_mode():
+    """A free vibration of damping 0.6 has 0.8 of the undamped frequency."""
+    assert damped_period(10.0, 0.6) == pytest.approx(0.125)
+    w, z = 2 * np.pi * 10.0, 0.6
+    t = damped_period(10.0, z) * np.array([0.0, 0.5, 1.0])
+    assert np.abs(np.sin(w * np.sqrt(1 - z**2) * t)).max() < 1e-12

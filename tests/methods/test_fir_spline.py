@@ -351,3 +351,19 @@ def test_an_impossible_feed_is_refused(feed):
 def test_an_impossible_tolerance_is_refused(tolerance):
     with pytest.raises(InputError):
         FirSplineMethod().plan_curve(circle(5.0), MACHINE, 100.0, tolerance)
+
+
+def test_the_plain_filters_are_those_of_paragraph_19():
+    """T1 = v_p / a, T2 = a / j: 50 ms and 10 ms."""
+    made = FirSplineMethod(plain=True).plan_curve(circle(20.0), MACHINE, 100.0)
+    assert made.sentence == "filters of 60 to 60 ms in all"
+
+
+def test_the_plain_speed_on_a_weak_machine_is_v_acc():
+    """sqrt(a rho) where everything else allows more; the setpoints run at it, less what the filters cut off."""
+    machine = problems.machine(acceleration=100.0, jerk=1e8, tolerance=5.0)
+    method = FirSplineMethod(plain=True, profile_filters=(0.01, 0.005), phase_lag=3.0)
+    made = method.plan_curve(circle(5.0, turns=3), machine, 100.0)
+    t = made.trajectory
+    steady = (t.t > 0.3 * t.t[-1]) & (t.t < 0.7 * t.t[-1])
+    np.testing.assert_allclose(t.feed[steady], np.sqrt(100.0 * 5.0), rtol=5e-3)

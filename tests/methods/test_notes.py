@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,7 +67,7 @@ def test_what_a_path_gives_up_is_noted() -> None:
     whole = solved([])
     assert path_notes(toolpath, whole) == []
     assert path_notes(toolpath, solved([2])) == [
-        "line 3: a full stop where the smooth path would turn back within the tolerance"
+        "line 3: a full stop where no smooth curve was found inside the tolerance"
     ]
     assert path_notes(toolpath, solved([2, 4]))[0].startswith("line 3: the first of 2 full stops")
 
@@ -82,9 +81,3 @@ def test_what_a_path_gives_up_is_noted() -> None:
     d[1] = 0.0
     sharp = dataclasses.replace(whole, path=dataclasses.replace(whole.path, d=d))
     assert path_notes(toolpath, sharp) == ["line 2: a corner not rounded: there is no room for it"]
-
-    lost = SimpleNamespace(
-        runs=SimpleNamespace(joint_first=np.array([1, 3])), laid=SimpleNamespace(fits=np.array([True, False]))
-    )
-    (said,) = path_notes(toolpath, dataclasses.replace(whole, shape=lost))
-    assert said.startswith("line 4: a stretch of 2 on single corners")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -152,3 +153,21 @@ def test_legs_that_a_wider_tolerance_opens_count(solved):
     gaps = (smaller.legs.length - smaller.d_out[:-1] - smaller.d_in[1:])[closed]
     v = np.sqrt(solution.feed_sq[solution.feed_sq > 0.0])
     assert gaps.sum() / v.max() <= opened <= gaps.sum() / v.min()
+
+
+def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_and_stop():
+    """400 pieces of 10 points, then one of 5000: windows of the first hold whole pieces, none has a part that is too short."""
+    piece = np.append(np.arange(0, 4001, 10), 9000)
+    kept = np.arange(9000)
+    edges, points, sampled = savings._windows(piece, kept, 3_000)
+    assert sampled
+    assert 2_500 <= len(points) <= 3_000
+    for a, b in pairwise(edges):
+        part = points[a:b]
+        assert (np.diff(part) == 1).all()
+        inside = np.searchsorted(piece, part[0], side="right") - 1
+        assert part[-1] < piece[inside + 1]
+        whole = part[0] == piece[inside] and part[-1] + 1 == piece[inside + 1]
+        assert whole or len(part) > savings.CELLS_MIN
+    assert (points < 4000).any()
+    assert savings._windows(piece, kept, 9_000)[2] is False

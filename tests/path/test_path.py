@@ -346,7 +346,10 @@ def test_a_slow_long_move_takes_its_length_over_its_feed():
 def test_a_hardly_turning_joint_beside_a_sharp_corner():
     angle = np.cumsum([0, 2e-8, np.deg2rad(174), np.deg2rad(174)])
     steps = np.array([10, 1e-3, 10, 10])[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    solve(problems.polyline(np.vstack([[0, 0], np.cumsum(steps, axis=0)])), MACHINE)
+    solved = solve(problems.polyline(np.vstack([[0, 0], np.cumsum(steps, axis=0)])), MACHINE)
+    # Faster than from rest to rest on every leg, slower than the feed.
+    assert 30.0 / 100.0 < solved.time < 3 * (10 / 100 + 100 / 2000)
+    assert (solved.solution.feed_sq <= problems.FEED**2 * (1 + 1e-9)).all()
 
 
 def test_joined_lines_stay_within_the_tolerance():

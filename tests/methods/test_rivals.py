@@ -1,0 +1,42 @@
+"""`optimal` is never slower than what it could have been: full stops, method kinematic, any single corner shape."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from benchmarks.never_slower import compared, job, slower
+from planner.feedrate.solution import Status
+from planner.methods import rivals
+from planner.methods.optimal import OptimalMethod
+
+
+@pytest.mark.parametrize("seed", [3, 17, 27, 28, 40, 55, 70, 99])
+def test_nothing_is_faster_than_optimal(seed):
+    row = compared(seed)
+    assert row["optimal"] is not None
+    assert not list(slower(row))
+
+
+def test_the_plan_says_when_full_stops_take_its_place():
+    plan = OptimalMethod().plan(*job(17))
+    assert (plan.method, plan.corner) == ("optimal", "auto")
+    assert plan.sentence.startswith("full stops at all blocks take less time than splines; ")
+    assert plan.trajectory.cycle_time == pytest.approx(plan.stop_time, rel=1e-6)
+    assert plan.verdict.passed
+
+
+def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):
+    program, machine = job(3)
+    plan = OptimalMethod(rounds=0).plan(program, machine)
+    assert plan.status is Status.OPTIMAL
+
+    class Asked:
+        stop_time = 1.01 * plan.trajectory.cycle_time
+
+    monkeypatch.setattr(rivals, "_chances", lambda best, job, on_path: iter(()))
+    assert rivals.fastest(plan, Asked(), None, None) is plan
+    large = dataclasses.replace(plan, grid_points=rivals.RIVAL_POINTS + 1)
+    monkeypatch.setattr(rivals, "_chances", None)
+    assert rivals.fastest(large, Asked(), None, None) is large

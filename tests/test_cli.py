@@ -192,6 +192,37 @@ def test_verify_takes_the_recorded_machine(job: Path, tmp_path: Path) -> None:
     assert "FAILED" in result.stdout
 
 
+def test_verify_does_not_believe_what_a_file_says_of_its_limits(job: Path, tmp_path: Path) -> None:
+    machine = load_machine("router")
+    program = parse_program(SQUARE, machine)
+    path = tmp_path / "fast.npz"
+    about = {
+        "machine": machine.model_dump(mode="json", exclude_none=True),
+        "not_limited": ["jerk", "acceleration", 5],
+    }
+    write_trajectory(path, trajectory_along(toolpath_from_program(program, machine), time=0.1), about)
+    result = run("verify", path, job)
+    assert result.exit_code == 1
+    assert "the file says: not limited: jerk, acceleration (judged all the same" in result.stderr
+    assert (
+        "jerk is exceeded; the file says that its plan did not limit it: --not-limited jerk reports it"
+        in result.stderr
+    )
+
+
+@pytest.mark.parametrize(
+    "said", [{"tolerance_mm": "wide"}, {"tolerance_mm": -1.0}, {"not_limited": None}, {"machine": 7}]
+)
+def test_verify_takes_no_harm_from_what_a_file_says_of_itself(job: Path, tmp_path: Path, said: dict) -> None:
+    machine = load_machine("mill")
+    path = tmp_path / "t.npz"
+    write_trajectory(
+        path, trajectory_along(toolpath_from_program(parse_program(SQUARE, machine), machine), time=1.5), said
+    )
+    assert run("verify", path, job, "-m", "mill").exit_code == 0
+    assert run("verify", path, job).exit_code == 0
+
+
 # ------------------------------------------------------------------------------------------ info
 
 

@@ -25,7 +25,7 @@ def run(*arguments: object) -> Result:
         (["--method", "stop", "--corner", "auto"], "corner = auto: method stop does not use it"),
         (["--method", "bezier", "--corner", "bezier"], "it is for optimal and toppra"),
         (["--solver", "reachability"], "solver = reachability: method optimal does not use it"),
-        (["--method", "toppra", "--rounds", "0"], "rounds = 0: method toppra does not use it"),
+        (["--method", "bezier", "--rounds", "0"], "rounds = 0: method bezier does not use it"),
         (["--corner", "bezier", "--rounds", "2"], "corner bezier has none"),
         (["--format", "parquet"], "give one with -o DIR"),
     ],

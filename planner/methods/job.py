@@ -273,8 +273,11 @@ def faster(plan: Plan, other: Plan) -> Plan:
 
 
 def _inside(made: Plan) -> bool:
-    """True if the motion's samples and chords keep the tolerance."""
-    return made.verdict is None or not (made.verdict.vertex.broken or made.verdict.contour.broken)
+    """True if the motion's samples and chords keep the tolerance, at corners (eq. 18) wherever the samples fall."""
+    verdict = made.verdict
+    return verdict is None or not (
+        verdict.vertex.broken or verdict.contour.broken or verdict.corners.overdrawn.any()
+    )
 
 
 def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:

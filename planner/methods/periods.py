@@ -35,6 +35,9 @@ from planner.trajectory import joined
 PHASES, PLACES = 16, 64
 # A motion is looked at so many times in a period to find its vertices.
 PER_PERIOD = 8
+# Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of the motion of its own, and
+# who looks at the pieces, at whatever times, sees it.
+LEAST_REST = 1e-6
 # Chords may miss a vertex by this share of its tolerance [-]; the rest is for what lies between the phases and places above.
 USED = 0.99
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
@@ -96,15 +99,18 @@ def _waits(
             k = first + r
             since = (arrival[k] + waited) % dt  # from the last sample
             rest = dt - since - (departure[k] - arrival[k])  # from leaving to the next one
-            if min(since, dt - since) <= 1e-9 * dt or rest <= 0.0:
+            waits[k] = LEAST_REST
+            waited += LEAST_REST
+            if min(since, dt - since) <= 1e-9 * dt or rest <= LEAST_REST:
                 continue
             last = np.array([np.interp(since, tau, column) for column in before[r].T])
             at = np.append(rest, tau[(tau < rest) & ((tau <= gap[k]) | (tau == 0.0))][::-1])
             next_ = np.stack([np.interp(at, tau, column) for column in behind[r].T], axis=1)
             enough = _from_chord(np.broadcast_to(last, next_.shape), next_) <= allowed[k]
             enough[-1] = True  # on the sample
-            waits[k] = rest - at[enough.argmax()]
-            waited += waits[k]
+            more = max(rest - at[enough.argmax()] - LEAST_REST, 0.0)
+            waits[k] += more
+            waited += more
     return waits
 
 

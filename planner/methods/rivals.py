@@ -8,7 +8,7 @@ corner shape its time without jerk limits on a coarse grid is less than what it 
              its time with jerk limits on a coarse grid is more, by less than `CHANCE` says
 kinematic    runs, with less freedom, on the corners of its own shape: a chance like theirs
 
-Beyond `RIVAL_POINTS` grid points only stopping is looked at.
+Beyond `RIVAL_POINTS` grid points only stopping is looked at, and `kinematic` where nothing passes.
 """
 
 from __future__ import annotations
@@ -55,6 +55,10 @@ def fastest(
             if name == "kinematic":
                 kinematic = _alone(job, KinematicMethod().plan_job)
                 best = _better(best, kinematic, "method kinematic takes less time")
+    if _time(best) == float("inf"):
+        best = _better(
+            best, _alone(job, KinematicMethod().plan_job), "method kinematic keeps all limits in less time"
+        )
     if best is plan:
         return plan
     return dataclasses.replace(best, method=plan.method, corner=plan.corner, timings=job.stages.timings)

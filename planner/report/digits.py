@@ -51,7 +51,7 @@ def on_grid(t: Array) -> tuple[FloatArray, float, float, float]:
 
     -> times [s]; the rounding they were written with; what remains of it for all of them, and for the last alone [s]
     """
-    times: FloatArray = t.astype(np.float64)
+    times = t.astype(np.float64)
     written = max(rounding(t), float(np.spacing(np.abs(times).max())) / 2.0)
     times = times - times[0]
     error = written if t[0] == 0 else 2.0 * written
@@ -61,7 +61,7 @@ def on_grid(t: Array) -> tuple[FloatArray, float, float, float]:
     dt = _roundest(times[1:-1], error * (1 + 1e-6))
     if dt is None:
         return times, error, error, error
-    grid = np.arange(len(t), dtype=np.float64) * dt
+    grid: FloatArray = np.arange(len(t), dtype=np.float64) * dt
     if abs(times[-1] - grid[-1]) <= min(error * (1 + 1e-6), 0.5 * dt):
         return grid, error, 0.0, 0.0
     grid[-1] = times[-1]

@@ -156,7 +156,7 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
         raise InputError("cannot be read: its metadata are nested too deep", source=str(path)) from None
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
         raise InputError(f"cannot be read: {fault}", source=str(path)) from fault
-    columns = {}
+    columns: dict[str, Array] = {}
     for name, column in _one_by_one(given).items():
         word = name.strip().lower()
         if word in KNOWN:

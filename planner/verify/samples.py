@@ -59,7 +59,7 @@ def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Mach
         if ratio > beyond:
             raise InputError(
                 f"the times look like {unit}: samples are {np.median(periods):.6g} s apart, and the motion takes {ratio:.3g} times as "
-                f"long as the program at its feed ({least:.4g} s); t must be in seconds: divide it by {factor:g}"
+                f"long as the program at its feed ({least:.4g} s); t must be in seconds: divide it by {factor:.0f}"
             )
 
 

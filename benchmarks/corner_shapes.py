@@ -8,7 +8,7 @@ that shape, less that of a straight line of 40 mm. The shapes, each using the wh
 
     bezier s     rational pair with sigma2 = s, G3 at its joint (paper 002)
     fir c r      overlap of two filtered pulses (paper 000) with Tk = c Td and T2 = r T1; c and r are all that its shape depends on,
-                 for Tk <= T2 it is the polynomial pair, "bezier 1" (PAPERS B1)
+                 for Tk <= T2 it is the polynomial pair, "bezier 1" (docs/papers.md B1)
     fir          the shape that `--corner fir` takes, filters from the machine's limits
     kinematic    `--corner kinematic` (paper 003): Tk = Td, T2/T1 from the limits at each corner
     stop         a full stop at the vertex

@@ -96,7 +96,7 @@ def star_spiral(chords: int = 1000, chord: float = 0.2) -> Program:
 
 
 def five_points() -> Program:
-    """The 5-point path of paper 002 (PAPERS E: the reading with symmetric leg lengths), feed 5000 mm/min."""
+    """The 5-point path of paper 002 (docs/papers.md E: the reading with symmetric leg lengths), feed 5000 mm/min."""
     points = [(0, 0, 0), (0.5, 0, 0), (1.0, 0.4, 0.4), (0.6, 0.9, 0.8), (0.1, 0.9, 0.8)]
     return polyline(points, feed=5000 / 60, source="five points")
 

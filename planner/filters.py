@@ -134,7 +134,7 @@ def lengths_from_limits(
 
 def corner_margin(u1: FloatArray, u2: FloatArray, overlap: FloatArray, T1: float, T2: float) -> FloatArray:
     """Factor on T2 = A/J that keeps the axis jerks of an isolated corner within J: largest of 1, max_k |u1k + u2k| for an overlap
-    Tk < 2 T2, and max_k |u2k - u1k| for Tk > T1 (PAPERS, peaks inside the corner). u1, u2 (n, A), overlap (n,) [s]."""
+    Tk < 2 T2, and max_k |u2k - u1k| for Tk > T1 (docs/papers.md, peaks inside the corner). u1, u2 (n, A), overlap (n,) [s]."""
     plus, minus = np.abs(u1 + u2).max(axis=-1), np.abs(u2 - u1).max(axis=-1)
     partial = (overlap > 0) & (overlap < 2.0 * T2)
     return np.maximum(1.0, np.maximum(np.where(partial, plus, 0.0), np.where(overlap > T1, minus, 0.0)))

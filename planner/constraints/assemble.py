@@ -114,7 +114,7 @@ def _programmed(samples: PathSamples) -> Array:
 def _curvature_bounds(
     kappa: FloatArray, budget: FloatArray, closed: Array, machine: Machine
 ) -> list[tuple[str, FloatArray]]:
-    """The bounds that depend on curvature. Where `closed`, chord and filter errors share the budget in proportion (PAPERS D);
+    """The bounds that depend on curvature. Where `closed`, chord and filter errors share the budget in proportion (docs/papers.md D);
     elsewhere the chord has the whole of it."""
     rate = error_rate(machine)
     found = []

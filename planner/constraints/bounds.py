@@ -4,7 +4,7 @@
     axis velocity         |r'_k| feed <= v_k                     x <= min_k (v_k / r'_k)^2
     normal acceleration   kappa x <= A                           eq. (19)
     chord error           kappa x dt^2 / 8 <= eps_ch             eq. (19), approximate form: rigorous, because the interpolator
-                                                                 advances the arc length feed*dt per period (PAPERS D)
+                                                                 advances the arc length feed*dt per period (docs/papers.md D)
     filter error          kappa x sum_i T_i^2 / 24 <= eps_fir    papers 000/001 (par. 21)
     phase lag             feed kappa (sum_i T_i)/2 <= phi        paper 001 (par. 26)
     curvature jump        |r''_k(s+) - r''_k(s-)| x <= a_k       where a line meets an arc: the acceleration steps

@@ -1,7 +1,7 @@
 """Error allocation: how much of a corner's budget the path may use, and how fast that lets it be taken (paper 002, eq. 18-20).
 
 The budget of one corner is shared by the rounding, the chord error of the interpolation period and, where FIR filters follow,
-their error; with X = kappa feed^2 the normal acceleration at the apex (PAPERS D, three sources):
+their error; with X = kappa feed^2 the normal acceleration at the apex (docs/papers.md D, three sources):
 
     eps_ap + c X <= eps,     c = dt^2/8 + sum_i T_i^2 / 24,     X <= A.
 

@@ -9,7 +9,7 @@ With w0 = w3 = 1: w1 = (sigma1^2 sigma2)^(-1/3), w2 = (sigma1 sigma2^2)^(-1/3).
     eps       = (d/4) sin(theta/2)                            (eq. (15), beta = theta/2)
     kappa_max = sigma2 * 8 sin(theta/2) / (3 d cos^2(theta/2))    at the joint   (eq. (17))
 
-The pair is G3 at the joint iff sigma1 = 4 - 3/sigma2 (PAPERS C.G3). sigma = (2/3, 0.9) has 10 % less curvature and a smaller
+The pair is G3 at the joint iff sigma1 = 4 - 3/sigma2 (docs/papers.md C.G3). sigma = (2/3, 0.9) has 10 % less curvature and a smaller
 curvature slope than the polynomial pair sigma = (1, 1) for all turning angles, so it is the default. The maximum is at the joint
 for every theta in (0, pi) if sigma2 >= 0.83; below, shallow corners have it beside the joint, at most 0.3 % higher (tested).
 """

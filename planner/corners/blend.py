@@ -109,7 +109,7 @@ def _bezier_shape(d, w1, w2, w, w_ref):
 
 @njit(cache=True, error_model="numpy")
 def _ramp(t, t_ref, T1, T2):
-    """Ramp response R of two FIR filters and its three derivatives (S, h, h'), on the branch of t_ref (PAPERS 0)."""
+    """Ramp response R of two FIR filters and its three derivatives (S, h, h'), on the branch of t_ref (docs/papers.md 0)."""
     if t_ref <= T2:
         q = 1.0 / (T1 * T2)
         return q * t * t * t / 6.0, q * t * t / 2.0, q * t, q

@@ -1,7 +1,7 @@
 """The FIR overlap corner of paper 000, as geometry.
 
 Two velocity pulses of feed V through two moving averages of lengths T1 >= T2, the second pulse started Tk before the first has
-died out: X = V R(Tk - tau), Y = V R(tau), tau in [0, Tk], with the ramp response R of PAPERS 0. With s = sin(theta/2), delay
+died out: X = V R(Tk - tau), Y = V R(tau), tau in [0, Tk], with the ramp response R of docs/papers.md 0. With s = sin(theta/2), delay
 Td = T1 + T2 (eq. (14), (15), the branch chosen on eps):
 
     eps = 2 V s R(Tk/2)
@@ -10,7 +10,7 @@ Td = T1 + T2 (eq. (14), (15), the branch chosen on eps):
           Td                                              beyond: the largest error there is
 
 The tangent length is d = V R(Tk); for Tk <= T2 the corner *is* the polynomial Bezier pair with this d, parameter included
-(PAPERS B1). Corners of neighbouring joints stay apart iff d_i + d_{i+1} <= L, which implies paper 000's condition
+(docs/papers.md B1). Corners of neighbouring joints stay apart iff d_i + d_{i+1} <= L, which implies paper 000's condition
 Tk_i + Tk_{i+1} <= Tv + Td because R(Tk) >= Tk - Td/2.
 """
 

@@ -1,6 +1,6 @@
 """The kinematic corner of paper 003: geometry and timing at once, within the limits of every axis.
 
-Directions u1 before and u2 after the vertex P, du = u2 - u1, s = sin(theta/2) = |du|/2, ramp response R as in PAPERS 0.
+Directions u1 before and u2 after the vertex P, du = u2 - u1, s = sin(theta/2) = |du|/2, ramp response R as in docs/papers.md 0.
 
 **Zero entry acceleration** (eq. (1)-(8)). All axes run jerk +j, 0, -j for Tj, Ta, Tj; with T1 = Tj + Ta >= T2 = Tj
 
@@ -19,10 +19,10 @@ the first where acceleration is reached, Vc >= alpha^2/eta. Solved for Vc, with 
          (eta l^2)^(1/3)                                           l <= l*
 
 The branch is chosen on the error. The paper's rule min(V_gw1, V_gw2) is wrong: V_gw1 <= V_gw2 always (3x^2 + 1 >= 4x^(3/2)), and
-V_gw1 is imaginary below m*/4. The curve is the FIR corner with complete overlap and filters T1, T2 (PAPERS F1).
+V_gw1 is imaginary below m*/4. The curve is the FIR corner with complete overlap and filters T1, T2 (docs/papers.md F1).
 
 **Entry deceleration** ("the same Vc and Ac"): the corner is entered with the deceleration Ac along u1, left with the acceleration
-Ac along u2, and has one phase of jerk Ac (u1 + u2)/Tc. It is the cubic of PAPERS B1 with d = Ac Tc^2 / 6, Vc = Ac Tc / 2 and
+Ac along u2, and has one phase of jerk Ac (u1 + u2)/Tc. It is the cubic of docs/papers.md B1 with d = Ac Tc^2 / 6, Vc = Ac Tc / 2 and
 eps = d s / 4. With a = min_k A_k / max(|u1_k|, |u2_k|) and J = min_k J_k / |u1_k + u2_k|:
 
     Ac = min(a, (24 J^2 eps/s)^(1/3)),  Vc = sqrt(6 eps Ac/s)                           for a given error,

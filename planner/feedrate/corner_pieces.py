@@ -6,7 +6,7 @@ Every piece is anchored at a joint k between the legs k-1 and k with the directi
 
 On leg k only c2 moves, in the seven phases of two ramps and the cruise between them. In the corner at joint k (corners/kinematic.py)
 
-    zero entry acceleration    c1'' = -V h(t),  c2'' = V h(t),   h = the trapezoid of T1, T2 (PAPERS 0);
+    zero entry acceleration    c1'' = -V h(t),  c2'' = V h(t),   h = the trapezoid of T1, T2 (docs/papers.md 0);
     entry deceleration         c1''' = c2''' = A/Tc,
 
 and c1 + c2 is the distance from the vertex along the program at which the corner is matched with it (corners/blend.py): pieces are

@@ -6,7 +6,7 @@ between two corners is in feedrate/ramps.py, with V' and x as there.
 
 Acceleration has to change its sign on the leg, at a speed not below either V + A^2/(2j); so a leg is feasible iff from the slower
 of its ends that speed of the faster one is within reach of what the corners leave: W_fast <= k (V' + x). The factor k, 0 < k <= 1,
-is paper 003's for short segments (eq. (9) as PAPERS reads it); with k = 1 the leg is used completely.
+is paper 003's for short segments (eq. (9) as docs/papers.md reads it); with k = 1 the leg is used completely.
 
 1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible. Lowering a speed
    shortens its corner, which leaves the neighbouring leg feasible, so two sweeps are enough.

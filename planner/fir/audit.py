@@ -8,7 +8,7 @@ polyline at sigma by
 
 whatever the speeds, gaps and lengths. sigma never goes back, so the largest of these distances bounds the deviation of motion
 and path from each other both ways and in order (their Frechet distance): no corner is left out, the tolerance is two-sided. For one
-corner between long legs it is eq. 14, for a chain without gaps V |sum Du_c psi(t - t_c)| (PAPERS A8). B_c grows until sigma
+corner between long legs it is eq. 14, for a chain without gaps V |sum Du_c psi(t - t_c)| (docs/papers.md A8). B_c grows until sigma
 passes s_c and falls from there on, so that the peaks are looked for at the corners, at the ends of the pieces and in their middle.
 Samples at dt leave the motion by up to |normal acceleration| dt^2/8 more, which is added.
 

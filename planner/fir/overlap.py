@@ -1,4 +1,4 @@
-"""One corner between two filtered pulses, in closed form (paper 000, eq. 10-15, as corrected in PAPERS A.14).
+"""One corner between two filtered pulses, in closed form (paper 000, eq. 10-15, as corrected in docs/papers.md A.14).
 
 Pulse 2 starts the gap g = Td - Tk after pulse 1 has ended; Tk is the overlap time, 0 for a full stop and Td without any gap. With
 tau = time since the start of pulse 2, w1 = V1 u1, w2 = V2 u2 and the ramp response R,

@@ -6,7 +6,7 @@ Two ways to turn at a joint within the tolerance:
 * flow:  no gap, but a speed so low that the filters cut the corner by no more than the tolerance. Right for the joints of curves.
 
 Flow joints are judged together, since on short legs many of them lie within one delay. Run through at the constant speed V the
-error E and the acceleration a at joint i are, exactly (PAPERS A8), the vectors
+error E and the acceleration a at joint i are, exactly (docs/papers.md A8), the vectors
 
     E = V sum_j Du_j R(Td/2 - |s_j - s_i| / V),      a = V sum_j Du_j h(Td/2 - |s_j - s_i| / V)
 
@@ -162,7 +162,7 @@ def _waiting(
 def _apart(course: Course, speed: FloatArray, tied: Array, filters: FloatArray) -> FloatArray:
     """Slow down legs between two standstills on which the jerks of speeding up and slowing down would meet.
 
-    They do for |Tv - T1| < T2 (PAPERS, short segments), and then add up to twice V/(T1 T2).
+    They do for |Tv - T1| < T2 (docs/papers.md, short segments), and then add up to twice V/(T1 T2).
     """
     T1, T2 = filters
     twice = 2 * speed > course.j_max * T1 * T2

@@ -10,7 +10,8 @@
 On a circle the filtered point runs on another one, exactly rho [1 - sinc(v T1/2rho) sinc(v T2/2rho)] further inside, sinc x =
 sin x / x; the second order is larger than that, by 0.9 % at a phase lag of 30 degrees.
 
-Where the curvature varies within the length that the filters cover, none of this is a bound (PAPERS, paper 001), nor is it needed:
+Where the curvature varies within the length that the filters cover, none of this is a bound (docs/papers.md, paper 001), nor is it
+needed:
 what the filters see at the constant speed v is the mean of the path with their kernel as weight. By a rule with two nodes that has
 the kernel's second and fourth moment mu2, mu4,
 

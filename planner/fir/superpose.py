@@ -1,6 +1,6 @@
 """The command through both filters: the motion itself, exact, in pieces of constant jerk.
 
-With w(t) the commanded velocity the filtered jerk is (PAPERS, universal identity)
+With w(t) the commanded velocity the filtered jerk is (docs/papers.md, universal identity)
 
     j(t) = [w(t) - w(t - T2) - w(t - T1) + w(t - Td)] / (T1 T2),
 

@@ -1,7 +1,8 @@
 """Motions that stay within the tolerance behind the machine's own filters (`[fir]`).
 
 A filter of kernel h on [0, Td] makes of the motion p the mean of its last Td. About p(t - Td/2) that is off by at most
-max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (PAPERS D), and a time Td after a motion comes to rest the
+max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (docs/papers.md D), and a time Td after a motion comes to
+rest the
 filtered one has come to rest at the same point. So there are two ways to leave less of an error, and both always end:
 
   slower   a run between full stops slowed down by f has 1/f^2 of the error; what a path that rounds its corners within less than the

@@ -4,7 +4,8 @@
 
 with A as in corners/allocation.py. The planned speed at the apex never exceeds it, and reaches it where normal acceleration or
 the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is largest between straight legs
-(PAPERS C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners and for all
+(docs/papers.md C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners
+and for all
 methods, is the verifier's business (verify/error_allocation.py), which shares nothing with this.
 """
 

@@ -6,7 +6,7 @@
 3. The filtered motion is made exactly, in pieces of constant jerk (fir/superpose.py).
 4. Its deviation from the path, its accelerations and its jerks are measured exactly, and where one is too large the command slows
    down (fir/audit.py, fir/settle.py): what the filters promise for isolated pulses, |a| <= V/T1 and |j| <= V/(T1 T2), holds for
-   no chain of pulses (up to 2 V/T1 and 4 V/(T1 T2), PAPERS), and eq. 14 not for short ones.
+   no chain of pulses (up to 2 V/T1 and 4 V/(T1 T2), docs/papers.md), and eq. 14 not for short ones.
 
 These filters make the setpoints. Filters that the machine has behind its setpoints (`[fir]`) come after them, as with every method.
 

@@ -8,7 +8,7 @@
    exceeded the command gets slower or the filters longer, until nothing is (fir/hold.py). The fastest of the V stays.
 
 `plain` is the paper as it is: v_sc at every point and its filters, without 3. The formulas assume a constant curvature within what
-the filters cover; where it varies, the verdict shows what they exceed (PAPERS, paper 001: G3).
+the filters cover; where it varies, the verdict shows what they exceed (docs/papers.md, paper 001: G3).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ RESOLUTION = 0.05
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
 # Share of the tolerance that the chords of a curve's program may use [-].
 CHORD_SHARE = 0.05
-# Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (PAPERS).
+# Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (docs/papers.md).
 PHASE_LAG = 0.5
 
 

@@ -19,7 +19,7 @@ from planner.verify.given import DERIVATIVES, Given
 from planner.verify.pieces import Pieces, pieces_of, widened
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
-from planner.verify.times import Motion, look
+from planner.verify.times import Motion, cells_per_period, look
 from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
@@ -58,9 +58,11 @@ def verify(
     limits = _limits(machine, trajectory, given, not_limited)
     if limits.rounding.any():
         pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
-    comparison = None
+    comparison, cells = None, 0
     if motion is not None:
         comparison = Comparison(trajectory, motion.end)
+        acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
+        cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
 
     def read(pieces: Pieces, progress: Callable[[float], None] = lambda done: None) -> list[Look]:
         share = 0.5 if motion is not None else 1.0
@@ -74,7 +76,7 @@ def verify(
         looks = [Look(seen, "")]
         if motion is not None and comparison is not None:
             chunks = comparison.pass_on(
-                look(motion, machine.dt, seed), lambda done: progress(share + (1.0 - share) * done)
+                look(motion, machine.dt, seed, cells), lambda done: progress(share + (1.0 - share) * done)
             )
             between = watch(chunks, pieces, limits, middles=False, progress=lambda count: None)
             looks += [Look(between, "between the samples")] if between.samples else []

@@ -4,7 +4,9 @@ A planned motion can be asked at any time. Its pieces, on which everything is sm
 cells, and every cell is looked at once, at a time drawn at random from a generator with a fixed seed:
 
     every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
-    every period   at least `PER_PERIOD` cells, whatever the pieces are said to be
+    every period   at least `PER_PERIOD` cells, whatever the pieces are said to be, and as many as keep the chords between
+                   the times from cutting corners: with an acceleration a they are off the motion by a h^2/8, which is kept below
+                   `BOW` of the tolerance
 
 so that a narrow peak cannot hide from all of them, two looks with one seed are the same, and with another seed they share no time
 but the motion's first and last.
@@ -22,6 +24,7 @@ from planner.trajectory import Trajectory
 
 PER_PIECE = 4  # cells; the planner's own places are three a piece
 PER_PERIOD = 2  # cells: chords between neighbouring times last less than a period, and cut no corner more than the machine's do
+BOW, MOST_PER_PERIOD = 0.01, 16  # [share of the tolerance]; cells, where axes are strong enough for anything
 SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the rounding of a position in it
 CELLS = 100_000  # looked at together: 30 MB for three axes
 
@@ -44,12 +47,20 @@ class Motion(Protocol):
         ...
 
 
-def look(motion: Motion, dt: float, seed: int) -> Iterator[Trajectory]:
+def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
+    """How many cells a period dt [s] needs for a tolerance [mm] under an acceleration [mm/s2] of all axes together."""
+    gap = float(np.sqrt(8.0 * BOW * tolerance / acceleration))
+    return int(
+        min(max(PER_PERIOD, np.ceil(2.0 * dt / gap)), MOST_PER_PERIOD)
+    )  # neighbouring times are up to two cells apart
+
+
+def look(motion: Motion, dt: float, seed: int, per_period: int = PER_PERIOD) -> Iterator[Trajectory]:
     """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's period [s]."""
     draw = np.random.default_rng(seed)
     edges = np.concatenate([[0.0], motion.t, [motion.end]])
     begin, lasting = edges[:-1], np.diff(edges)
-    cells = np.maximum(PER_PIECE, np.ceil(PER_PERIOD * lasting / dt)).astype(np.int64)
+    cells = np.maximum(PER_PIECE, np.ceil(per_period * lasting / dt)).astype(np.int64)
     cells[lasting <= SHORTEST_PIECE] = 0
     last = np.cumsum(cells)  # the number of cells up to the end of each piece
     width = lasting / np.maximum(cells, 1)

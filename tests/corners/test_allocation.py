@@ -80,7 +80,9 @@ def test_a_capped_corner_gives_what_it_cannot_use_to_the_chord(tol, acceleration
     X = normal_acceleration_max(np.array([tol]), np.array([used]), np.array([acceleration]), rate)[0]
     assert pytest.approx(min(acceleration, (tol - used) / rate)) == X
     assert used + rate * X <= tol * (1 + 1e-12)
-    tried = np.linspace(0.0, used, 501)  # D6: with eps_ap <= the cap nothing is faster than the cap itself
+    tried = np.linspace(
+        0.0, used, 501
+    )  # docs/papers.md D6: with eps_ap <= the cap nothing is faster than the cap itself
     assert X * used >= speed_sq(tried, tol, acceleration, rate).max() * (1 - 1e-9)
 
 
@@ -101,7 +103,7 @@ def test_the_axes_support_along_the_bisector(theta, seed):
     assert found <= np.linalg.norm(limits) * (1 + 1e-12)
 
 
-POLYNOMIAL_SPEEDS = (47.06, 28.31, 38.26)  # PAPERS E [mm/s]
+POLYNOMIAL_SPEEDS = (47.06, 28.31, 38.26)  # docs/papers.md E [mm/s]
 
 
 @pytest.mark.parametrize(("sigma2", "gain"), [(1.0, 1.0), (0.9, np.sqrt(1 / 0.9))])

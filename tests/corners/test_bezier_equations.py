@@ -79,7 +79,8 @@ def halves(points: FloatArray, t: float) -> tuple[FloatArray, FloatArray]:
 )
 @settings(max_examples=60)
 def test_equation_8_with_the_bar_is_the_g2_condition(sigma, seed, scale):
-    """kappa1(1) = (2/3) sigma2 h/a^2, kappa2(0) = (2/3) sigma1bar h'/a'^2 (C4): equal iff sigma2/sigma1bar is eq. (8)'s right side.
+    """kappa1(1) = (2/3) sigma2 h/a^2, kappa2(0) = (2/3) sigma1bar h'/a'^2 (docs/papers.md C4): equal iff sigma2/sigma1bar is eq.
+    (8)'s right side.
     As printed, with sigma1 of the *first* curve, it is another condition."""
     rng = np.random.default_rng(seed)
     joint, tangent = rng.normal(size=2), np.array([1.0, 0.0])
@@ -113,7 +114,8 @@ def test_the_weights_have_their_shape_numbers(sigma1, sigma2):
 @given(seed=st.integers(0, 10**6), sigma1=st.floats(0.3, 3.0), sigma2=st.floats(0.3, 3.0))
 @settings(max_examples=40)
 def test_equation_7_needs_its_factor_of_one_sixth(seed, sigma1, sigma2):
-    """r''(1) = -6 (w1/w3) P1P3 + (18 w2^2/w3^2 - 6 w2/w3) P2P3 (C7): solved for P1P3 there is the 6 that is missing in print."""
+    """r''(1) = -6 (w1/w3) P1P3 + (18 w2^2/w3^2 - 6 w2/w3) P2P3 (docs/papers.md C7): solved for P1P3 there is the 6 that is missing
+    in print."""
     rng = np.random.default_rng(seed)
     P = rng.normal(size=(4, 2))
     w = weights_of(sigma1, sigma2)
@@ -126,7 +128,8 @@ def test_equation_7_needs_its_factor_of_one_sixth(seed, sigma1, sigma2):
 
 
 def test_equation_14_is_not_necessary_for_g3():
-    """H2: the two parts of one cubic, d2/d1 = 2, are C-infinity at their joint; all weights are 1, and eq. 14 would want 0.288."""
+    """docs/papers.md H2: the two parts of one cubic, d2/d1 = 2, are C-infinity at their joint; all weights are 1, and eq. 14 would
+    want 0.288."""
     d1, d2 = 1.0, 2.0
     whole = np.array([[-d1, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, d2]])
     first, second = halves(whole, 0.3977)
@@ -139,7 +142,7 @@ def test_equation_14_is_not_necessary_for_g3():
 
 
 def test_equation_14_is_not_sufficient_for_g3():
-    """H3: the mirrored pair with sigma = (2, 1) satisfies (8) and (14); its curvature slope jumps."""
+    """docs/papers.md H3: the mirrored pair with sigma = (2, 1) satisfies (8) and (14); its curvature slope jumps."""
     s = np.sqrt(0.5)
     Q = np.array([[-1, 0], [-0.5, 0], [-0.25, 0], [-0.125, 0.125], [0, 0.25], [0, 0.5], [0, 1]], float)
     first, second = weights_of(2.0, 1.0), weights_of(1.0, 2.0)  # read from the joint: (1, 2) backwards

@@ -28,7 +28,7 @@ from planner.nc.program import Program
 from planner.nc.reader import parse_program
 
 DEFAULT, POLYNOMIAL = BezierCorner(), BezierCorner(sigma2=1.0)
-# PAPERS C.G3: the angles for which the default weights were compared with the polynomial pair [deg].
+# docs/papers.md C.G3: the angles for which the default weights were compared with the polynomial pair [deg].
 ANGLES_14 = (2, 5, 10, 15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 175)
 MACHINE = problems.machine()
 
@@ -187,7 +187,7 @@ def test_the_joint_is_g3_exactly_for_the_right_pair_of_weights(theta, sigma2, of
     s, C = np.sin(theta / 2), np.cos(theta / 2)
     expected = (
         32 / 3 * sigma2 * (sigma1 * sigma2 - 4 * sigma2 + 3) * s / C**3
-    )  # PAPERS C.G3, away from the joint
+    )  # docs/papers.md C.G3, away from the joint
     np.testing.assert_allclose(joint.by_s[0, :2], joint.by_s[1, :2], atol=1e-12)
     np.testing.assert_allclose(kappa[0], kappa[1], rtol=1e-7)
     size = sigma2 * s / C**3
@@ -196,7 +196,8 @@ def test_the_joint_is_g3_exactly_for_the_right_pair_of_weights(theta, sigma2, of
 
 
 def test_mirrored_weights_alone_are_not_g3():
-    """sigma = (2, 1) satisfies the paper's eq. (8) and (14); its curvature slope jumps from -21.3 to 21.3 at 90 deg (H3)."""
+    """sigma = (2, 1) satisfies the paper's eq. (8) and (14); its curvature slope jumps from -21.3 to 21.3 at 90 deg
+    (docs/papers.md H3)."""
     shape = BezierCorner(sigma1=2.0, sigma2=1.0)
     joint, toolpath = corner(np.pi / 2, shape, 1.0, np.array([0.5, 0.5]), np.array([0.4, 0.6]))
     _, slope = planar_curvature(joint.by_s, toolpath)

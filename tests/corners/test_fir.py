@@ -37,7 +37,7 @@ def corner_points(theta: float, T1: float, T2: float, Tk: float, w: FloatArray, 
 @given(theta=thetas, T1=times, ratio=ratios, share=st.floats(1e-3, 1.0))
 @settings(max_examples=40)
 def test_up_to_the_shorter_filter_it_is_the_polynomial_pair(theta, T1, ratio, share):
-    """PAPERS B1: the same curve and the same parameter, with d = V Tk^3 / (6 T1 T2)."""
+    """docs/papers.md B1: the same curve and the same parameter, with d = V Tk^3 / (6 T1 T2)."""
     T2 = T1 * ratio
     Tk = T2 * share
     w = np.linspace(0, 1, 33)
@@ -57,7 +57,7 @@ def test_up_to_the_shorter_filter_it_is_the_polynomial_pair(theta, T1, ratio, sh
     [(0.05, 0.03, 0.02), (0.05, 0.03, 0.045), (0.05, 0.03, 0.06), (0.05, 0.03, 0.08), (0.04, 0.04, 0.05), (0.05, 0.01, 0.03)],
 )  # fmt: skip
 def test_it_is_the_superposition_of_two_filtered_pulses(T1, T2, Tk):
-    """Two pulses through two moving averages, by brute-force convolution; PAPERS A1/A4."""
+    """Two pulses through two moving averages, by brute-force convolution; docs/papers.md A1/A4."""
     step, theta = 1e-5, np.deg2rad(70.0)
     Tv, delay = 0.3, T1 + T2
     t = np.arange(0.0, 2 * Tv + 2 * delay, step)
@@ -121,7 +121,9 @@ def test_the_branches_meet(T2, below, above):
 
 def test_equation_15_limits():
     assert overlap_time(0.1, V, 0.0, 0.05, 0.03) == 0.08  # no turn: complete overlap
-    assert overlap_time(0.1, V, 1.0, 0.05, 0.03) == pytest.approx(0.0330, abs=5e-5)  # reversal, PAPERS A
+    assert overlap_time(0.1, V, 1.0, 0.05, 0.03) == pytest.approx(
+        0.0330, abs=5e-5
+    )  # reversal, docs/papers.md A
     assert overlap_time(0.1, V, np.sin(np.pi / 4), 0.05, 0.03) == pytest.approx(0.0371, abs=5e-5)
     for T1, T2, Tk in ((0.04, 0.04, 0.0379), (0.07, 0.01, 0.0290), (0.079, 0.001, 0.0221)):
         assert overlap_time(0.1, V, np.sin(np.pi / 4), T1, T2) == pytest.approx(Tk, abs=6e-5)
@@ -132,7 +134,7 @@ def test_equation_15_limits():
 
 
 def test_the_interior_angle_would_miss_the_tolerance():
-    """150 degrees of turn read as 30: Tk = 51.8 ms and a true error of 0.373 for the 0.1 asked for (PAPERS A.14)."""
+    """150 degrees of turn read as 30: Tk = 51.8 ms and a true error of 0.373 for the 0.1 asked for (docs/papers.md A.14)."""
     misread = overlap_time(0.1, V, np.sin(np.deg2rad(15)), 0.05, 0.03)
     assert misread == pytest.approx(0.0518, abs=5e-5)
     apex = corner_points(np.deg2rad(150), 0.05, 0.03, misread, np.array([0.5])).by_w[0, 0]
@@ -178,7 +180,7 @@ def test_corners_that_stay_apart_keep_paper_000s_condition(T1, ratio, shares, sp
 @given(theta=st.floats(1.0, 179.0).map(np.deg2rad), T1=times, ratio=ratios, share=st.floats(0.01, 1.0))
 @settings(max_examples=60)
 def test_speed_and_acceleration_at_the_middle(theta, T1, ratio, share):
-    """v_mid = 2 V S(Tk/2) cos(theta/2), purely normal acceleration 2 V h(Tk/2) sin(theta/2) (PAPERS A.14, peaks)."""
+    """v_mid = 2 V S(Tk/2) cos(theta/2), purely normal acceleration 2 V h(Tk/2) sin(theta/2) (docs/papers.md A.14, peaks)."""
     T2 = T1 * ratio
     Tk = (T1 + T2) * share
     assume(abs(Tk / 2 - T2) > 1e-6 * T2)
@@ -197,7 +199,7 @@ def test_speed_and_acceleration_at_the_middle(theta, T1, ratio, share):
 @pytest.mark.parametrize("theta_deg", [10.0, 60.0, 150.0])
 @pytest.mark.parametrize("Tk", [0.02, 0.045, 0.055, 0.07, 0.08])
 def test_curvature_at_the_joint_and_what_longer_overlaps_save(theta_deg, Tk):
-    """eps kappa / tan^2(theta/2) = 2/3 up to 2 T2, [3 + (T2/(Tk-T2))^2]/6 beyond (PAPERS B3)."""
+    """eps kappa / tan^2(theta/2) = 2/3 up to 2 T2, [3 + (T2/(Tk-T2))^2]/6 beyond (docs/papers.md B3)."""
     T1, T2, theta = 0.05, 0.02, np.deg2rad(theta_deg)
     apex = corner_points(theta, T1, T2, min(Tk, T1 + T2), np.array([0.5]))
     Tk = min(Tk, T1 + T2)

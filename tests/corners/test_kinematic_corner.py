@@ -159,7 +159,7 @@ def test_length_and_speed_belong_together(seed):
     np.testing.assert_allclose(
         kinematic.speed_from_middle(kinematic.middle(V, alpha, eta), alpha, eta), V, rtol=1e-10
     )
-    # PAPERS: 2 eps/s <= l <= 3 eps/s, the second where only jerk limits
+    # docs/papers.md: 2 eps/s <= l <= 3 eps/s, the second where only jerk limits
     V, _, _ = zero_entry(c)
     ratio = kinematic.approach(V, alpha, eta) * c.s / c.eps
     assert (ratio >= 2 * (1 - 1e-9)).all()
@@ -213,7 +213,7 @@ def straight_corner(theta: float):
 @pytest.mark.parametrize("theta", [5.0, 60.0, 90.0, 150.0])
 @pytest.mark.parametrize("eps", [0.01, 0.3])
 def test_it_is_the_fir_corner_with_complete_overlap(theta, eps):
-    """PAPERS F1: T1' = Tj + Ta, T2' = Tj, Tk = Td, as a curve and in time."""
+    """docs/papers.md F1: T1' = Tj + Ta, T2' = Tj, Tk = Td, as a curve and in time."""
     theta = np.deg2rad(theta)
     limits = np.full(2, 2000.0), np.full(2, 66_667.0)
     u1, u2 = np.array([[1.0, 0.0]]), np.array([[np.cos(theta), np.sin(theta)]])
@@ -238,7 +238,7 @@ def test_it_is_the_fir_corner_with_complete_overlap(theta, eps):
 
 @pytest.mark.parametrize("theta", [5.0, 60.0, 90.0, 150.0])
 def test_with_entry_deceleration_it_is_the_polynomial_pair(theta):
-    """PAPERS B1, F5: the cubic, run through with uniform parameter speed."""
+    """docs/papers.md B1, F5: the cubic, run through with uniform parameter speed."""
     theta = np.deg2rad(theta)
     u1, u2 = np.array([1.0, 0.0]), np.array([np.cos(theta), np.sin(theta)])
     a, J = kinematic.entry_limits(u1[None], u2[None], np.full(2, 2000.0), np.full(2, 66_667.0))

@@ -198,7 +198,7 @@ def test_no_other_choice_of_corners_and_stops_is_faster(seed):
 
 
 def two_legs(theta: float, V: float, eps: float, *, kinds=("zero", "entry")) -> tuple[Legs, list[Passage]]:
-    """PAPERS' example: two legs of 20 mm, A = 2000, J = 66,667 along the path, a corner of angle theta between them."""
+    """docs/papers.md' example: two legs of 20 mm, A = 2000, J = 66,667 along the path, a corner of angle theta between them."""
     A, J, s = 2000.0, 66_667.0, np.sin(theta / 2)
     legs = Legs(length=np.full(2, 20.0), v=np.full(2, V), a=np.full(2, A), j=np.full(2, J))
     u1, u2 = np.array([[1.0, 0.0]]), np.array([[np.cos(theta), np.sin(theta)]])
@@ -222,7 +222,7 @@ def two_legs(theta: float, V: float, eps: float, *, kinds=("zero", "entry")) -> 
 
 
 def test_the_fastest_corner_is_not_the_fastest_motion():
-    """PAPERS: 90 degrees, eps 0.1, V 100: stop 0.56000 s, kinematic corner (22.9 mm/s) 0.56144 s; so the stop is chosen."""
+    """docs/papers.md: 90 degrees, eps 0.1, V 100: stop 0.56000 s, kinematic corner (22.9 mm/s) 0.56144 s; so the stop is chosen."""
     legs, (zero,) = two_legs(np.pi / 2, 100.0, 0.1, kinds=("zero",))
     assert zero.V[1] == pytest.approx(22.9, abs=0.05)
     assert total_time(legs, zero) == pytest.approx(0.56144, abs=2e-5)

@@ -36,7 +36,7 @@ def convolved(signal_in, times, step):
 
 
 def printed_kernel(t, T1, T2):
-    """PAPERS 0, row by row."""
+    """docs/papers.md 0, row by row."""
     return np.select(
         [t < 0, t <= T2, t <= T1, t <= T1 + T2], [0.0, t / (T1 * T2), 1 / T1, (T1 + T2 - t) / (T1 * T2)], 0.0
     )
@@ -104,7 +104,7 @@ def test_a_pulse_of_any_length_is_its_convolution(times, Tv):
 
 
 def test_misprint_equation_5_holds_for_long_pulses_only():
-    """The eight rows, taken for Tv > T1 > T2 as printed: right from Tv = Td on, wrong below by what PAPERS A1 measured."""
+    """The eight rows, taken for Tv > T1 > T2 as printed: right from Tv = Td on, wrong below by what docs/papers.md A1 measured."""
     T1, T2 = 0.05, 0.03
     Td = T1 + T2
 
@@ -130,7 +130,7 @@ def test_misprint_equation_5_holds_for_long_pulses_only():
 
 
 def test_misprint_equation_8_lacks_the_absolute_value():
-    """sin(x)/x as printed is negative over 42 % of 1..600 rad/s for T = 50 ms; the magnitude never is (PAPERS A9)."""
+    """sin(x)/x as printed is negative over 42 % of 1..600 rad/s for T = 50 ms; the magnitude never is (docs/papers.md A9)."""
     w, T = np.linspace(1.0, 600.0, 60_000), 0.05
     printed = np.sin(w * T / 2) / (w * T / 2)
     assert (printed < 0).mean() == pytest.approx(0.42, abs=0.01)
@@ -180,7 +180,7 @@ def test_the_spectrum_of_sampled_accelerations_is_exact_between_the_samples():
 
 
 def test_the_taps():
-    """Unit sum, delay sum (N_i - 1)/2, variance dt^2 (sum N_i^2 - n)/12 (PAPERS A10)."""
+    """Unit sum, delay sum (N_i - 1)/2, variance dt^2 (sum N_i^2 - n)/12 (docs/papers.md A10)."""
     dt = 1e-3
     taps = Filters((0.05, 0.03)).taps(dt)
     assert len(taps) == 50 + 30 - 1
@@ -197,7 +197,7 @@ def test_the_taps():
 
 @pytest.mark.parametrize(("damping", "residue"), [(0.0, 0.0), (0.01, 0.0103), (0.05, 0.0588), (0.10, 0.139)])
 def test_what_a_filter_of_one_period_leaves_of_a_mode(damping, residue):
-    """Equation 10: T = 2 pi/w_r is exact for an undamped mode; PAPERS A9 for damped ones, up to the exact damped period."""
+    """Equation 10: T = 2 pi/w_r is exact for an undamped mode; docs/papers.md A9 for damped ones, up to the exact damped period."""
     frequency = 25.0
     filters = Filters((1.0 / frequency,))
     assert filters.residue(frequency, damping) == pytest.approx(residue, rel=0.3, abs=1e-12)
@@ -289,7 +289,7 @@ def test_lengths_from_limits():
 )
 @settings(max_examples=150)
 def test_the_margin_of_an_isolated_corner_is_its_largest_axis_jerk(theta, turn, T1, ratio, share):
-    """PAPERS, peaks inside the corner: the jerk of two overlapped pulses by differences, over V/(T1 T2)."""
+    """docs/papers.md, peaks inside the corner: the jerk of two overlapped pulses by differences, over V/(T1 T2)."""
     T2 = T1 * ratio
     Td, Tk = T1 + T2, share * (T1 + T2)
     u1 = np.array([np.cos(turn), np.sin(turn)])

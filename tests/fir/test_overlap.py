@@ -34,7 +34,7 @@ def around_corner(course, motion, overlap, feed=V, T1=T1, T2=T2, count=2001):
 @given(theta=thetas, T1=st.floats(0.01, 0.1), ratio=st.floats(0.05, 1.0), share=st.floats(0.05, 1.0))
 @settings(max_examples=40)
 def test_equation_14_is_how_far_the_motion_misses_the_vertex(theta, T1, ratio, share):
-    """PAPERS A3; the nearest point is the middle, and the deviation from the legs eps cos(theta/2)."""
+    """docs/papers.md A3; the nearest point is the middle, and the deviation from the legs eps cos(theta/2)."""
     T2 = T1 * ratio
     Tk = share * (T1 + T2)
     course, motion = corner_motion(theta, Tk, T1, T2)
@@ -72,7 +72,7 @@ def test_misprint_the_branch_is_chosen_on_the_error():
 
 
 def test_misprint_the_interior_angle():
-    """150 degrees of turn, read as the angle between the segments (30): a true error of 0.373 for 0.1 (PAPERS A.14)."""
+    """150 degrees of turn, read as the angle between the segments (30): a true error of 0.373 for 0.1 (docs/papers.md A.14)."""
     misread = float(overlap_time(np.array(0.1), V, np.sin(np.deg2rad(15)), T1, T2))
     course, motion = corner_motion(np.deg2rad(150), misread)
     apart = np.linalg.norm(around_corner(course, motion, misread).position - course.point[1], axis=1).min()
@@ -90,7 +90,7 @@ def test_misprint_no_overlap_is_a_full_stop():
             0.02: V * 0.02**2 * np.cos(np.pi / 4) / (4 * T1 * T2),
             Td: V * (Td - T2) / T1 * np.cos(np.pi / 4),
         }
-        assert slowest == pytest.approx(expected[Tk], rel=1e-4, abs=1e-3)  # the speed dip of PAPERS
+        assert slowest == pytest.approx(expected[Tk], rel=1e-4, abs=1e-3)  # the speed dip of docs/papers.md
 
 
 def equation_13(t, Tv, Tk, Vs, Ve, printed):
@@ -113,7 +113,7 @@ def equation_13(t, Tv, Tk, Vs, Ve, printed):
 
 @pytest.mark.parametrize("Tk", [0.01, 0.02, 0.03, 0.045, 0.06])
 def test_misprint_equation_13(Tk):
-    """Three rows lack Tk, and all of it needs Tk <= T2 (PAPERS A4: 666 mm/s; 2.2 and 9.9 mm/s at 45 and 60 ms)."""
+    """Three rows lack Tk, and all of it needs Tk <= T2 (docs/papers.md A4: 666 mm/s; 2.2 and 9.9 mm/s at 45 and 60 ms)."""
     theta, Tv = np.deg2rad(60), 50.0 / V
     _, motion = corner_motion(theta, Tk)
     t = np.linspace(Tv, Tv + 2 * Td - Tk - 1e-9, 5001)
@@ -131,7 +131,7 @@ def test_misprint_equation_13(Tk):
 )
 @settings(max_examples=60)
 def test_different_speeds_share_the_geometric_mean(theta, V1, V2, eps):
-    """PAPERS, different programmed speeds: the vertex is missed by at most the tolerance, in the cubic zone too."""
+    """docs/papers.md, different programmed speeds: the vertex is missed by at most the tolerance, in the cubic zone too."""
     Tk = float(overlap_time(np.array(eps), np.sqrt(V1 * V2), np.sin(theta / 2), T1, T2))
     feed = np.array([V1, V2])
     course, motion = corner_motion(theta, Tk, feed=feed, length=100.0)
@@ -151,7 +151,7 @@ def test_different_speeds_share_the_geometric_mean(theta, V1, V2, eps):
 
 
 def test_the_smaller_speed_would_be_unsafe():
-    """100 and 10 mm/s at 90 degrees: 0.0031 promised with min(V1, V2), 0.0075 true (PAPERS A5)."""
+    """100 and 10 mm/s at 90 degrees: 0.0031 promised with min(V1, V2), 0.0075 true (docs/papers.md A5)."""
     Tk = 0.025
     feed = np.array([100.0, 10.0])
     course, motion = corner_motion(np.pi / 2, Tk, feed=feed)

@@ -70,7 +70,8 @@ def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):
 
 
 def test_the_universal_identity():
-    """|a| <= 2 V/T1 and |j| <= 4 V/(T1 T2), both attained by zig-zags without gap (PAPERS G7: 119 and 70 ms, T1 = 50, T2 = 30)."""
+    """|a| <= 2 V/T1 and |j| <= 4 V/(T1 T2), both attained by zig-zags without gap (docs/papers.md G7: 119 and 70 ms, T1 = 50, T2 =
+    30)."""
     T1, T2, V = 0.05, 0.03, 100.0
     machine = machine_of(velocity=1e4, acceleration=V / T1, jerk=V / (T1 * T2))
     for duration, quantity, peak in ((0.119, "acceleration", 2.0), (0.070, "jerk", 4.0)):

@@ -1,6 +1,7 @@
 """Laws of every method on random polylines: 2 to 4 axes, turns of 1 to 179 degrees, legs of 10 um to 100 mm.
 
-Those that promise the limits hold them, by the verifier's judgement; those of the papers that do not stay below what PAPERS proves;
+Those that promise the limits hold them, by the verifier's judgement; those of the papers that do not stay below what
+docs/papers.md proves;
 and at a corner by itself each misses the vertex by what it promises.
 """
 
@@ -84,7 +85,8 @@ def test_tolerance_and_limits_hold(method, seed, axes):
 @given(seed=seeds, axes=st.integers(2, 4))
 @settings(max_examples=15)
 def test_the_plain_pulses_exceed_no_more_than_proved(seed, axes):
-    """PAPERS A, universal identity: |a| <= 2 V/T1 and |j| <= 4 V/(T1 T2) for any path; T1 = V/A and T2 = A/J are the paper's. The
+    """docs/papers.md A, universal identity: |a| <= 2 V/T1 and |j| <= 4 V/(T1 T2) for any path; T1 = V/A and T2 = A/J are the
+    paper's. The
     deviation, by eq. 14 the tolerance, is at most it plus the bow between samples where blends stay apart."""
     limits = problems.machine(
         axes={k: Axis(velocity=100.0 * u, acceleration=2000.0 * u, jerk=2e5 * u) for k, u in UNITS.items()}
@@ -96,7 +98,8 @@ def test_the_plain_pulses_exceed_no_more_than_proved(seed, axes):
 
 
 def test_the_plain_pulses_do_reach_it():
-    """PAPERS A: both factors are attained by zig-zags without dwell, that of the jerk by legs of 70 ms for filters of 50 and 30 ms;
+    """docs/papers.md A: both factors are attained by zig-zags without dwell, that of the jerk by legs of 70 ms for filters of 50
+    and 30 ms;
     almost, as complete reversals are stopped at."""
     limits = problems.machine(jerk=2000.0 / 0.03, tolerance=50.0)
     turn = np.deg2rad(87.0)

@@ -20,7 +20,7 @@ from planner.verify.pieces import RATIO_ROUNDING
 
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
-# The 5-point path of paper 002 ten times as large (PAPERS E doubts its scale: it takes 7.5 periods), its A_max, Ts and eps.
+# The 5-point path of paper 002 ten times as large (docs/papers.md E doubts its scale: it takes 7.5 periods), its A_max, Ts and eps.
 TEN_TIMES = problems.polyline(
     10.0 * np.array([(0, 0, 0), (0.5, 0, 0), (1.0, 0.4, 0.4), (0.6, 0.9, 0.8), (0.1, 0.9, 0.8)]),
     feed=5000 / 60,
@@ -84,7 +84,7 @@ def test_the_speed_is_constant_from_one_end_of_a_corner_to_the_other():
 
 def test_without_allocation_the_errors_add_up_to_more_than_the_tolerance():
     """Figures 6 and 7: with eq. (20) all errors together stay within eps. Without, the rounding takes all of it and the chords of
-    A Ts^2/8 = 0.02 come on top: up to 0.07 (PAPERS E)."""
+    A Ts^2/8 = 0.02 come on top: up to 0.07 (docs/papers.md E)."""
     machine = paper_machine()
     sharing, alone = bezier(TEN_TIMES, machine), BezierMethod(allocate=False).plan(TEN_TIMES, machine)
     assert sharing.verdict.vertex_error_mm <= EPS
@@ -113,7 +113,7 @@ def test_rounding_and_chord_error_add_up_to_the_tolerance_at_the_vertex(theta, e
 
 
 def test_other_weights_are_faster_by_the_root_of_sigma2():
-    """PAPERS C.G3: in the G3 family kappa_max is sigma2 times the printed pair's."""
+    """docs/papers.md C.G3: in the G3 family kappa_max is sigma2 times the printed pair's."""
     printed, better = (bezier(TEN_TIMES, paper_machine(), corner=BezierCorner(sigma2=s)) for s in (1.0, 0.9))
     both = np.intersect1d(printed.rounded.line, better.rounded.line)
     assert len(both)
@@ -155,7 +155,7 @@ def test_times_of_the_shared_jobs():
 
 
 def test_a_corner_is_run_through_only_where_that_is_faster():
-    """At 90 degrees a stop is faster, at 10 degrees the corner is; PAPERS 003: the largest corner speed is not time-optimal."""
+    """At 90 degrees a stop is faster, at 10 degrees the corner is; docs/papers.md 003: the largest corner speed is not time-optimal."""
     sharp, shallow = bezier(one_corner(np.pi / 2)), bezier(one_corner(np.deg2rad(5)))
     assert len(sharp.rounded) == 0
     assert sharp.trajectory.cycle_time == pytest.approx(sharp.stop_time, rel=1e-6)

@@ -42,7 +42,7 @@ def test_times_of_the_shared_jobs():
 
 
 def test_the_papers_pentagon():
-    """PAPERS E (i): 5 corners of 72 degrees of turn, V = 100, filters of 50 and 30 ms, eps 0.1, six legs of 93.6 mm in all: the
+    """docs/papers.md E (i): 5 corners of 72 degrees of turn, V = 100, filters of 50 and 30 ms, eps 0.1, six legs of 93.6 mm in all: the
     saving of 5 x 39.42 ms from a point-to-point time of 1.416 s."""
     side = 93.6 / 6
     angle = np.deg2rad(72.0) * np.arange(6)
@@ -109,7 +109,8 @@ def test_it_has_a_name():
 
 
 def test_the_plain_mode_overlaps_corners_between_two_feeds_by_their_geometric_mean():
-    """PAPERS: eq. (14) with V = sqrt(V1 V2) is safe where the feeds differ; the overlap is what the corner saves of the delay."""
+    """docs/papers.md: eq. (14) with V = sqrt(V1 V2) is safe where the feeds differ; the overlap is what the corner saves of the
+    delay."""
     program = problems.polyline([[0, 0], [20, 0], [20, 10]], feed=np.array([100.0, 25.0]))
     made = FirMethod(plain=True, profile_filters=(0.05, 0.03)).plan(program, problems.machine(dt=1e-4))
     overlap = (24 * 0.05 * 0.03 * 0.05 / (np.sqrt(100.0 * 25.0) * np.sin(np.pi / 4))) ** (1 / 3)

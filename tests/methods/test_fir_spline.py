@@ -1,6 +1,7 @@
 """Method `fir-spline` (paper 001): its closed forms on circles against the filters themselves, and the motions it makes.
 
-The patent's formulas are lost; PAPERS has them reconstructed. The oracle is the mean of the unfiltered point with the filters' kernel
+The patent's formulas are lost; docs/papers.md has them reconstructed. The oracle is the mean of the unfiltered point with the
+filters' kernel
 as weight, by quadrature: no formula of the package.
 """
 
@@ -84,7 +85,7 @@ radii, shares = st.floats(0.1, 100.0), st.floats(0.05, 1.0)
 
 @given(rho=radii, lag=st.floats(0.01, 3.0), T1=st.floats(0.005, 0.1), ratio=shares)
 def test_the_error_on_a_circle_is_exact(rho, lag, T1, ratio):
-    """rho [1 - sinc sinc]; PAPERS 001: simulation = formula."""
+    """rho [1 - sinc sinc]; docs/papers.md 001: simulation = formula."""
     T2 = T1 * ratio
     v = 2 * lag * rho / (T1 + T2)
     error = rho - abs(mean_on_circle(rho, v, T1, T2))
@@ -250,14 +251,15 @@ def excess(made) -> dict[str, float]:
 def test_on_varying_curvature_the_plain_mode_exceeds_and_says_so_and_the_safe_one_does_not(
     name, tolerance, exceeded
 ):
-    """PAPERS G3: v_sc varies within the window, so none of the formulas is a bound; the verdict shows it. v_ph, when it is not left
+    """docs/papers.md G3: v_sc varies within the window, so none of the formulas is a bound; the verdict shows it. v_ph, when it is
+    not left
     out of the way, hides most of it. Papers' limits: 2000 mm/s2 and 66 667 mm/s3, filters of 50 and 30 ms."""
     curve, machine = curve_named(name), problems.machine(jerk=66_667.0, tolerance=tolerance)
     plain = GIVEN.plan_curve(curve, machine, 100.0)
     worst = excess(plain)
     assert not plain.verdict.passed
     assert {name for name, ratio in worst.items() if ratio > 1.05} == set(exceeded.split())
-    assert all(ratio < 2.0 for ratio in worst.values())  # PAPERS: up to 1.46, 1.93 and 1.07
+    assert all(ratio < 2.0 for ratio in worst.values())  # docs/papers.md: up to 1.46, 1.93 and 1.07
     safe = FirSplineMethod().plan_curve(curve, machine, 100.0)
     assert safe.verdict.passed, safe.verdict.faults
     assert max(excess(safe).values()) > 0.95  # no large margins are left
@@ -291,7 +293,7 @@ def test_given_filters_are_kept_and_the_safe_mode_slows_down_for_them():
 
 
 def test_a_kink_is_a_full_stop():
-    """PAPERS: rho -> 0 makes v_ph 0, the scheme stalls at corners; a curve's kink is stopped at, on the spot."""
+    """docs/papers.md: rho -> 0 makes v_ph 0, the scheme stalls at corners; a curve's kink is stopped at, on the spot."""
     points = np.array([[0, 0], [5, 0], [10, 0], [10, 5], [10, 10]], float)
     curve = Nurbs(degree=2, points=points, knots=np.array([0, 0, 0, 1, 1, 2, 2, 2.0]), weights=np.ones(5))
     made = FirSplineMethod().plan_curve(curve, MACHINE, 100.0)

@@ -230,7 +230,8 @@ def test_scaled_lengths_and_times_scale_the_plan(length, time):
 
 
 def test_start_stop_speed_is_a_step_at_the_vertex():
-    """PAPERS: floor = v_ss / max |du_k|, at the vertex exactly; incompatible with the limits by construction, and reported as such."""
+    """docs/papers.md: floor = v_ss / max |du_k|, at the vertex exactly; incompatible with the limits by construction, and reported
+    as such."""
     program, machine = (
         problems.polyline([[0, 0], [10, 0], [20, 0.5], [20, 10], [10, 10]]),
         problems.machine(tolerance=1e-3),

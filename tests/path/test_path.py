@@ -118,7 +118,7 @@ def test_arc_length_against_quadrature(job, kind):
 
 @pytest.mark.parametrize("theta_deg", [30.0, 60.0, 90.0, 120.0, 150.0, 170.0])
 def test_length_of_the_polynomial_corner_in_elliptic_integrals(theta_deg):
-    """L = d [2 sec^2 + K - (2 sec^2 - 1) E], modulus k = sin(theta/2) (PAPERS C)."""
+    """L = d [2 sec^2 + K - (2 sec^2 - 1) E], modulus k = sin(theta/2) (docs/papers.md C)."""
     theta = np.deg2rad(theta_deg)
     program = problems.polyline([[-50, 0], [0, 0], [50 * np.cos(theta), 50 * np.sin(theta)]])
     path = smooth_path(program, MACHINE, BezierCorner(sigma2=1.0))

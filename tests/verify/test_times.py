@@ -6,7 +6,7 @@ from motions import JERK_FREE, Asked, Moves, machine, polyline, sample
 
 from planner.timing import WATCHED
 from planner.verify import verify
-from planner.verify.times import PER_PERIOD, PER_PIECE, look
+from planner.verify.times import PER_PERIOD, PER_PIECE, cells_per_period, look
 
 M = machine()
 LINE = polyline([(0, 0, 0), (30, 0, 0)], jerk=2e5)
@@ -91,3 +91,17 @@ def test_a_peak_hidden_from_the_planners_places_is_found(seed):
     )
     assert verdict.limits["acceleration.x"].ratio > 1.3
     assert not verdict.passed
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.004, 0.02])
+def test_chords_between_the_times_cut_no_corners(dt):
+    """Two neighbouring times are less than two cells apart: the bow of an arc at that distance is a hundredth of the tolerance."""
+    tolerance, acceleration = 0.01, 3000.0
+    gap = 2.0 * dt / cells_per_period(dt, tolerance, acceleration)
+    assert gap < dt * (1 + 1e-12)
+    assert acceleration * gap**2 / 8.0 <= 0.01 * tolerance * (1 + 1e-9) or gap == 2.0 * dt / 16
+
+
+def test_cells_per_period_are_bounded():
+    assert cells_per_period(0.02, 1e-6, 1e9) == 16
+    assert cells_per_period(0.001, 1.0, 1.0) == PER_PERIOD

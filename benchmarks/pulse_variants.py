@@ -1,4 +1,4 @@
-"""How far do pulse counts drift? Paper 003's ways of sharing pulses between two axes against carrying the remainder in pulses.
+"""How far do pulse counts drift? Ways of sharing pulses between two axes, paper 003's and others (docs/papers.md F10).
 
 600 interpolation periods of 10 ms (the paper's), X the long axis. Every period an axis should send f T pulses; the variants are
 

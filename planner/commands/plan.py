@@ -55,7 +55,8 @@ def plan(
     shaped: Annotated[
         bool,
         typer.Option(
-            "--shaped", help="set points that leave the machine's [[modes]] at rest; for optimal and toppra"
+            "--shaped",
+            help="set points that leave the machine's vibration modes at rest, for optimal and toppra",
         ),
     ] = False,
     tolerance: ToleranceOption = None,

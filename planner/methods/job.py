@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -38,6 +38,8 @@ Delivered = tuple[Trajectory, Verdict]
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
+# Other methods are tried then on jobs with up to so many grid points.
+INSTEAD_POINTS = 20_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -201,8 +203,10 @@ class Method(ABC):
 
     ways : for machines with filters behind the setpoints: shares of the tolerance, and of the filters' lengths that closed forms see
            (`Job.with_share`), that are tried beside (1, 1); the fastest plan is taken
+    instead : methods that are tried too where the chords between samples take tolerance away: what was fastest without may not be
     """
 
+    instead: Sequence[Method] = ()
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
     def plan(
@@ -256,7 +260,13 @@ class Method(ABC):
             made = self.plan_job(job)
         if job is given:
             return made
-        return dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
+        made = dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
+        for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
+            rival = other.plan_within_periods(given.afresh())
+            if faster(made, rival) is rival:
+                said = f"{rival.corner} corners lose less to the period; {rival.sentence}"
+                made = dataclasses.replace(rival, corner=made.corner, sentence=said)
+        return made
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:

@@ -59,6 +59,13 @@ class OptimalMethod(Method):
 
     ways = ((0.5, 1.0), (0.1, 1.0))
 
+    @property
+    def instead(self) -> tuple[Method, ...]:  # type: ignore[override]
+        """Single corners, where the chords between samples take tolerance from splines."""
+        if self.corner != AUTO or self.shaped:
+            return ()
+        return tuple(dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
+
     def plan_job(self, job: Job) -> Plan:
         if self.shaped:
             # reshaping makes paths for the motion as it is planned, not for the one behind the shaper

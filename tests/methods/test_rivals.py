@@ -10,6 +10,7 @@ from benchmarks.never_slower import compared, job, slower
 from planner.feedrate.solution import Status
 from planner.methods import rivals
 from planner.methods.optimal import OptimalMethod
+from planner.nc.reader import parse_program
 
 
 @pytest.mark.parametrize("seed", [3, 17, 27, 28, 40, 55, 70, 99])
@@ -20,11 +21,13 @@ def test_nothing_is_faster_than_optimal(seed):
 
 
 def test_the_plan_says_when_full_stops_take_its_place():
-    plan = OptimalMethod().plan(*job(17))
+    machine = job(17)[1]
+    plan = OptimalMethod().plan(parse_program("G21 G1 X10 F3000\n", machine), machine)
     assert (plan.method, plan.corner) == ("optimal", "auto")
     assert plan.sentence.startswith("full stops at all blocks take less time than splines; ")
     assert plan.trajectory.cycle_time == pytest.approx(plan.stop_time, rel=1e-6)
     assert plan.verdict.passed
+    assert plan.prices is not None
 
 
 def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):

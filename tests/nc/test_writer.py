@@ -136,7 +136,9 @@ def test_the_programmed_feed_is_brought_back() -> None:
 def test_a_feed_in_force_is_not_written_again() -> None:
     source = b"G1 X1 F6000\nX2\nG0 X3\nG1 X4\nG20\nX5\nX6 F100\n"
     text = check(source, np.array([10.0, 10.0, np.nan, 10.0, 10.0, 10.0]))
-    assert text == b"G1 X1 F600\nX2\nG0 X3\nG1 X4\nG20\nX5\nX6 F23.62\n"
+    assert (
+        text == b"G1 X1 F600\nX2\nG0 X3\nG1 X4\nG20\nX5 F23.62\nX6 F23.62\n"
+    )  # 600 mm/min, in inches and rounded down
 
 
 def test_a_feed_on_a_rapid_rules_what_follows() -> None:
@@ -175,7 +177,7 @@ def test_what_does_not_belong_together_is_refused() -> None:
 def test_deleted_blocks_that_are_read_are_written() -> None:
     source = b"F6000 G1 X1\n/X9\n"
     program = parse_program(source, block_delete=False)
-    assert retimed(source, program, np.full(2, 10.0), block_delete=False) == b"F600 G1 X1\n/X9 F600\n"
+    assert retimed(source, program, np.full(2, 10.0), block_delete=False) == b"F600 G1 X1\n/X9\n"
 
 
 # --- any program, in any spelling ----------------------------------------------------------------------------------------

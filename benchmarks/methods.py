@@ -124,8 +124,8 @@ def _markdown(table: dict[str, list[Row]]) -> str:
         [[label, *(_time(found.get((name, label)), best[name]) for name in table)] for label in labels],
     )
     text += "\n`toppra` does not limit the jerk; the others are judged with it.\n"
-    text += "\nLargest ratio to a limit that is exceeded, or of the error to the tolerance; no number where the motion leaves the\n"
-    text += "tolerance so far that the verifier's matching loses its place (circle, fir-plain: 0.108 mm, it says 19.9).\n\n"
+    text += "\nLargest ratio to a limit that is exceeded, or of the error to the tolerance; no number where the distance is\n"
+    text += "not known.\n\n"
     broken = [
         label
         for label in labels

@@ -56,9 +56,9 @@ HINT, HINT_LEAST = (
     0.15,
     1e-4,
 )  # how far a saving may be off and still be told as a number [-, share of the time]
-# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]; with 1e-4 more or less of the
-# tolerance up to 2.5e-4 (pentagon).
-UNREST = 5e-4
+# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]: 2.5e-4 with 1e-4 more or less
+# of the tolerance (pentagon), 1e-3 with more jerk (bracket: 5e-4 was too little for jerk.y).
+UNREST = 1e-3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -101,15 +101,15 @@ def compared(
     plan = planner.plan(program, machine, method="optimal", corner=corner).require()
     took = time.process_time() - began
     prices, cycle_time = plan.prices, time_of(plan)
-    assert prices is not None, "a plan by optimal has prices"
-    rows = []
-    for limit, saved in prices.saved.items():
+    rows: list[dict[str, Any]] = []
+    for limit, saved in prices.saved.items() if prices is not None else ():
         if among and limit not in among:
             continue
         if limit not in ("feed", "tolerance") and saved < WORTH * cycle_time:
             continue
         again = planner.plan(*with_more(program, machine, limit), method="optimal", corner=corner).require()
         found = cycle_time - time_of(again)
+        assert prices is not None
         least, most = prices.ranges[limit]
         room = HINT_LEAST * cycle_time
         hint = limit in prices.hints
@@ -160,6 +160,8 @@ def table(results: list[dict[str, Any]]) -> str:
                     "yes" if row["right"] else "NO",
                 ]
             )
+        if not result["rows"]:
+            lines.append([f"{result['program']}, {result['corner']}", "no prices", "", "", "", "", ""])
     rows = [row for result in results for row in result["rows"]]
     numbers = [row for row in rows if not row["hint"]]
     hints = [row for row in rows if row["hint"]]

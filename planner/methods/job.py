@@ -260,7 +260,8 @@ class Method(ABC):
             made = self.plan_job(job)
         if job is given:
             return made
-        made = dataclasses.replace(made, notes=(*made.notes, _said(made, programmed, planned)))
+        # what less tolerance costs is not in the problem's prices
+        made = dataclasses.replace(made, prices=None, notes=(*made.notes, _said(made, programmed, planned)))
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
             rival = other.plan_within_periods(given.afresh())
             if faster(made, rival) is rival:

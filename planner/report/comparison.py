@@ -47,6 +47,7 @@ class Row:
     worst         : by quantity: worst ratio to its limit and which of the limits that is ("jerk.y")
     free          : quantities that this method does not limit
     contour_error, vertex_error : [mm]
+    after_filters : the larger of both behind the machine's filters [mm]; None without filters, or where it is not known
     corner_ratio  : the largest of eq. 18-19 at the programmed corners, None without corners
     gain          : median speed there over eq. 20 of the paper's corner, None where that says nothing
     ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
@@ -64,6 +65,7 @@ class Row:
     vertex_error: float | None = None
     corner_ratio: float | None = None
     gain: float | None = None
+    after_filters: float | None = None
     ringing: float | None = None
     planning_time: float | None = None
     summary: dict[str, Any] | None = None
@@ -96,10 +98,18 @@ def row_of_plan(method: str, plan: Plan) -> Row:
         vertex_error=verdict.vertex_error_mm,
         corner_ratio=_known(verdict.corners.worst_ratio),
         gain=_known(verdict.corners.gains()[0]),
+        after_filters=_after_filters(verdict),
         ringing=_ringing(verdict),
         planning_time=planning,
         summary=summary(plan),
     )
+
+
+def _after_filters(verdict: Verdict) -> float | None:
+    after = verdict.after_filters
+    if after is None or after.contour_error_mm is None or after.vertex_error_mm is None:
+        return None
+    return max(after.contour_error_mm, after.vertex_error_mm)
 
 
 def _ringing(verdict: Verdict) -> float | None:
@@ -137,8 +147,10 @@ def comparison_table(rows: list[Row], title: str) -> Group:
     ):
         table.add_column(name, justify="right", no_wrap=True)
     rings = any(row.ringing is not None for row in rows)
+    filters = any(row.after_filters is not None for row in rows)
     law = ("eq. 18-19\nat most", "over\neq. 20")
-    for name in ("contour\nµm", "corners\nµm", *law, *(["rings\nµm"] if rings else []), "planning\ns"):
+    more = (["behind\nfilters"] if filters else []), (["rings\nµm"] if rings else [])
+    for name in ("contour\nµm", "corners\nµm", *more[0], *law, *more[1], "planning\ns"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     said = []
@@ -150,6 +162,7 @@ def comparison_table(rows: list[Row], title: str) -> Group:
             *(_worst(row, quantity) for quantity in shown),
             _number(row.contour_error, ".4g", MICROMETRE),
             _number(row.vertex_error, ".4g", MICROMETRE),
+            *([_number(row.after_filters, ".4g", MICROMETRE)] if filters else []),
             "-" if row.corner_ratio is None else ratio_text(row.corner_ratio),
             _number(row.gain, ".3f"),
             *([_number(row.ringing, ".4g", MICROMETRE)] if rings else []),
@@ -185,6 +198,7 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
                 "vertex_error_mm": row.vertex_error,
                 "corner_ratio": row.corner_ratio,
                 "gain": row.gain,
+                "after_filters_mm": row.after_filters,
                 "ringing_mm": row.ringing,
                 "planning_time_s": row.planning_time,
                 "summary": row.summary,
@@ -201,13 +215,20 @@ def comparison_csv(rows: list[Row]) -> str:
     write = csv.writer(out, lineterminator="\n")
     limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
     head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
-    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain", "ringing_mm"]
-    tail += ["planning_time_s", "sentence"]
+    tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain"]
+    tail += ["after_filters_mm", "ringing_mm", "planning_time_s", "sentence"]
     write.writerow([*head, *limits, *tail])
     for row in rows:
         worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
         first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
-        errors = [row.contour_error, row.vertex_error, row.corner_ratio, row.gain, row.ringing]
+        errors = [
+            row.contour_error,
+            row.vertex_error,
+            row.corner_ratio,
+            row.gain,
+            row.after_filters,
+            row.ringing,
+        ]
         last = [" ".join(row.free), *errors, row.planning_time, row.sentence]
         write.writerow([*first, *worst, *last])
     return out.getvalue()

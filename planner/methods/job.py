@@ -265,8 +265,13 @@ class Method(ABC):
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
             rival = other.plan_within_periods(given.afresh())
             if faster(made, rival) is rival:
-                said = f"{rival.corner} corners lose less to the period; {rival.sentence}"
-                made = dataclasses.replace(rival, corner=made.corner, sentence=said)
+                what = (
+                    f"{rival.corner} corners lose"
+                    if rival.method == made.method
+                    else f"method {rival.method} loses"
+                )
+                said = f"{what} less to the period; {rival.sentence}"
+                made = dataclasses.replace(rival, method=made.method, corner=made.corner, sentence=said)
         return made
 
     @abstractmethod

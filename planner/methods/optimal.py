@@ -25,6 +25,7 @@ from planner.machine import Machine
 from planner.methods.creeping import within_filters
 from planner.methods.geometry import AUTO
 from planner.methods.job import Job, Method
+from planner.methods.kinematic import KinematicMethod
 from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
 from planner.methods.plan import Plan
 from planner.methods.prices import MORE_TOLERANCE, SitePrices, price_list
@@ -33,6 +34,7 @@ from planner.methods.rivals import fastest
 from planner.methods.shaped import shaped_plan
 from planner.methods.slowing import within_limits, without_seen_excess
 from planner.methods.stages import Stages
+from planner.methods.stop import StopMethod
 from planner.path import RESOLUTION, sample_path
 from planner.timing import Motion
 
@@ -61,10 +63,11 @@ class OptimalMethod(Method):
 
     @property
     def instead(self) -> tuple[Method, ...]:  # type: ignore[override]
-        """Single corners, where the chords between samples take tolerance from splines."""
+        """Single corners, method kinematic and full stops, where the chords between samples take tolerance from splines."""
         if self.corner != AUTO or self.shaped:
             return ()
-        return tuple(dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
+        corners = (dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
+        return (*corners, KinematicMethod(), StopMethod())
 
     def plan_job(self, job: Job) -> Plan:
         if self.shaped:

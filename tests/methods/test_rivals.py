@@ -13,7 +13,7 @@ from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program
 
 
-@pytest.mark.parametrize("seed", [3, 17, 27, 28, 40, 55, 70, 99])
+@pytest.mark.parametrize("seed", [3, 17, 27, 28, 40, 52, 70, 99])
 def test_nothing_is_faster_than_optimal(seed):
     row = compared(seed)
     assert row["optimal"] is not None

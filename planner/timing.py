@@ -30,8 +30,9 @@ from planner.trajectory import Trajectory
 # Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of coordinates, so that
 # accelerations by differences of nearby positions are as good as the columns.
 LENGTH_ROUNDING = 1e-13
-# Steps on s(w) at most; one is the rule where the interpolated inverse is not good enough by itself.
-REFINE_STEPS = 12
+# Steps on s(w) at most; one is the rule where the interpolated inverse is not good enough by itself. Halves alone take 43 for
+# `LENGTH_ROUNDING`.
+REFINE_STEPS = 60
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
 CUBE_ROOT_ROUNDING = 4e-5
 # Where a piece of the law is looked at [share of the piece].
@@ -200,7 +201,7 @@ def _segment(samples: PathSamples, point: Array, parameter: FloatArray) -> Array
 def _invert(legs, corners, spans, element, w0, w1, h, work, out, c):
     """Quintic c (6,) with w = w0 + (w1 - w0) sum c_n q^n, q = ds/h, matching w(s) and two derivatives at both ends.
 
-    Returns whether it is accurate to `LENGTH_ROUNDING` in the middle, where it is worst.
+    Returns whether it is accurate to `LENGTH_ROUNDING` in the middle, where it is worst as a rule, and at its quarters.
     """
     c[:] = 0.0
     c[1] = 1.0
@@ -219,11 +220,13 @@ def _invert(legs, corners, spans, element, w0, w1, h, work, out, c):
     c[1], c[2] = slope[0], 0.5 * bend[0]
     p, v, a = 1.0 - c[1] - c[2], slope[1] - c[1] - 2.0 * c[2], bend[1] - 2.0 * c[2]
     c[3], c[4], c[5] = 10.0 * p - 4.0 * v + 0.5 * a, -15.0 * p + 7.0 * v - a, 6.0 * p - 3.0 * v + 0.5 * a
-    middle = w0 + dw * _horner(c, 0.5)
-    return (
-        abs(element_length(legs, corners, spans, element, w0, middle, w_ref, out) / h - 0.5)
-        <= LENGTH_ROUNDING
-    )
+    for q in (0.5, 0.25, 0.75):
+        w = w0 + dw * _horner(c, q)
+        if not w0 <= w <= w1:
+            return False
+        if abs(element_length(legs, corners, spans, element, w0, w, w_ref, out) / h - q) > LENGTH_ROUNDING:
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -233,19 +236,29 @@ def _horner(c, q):
 
 @njit(cache=True, error_model="numpy")
 def _refine(legs, corners, spans, element, w0, w1, w, ds, h, work, out):
-    """Solve for the arc length ds from w0, starting from a good w: the inverse function's series to second order."""
+    """Solve for the arc length ds from w0, starting from w: the inverse function's series to second order, and halves of what encloses
+    the solution where that leads outside it (where an interval is a whole span it may)."""
     w_ref = 0.5 * (w0 + w1)
+    low, high = w0, w1
+    w = min(max(w, w0), w1)
     for _ in range(REFINE_STEPS):
         miss = element_length(legs, corners, spans, element, w0, w, w_ref, out) - ds
         if abs(miss) <= LENGTH_ROUNDING * h:
             break
+        if miss > 0.0:
+            high = w
+        else:
+            low = w
         element_point(legs, corners, spans, element, w, w_ref, work, out)
         speed_sq, along = 0.0, 0.0
         for k in range(out.shape[1]):
             speed_sq += out[1, k] * out[1, k]
             along += out[1, k] * out[2, k]
         step = miss / np.sqrt(speed_sq)
-        w = min(max(w - step - 0.5 * along / speed_sq * step * step, w0), w1)
+        w = w - step - 0.5 * along / speed_sq * step * step
+        if not low <= w <= high:
+            w = 0.5 * (low + high)
+            continue
         if abs(miss) <= CUBE_ROOT_ROUNDING * h:
             break
     return w

@@ -11,6 +11,10 @@ from whole_plans import CORNERS, Solved, smooth_path, solve
 
 from benchmarks import problems
 from planner.feedrate.rest_to_rest import PHASES, rest_to_rest_phases, rest_to_rest_times
+from planner.geometry.build import toolpath_from_program
+from planner.methods.job import Job
+from planner.methods.optimal import OptimalMethod
+from planner.methods.stages import Stages
 from planner.nc.reader import parse_program
 from planner.path import sample_path
 from planner.time_law import law_of_phases
@@ -205,3 +209,27 @@ def test_the_stop_law_is_ruckigs_own_motion(length):
     np.testing.assert_allclose(got.velocity[inner, 0], theirs[:, 1], atol=1e-5)
     np.testing.assert_allclose(got.acceleration[inner, 0], theirs[:, 2], atol=1e-2)
     assert got.position[-1, 0] == length
+
+
+def test_places_follow_one_another_at_a_crawl():
+    """At 0.1 mm/s intervals are whole spans of a spline; on short and long blocks in turns their parameter is far from the arc length.
+    Between any two times the motion covers what its feed says, and never more than the programmed feed allows."""
+    turns = np.deg2rad(np.tile([4.0, -7.0, 5.0, -2.0], 6))
+    steps = np.tile([0.3, 0.012, 0.2, 0.03], 6)[:, None] * np.stack(
+        [np.cos(turns.cumsum()), np.sin(turns.cumsum())], axis=1
+    )
+    program = problems.polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), feed=0.1)
+    machine = problems.machine()
+    job = Job(
+        program=program,
+        machine=machine,
+        toolpath=toolpath_from_program(program, machine),
+        stages=Stages(None),
+    )
+    made = OptimalMethod(corner="spline", rounds=1).plan_job(job)
+    motion = job.motion_of[made.trajectory]
+    times = np.sort(np.random.default_rng(3).uniform(0.0, motion.end, 20_000))
+    seen = motion.at(times, machine.dt)
+    moved = np.linalg.norm(np.diff(seen.position, axis=0), axis=1)
+    assert (moved <= 0.1 * np.diff(times) * (1 + 1e-6) + 1e-12).all()
+    assert made.verdict.passed

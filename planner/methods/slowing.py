@@ -19,6 +19,7 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.methods.pacing import paced, runs_of
 from planner.methods.reshape import OnPath
 from planner.time_law import TimeLaw, law_of_solution
 from planner.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
@@ -174,18 +175,4 @@ def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion 
 
 def slower(motion: Motion, factor: FloatArray) -> Motion:
     """Every run (G,) slowed down by its factor."""
-    law = motion.law
-    by = factor[law.run]
-    lasting = np.diff(np.append(law.t, law.end))
-    closing = np.append(law.run[1:] != law.run[:-1], True)  # the last piece of a run is its standstill
-    t = law.t[0] + np.concatenate([[0.0], np.cumsum(np.where(closing, lasting, lasting * by))])
-    new = TimeLaw(
-        t=t[:-1],
-        s=law.s,
-        feed=law.feed / by,
-        acc_s=law.acc_s / by**2,
-        jerk_s=law.jerk_s / by**3,
-        run=law.run,
-        end=float(t[-1]),
-    )
-    return dataclasses.replace(motion, law=new)
+    return paced(motion, runs_of(motion), factor, np.zeros(len(factor)))

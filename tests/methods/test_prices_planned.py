@@ -52,6 +52,20 @@ def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_s
     assert rows["tolerance"]["found_s"] > 1e-3 * cycle_time
 
 
+def test_where_the_period_may_take_its_share_of_more_everything_is_a_hint_and_right():
+    """Chords between samples 4 ms apart use 40 % of the tolerance: a faster motion has to leave them more."""
+    among = ("feed", "tolerance")
+    machine = problems.five_points_machine()
+    result = compared("five points", problems.five_points(), machine, "bezier", among)
+    assert [row["limit"] for row in result["rows"]] == ["feed", "tolerance"]
+    for row in result["rows"]:
+        assert row["hint"], row
+        assert row["least_s"] <= 0.0 < row["found_s"] <= row["most_s"], row
+    fine = machine.model_copy(update={"dt": 1e-4})
+    plan = planner.plan(problems.five_points(), fine, method="optimal", corner="bezier")
+    assert not set(among) & set(plan.prices.hints)
+
+
 def test_a_tenth_more_of_anything_saves_no_more_than_everything_a_tenth_faster(on_corners, on_splines):
     for result in (on_corners, on_splines):
         for row in result["rows"]:

@@ -19,8 +19,8 @@ from scipy.interpolate import make_interp_spline
 
 from benchmarks.record import write_results
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk import JerkLimited
-from planner.feedrate.nlp import JerkLimitedNLP
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 
 LIMIT_ROUNDING = 1e-6  # a limit holds if it is exceeded by no more than this [-]

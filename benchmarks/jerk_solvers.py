@@ -34,9 +34,9 @@ from benchmarks import copp_solver
 from benchmarks.random_paths import COPP_TIME, copp_spline, long_path, nurbs, random_path
 from benchmarks.record import markdown, write_results
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk import JerkLimited
-from planner.feedrate.nlp import JerkLimitedNLP
-from planner.feedrate.sequential_convex import SequentialConvex
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.reference.nlp import JerkLimitedNLP
+from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.solution import FeedrateSolver, constraint_ratios
 
 REFERENCE = "ipopt"

@@ -24,15 +24,15 @@ import numpy as np
 import planner
 from benchmarks import problems
 from benchmarks.record import markdown, write_results
-from planner.errors import PlannerError
+from planner.base.errors import PlannerError
 from planner.geometry.nurbs import Nurbs
+from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.methods.fir_spline import FirSplineMethod
-from planner.methods.names import METHODS
-from planner.methods.on_path import CORNERS
-from planner.methods.plan import Plan
+from planner.methods.registry import METHODS
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.optimal.on_path import CORNERS
 from planner.report.comparison import Row, best_of, refused, row_of_plan
 
 ROUNDING = ("optimal", "toppra")

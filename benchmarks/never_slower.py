@@ -15,11 +15,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.record import markdown, write_results
+from planner.job.job import Method
+from planner.job.plan import Plan
 from planner.machine import Axis, Machine
-from planner.methods.job import Method
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
-from planner.methods.plan import Plan
 from planner.methods.stop import StopMethod
 from planner.nc.program import Program
 from planner.nc.reader import parse_program

@@ -24,12 +24,12 @@ import numpy as np
 import planner
 from benchmarks import problems
 from benchmarks.record import RESULTS, markdown, write_results
+from planner.job.plan import Plan
 from planner.machine import Machine, load_machine
-from planner.methods.plan import Plan
-from planner.methods.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE, WORTH
-from planner.methods.savings import more_of
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.sensitivity.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE, WORTH
+from planner.sensitivity.savings import more_of
 
 CORNERS = ("bezier", "auto")
 NC = Path("../shared/nc")

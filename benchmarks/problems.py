@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.machine import Axis, Machine
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.reader import parse_program

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.record import markdown, write_results
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 
 PERIOD = 0.01  # [s], the paper's
 PERIODS = 600

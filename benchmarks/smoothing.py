@@ -15,9 +15,9 @@ from typing import Any
 
 from benchmarks.nc_programs import KEEP_OUT
 from benchmarks.record import markdown, write_results
+from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine, load_machine
 from planner.methods.optimal import SIGMA2

@@ -28,7 +28,7 @@ from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.geometry.build import toolpath_from_program
 from planner.nc.program import Program
-from planner.path import sample_path
+from planner.path.samples import sample_path
 
 COMMAND = "python -m benchmarks.solver_speed"
 RESULTS = Path(__file__).resolve().parent / "results"

@@ -21,9 +21,9 @@ import numpy as np
 import planner
 from benchmarks import problems
 from benchmarks.record import RESULTS, markdown, write_results
-from planner.errors import PlannerError
-from planner.methods.on_path import CORNERS
+from planner.base.errors import PlannerError
 from planner.nc.program import Program
+from planner.optimal.on_path import CORNERS
 
 ANGLES = (15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 160, 170)  # [deg]
 LEG = 20.0  # [mm]

@@ -8,37 +8,37 @@
     InputError, NotSolvedError
     __version__
 
-Names and units: `planner.units`. Everything is imported on first use, so that `import planner` costs nothing.
+Names and units: `planner.base.units`. Everything is imported on first use, so that `import planner` costs nothing.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from planner.errors import InputError, NotSolvedError
+    from planner.base.errors import InputError, NotSolvedError
     from planner.geometry.toolpath import Toolpath
+    from planner.job.plan import Plan
     from planner.machine import Machine, load_machine
-    from planner.methods.names import plan
-    from planner.methods.plan import Plan
+    from planner.methods.registry import plan
+    from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
     from planner.nc.reader import read_program
-    from planner.trajectory import Trajectory
     from planner.verify import Verdict
 
     __version__: str
 
 _HOME = {
-    "plan": "planner.methods.names",
-    "Plan": "planner.methods.plan",
+    "plan": "planner.methods.registry",
+    "Plan": "planner.job.plan",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
     "read_program": "planner.nc.reader",
     "Toolpath": "planner.geometry.toolpath",
-    "Trajectory": "planner.trajectory",
+    "Trajectory": "planner.motion.trajectory",
     "Verdict": "planner.verify",
-    "InputError": "planner.errors",
-    "NotSolvedError": "planner.errors",
+    "InputError": "planner.base.errors",
+    "NotSolvedError": "planner.base.errors",
 }
 
 __all__ = [

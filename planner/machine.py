@@ -14,10 +14,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from planner.arrays import FloatArray
-from planner.errors import InputError
-from planner.files import require_ending
-from planner.units import RAD_PER_DEG
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.base.files import require_ending
+from planner.base.units import RAD_PER_DEG
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.blend import CORNER_DTYPE, corner_point
@@ -19,11 +19,11 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.methods.on_path import corner_shape
+from planner.motion.time_law import TimeLaw, law_of_solution
+from planner.motion.timing import Motion
 from planner.nc.program import Program
-from planner.path import RESOLUTION, PathSamples, sample_path
-from planner.time_law import TimeLaw, law_of_solution
-from planner.timing import Motion
+from planner.optimal.on_path import corner_shape
+from planner.path.samples import RESOLUTION, PathSamples, sample_path
 
 CORNERS = ("bezier", "fir", "kinematic")
 

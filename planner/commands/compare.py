@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from planner.base.errors import InputError, NotSolvedError
 from planner.commands.options import (
     DEFAULT_MACHINE,
     ForceOption,
@@ -28,7 +29,6 @@ from planner.commands.terminal import (
     say,
     show,
 )
-from planner.errors import InputError, NotSolvedError
 
 if TYPE_CHECKING:
     from planner.machine import Machine

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from planner.base.errors import InputError
 from planner.commands.terminal import guarded, say, show
-from planner.errors import InputError
 
 
 @guarded

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from planner.base.errors import InputError, NotSolvedError
 from planner.commands.options import (
     DEFAULT_MACHINE,
     Corner,
@@ -22,7 +23,6 @@ from planner.commands.options import (
     ToleranceOption,
 )
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
-from planner.errors import InputError, NotSolvedError
 
 NO_CORNERS = "no corners to list: the program turns nowhere without a stop"
 

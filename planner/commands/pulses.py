@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.base.errors import InputError
 from planner.commands.options import ForceOption, JsonOption
 from planner.commands.terminal import FAILED, guarded, say
-from planner.errors import InputError
 
 if TYPE_CHECKING:
-    from planner.pulses import AxisPulses
+    from planner.motion.pulses import AxisPulses
 
 
 @guarded
@@ -40,7 +40,7 @@ def pulses(
 
     Where they follow faster than the drives take them nothing is written, and the exit code is 1.
     """
-    from planner.pulses import Drive, overrun, pulses_of
+    from planner.motion.pulses import Drive, overrun, pulses_of
     from planner.report.pulse_file import check_place, write_pulses
     from planner.report.trajectory_file import read_trajectory
 

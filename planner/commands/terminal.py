@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from planner import kernels
+from planner.base import kernels
+from planner.base.errors import InputError, NotSolvedError
 from planner.commands.interrupt import INTERRUPTED
-from planner.errors import InputError, NotSolvedError
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.base.errors import InputError
 from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, QuietOption, ToleranceOption
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
-from planner.errors import InputError
 
 if TYPE_CHECKING:
     from planner.machine import Machine

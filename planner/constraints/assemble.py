@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import NotSolvedError
+from planner.base.units import RAD_PER_DEG
 from planner.constraints import bounds
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.allocation import error_rate
-from planner.errors import NotSolvedError
 from planner.machine import Machine
-from planner.path import PathSamples
-from planner.units import RAD_PER_DEG
+from planner.path.samples import PathSamples
 
 # The effective curvature is exact in the middle of an interval; at its quarters up to 4e-4 is missing on grids of the default
 # resolution (measured in tests/path), which this share of the bounds makes good [-].
@@ -23,7 +23,8 @@ JUMP_ROUNDING = 1e-6
 def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
     """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
 
-    measured : the error of the machine's filters is measured afterwards (methods/creeping.py), and bounded here on programmed arcs only
+    measured : the error of the machine's filters is measured afterwards (optimal/within_filters.py), and bounded here on programmed
+        arcs only
 
     Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for the path.
     """

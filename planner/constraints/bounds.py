@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 
 
 def programmed_feed(feed: FloatArray) -> FloatArray:

@@ -9,11 +9,12 @@ In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), with constant u
                                                                 and the right end (x = x_{i+1}, r'' to its left), every axis k
                x = feed_sq_start, feed_sq_end at the ends of each piece.
 
-`margin` is the grid's interpolation error (path.py), so that the constraint holds in between as well. The jerk limits are carried
-along for solvers of third order; a second-order solver says that it does not use them.
+`margin` is the grid's interpolation error (path/samples.py), so that the constraint holds in between as well. The jerk limits are
+carried along for solvers of third order; a second-order solver says that it does not use them.
 
-`limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask for (methods/slowing.py).
-Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk over lam^3, so that every row of the point has the limit
+`limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask for
+(optimal/between_points.py). Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk over lam^3,
+so that every row of the point has the limit
 
     feed_sq_max / lam^2,     a_k / lam^2  (times 1 - margin),     j_k / lam^3
 
@@ -28,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.corners.blend import Shape
-from planner.errors import InputError
 
 # Up to here retreat times advance is largest at the middle of the corner, which the error bound needs (tested).
 SIGMA2_MAX = 1.5

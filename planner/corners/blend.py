@@ -33,9 +33,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
 from planner.geometry.legs import leg_point
-from planner.kernels import njit
 
 # Largest angle between the two tangents that are superposed [rad]; at pi the corner would have a cusp.
 BEND_MAX = np.deg2rad(176.0)

@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import Array
+from planner.base.arrays import Array
+from planner.base.kernels import njit
 from planner.corners.blend import CORNER_DTYPE, corner_point, shape_at
 from planner.corners.smooth import SmoothPath
 from planner.geometry.legs import leg_point, leg_tangent
 from planner.geometry.spline import span_point, span_tangent
-from planner.kernels import njit
 
 # Eight-point Gauss-Legendre rule on [0, 1]: on the widest grid interval, a quarter of a corner, good to 1e-10 of the length (four
 # points leave 4e-6, which shows as feed when positions are differenced).

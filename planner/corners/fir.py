@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.corners.blend import Shape
-from planner.errors import InputError
 from planner.machine import Machine
 
 

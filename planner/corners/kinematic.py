@@ -37,7 +37,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners.blend import Shape
 from planner.corners.fir import fir_breaks
 from planner.machine import Machine

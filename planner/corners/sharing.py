@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 
 # Rounds of handing over what is left. On a chain the rest shrinks by about half a round; 12 leave 2e-4 of it.
 ROUNDS = 12

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 from planner.corners.allocation import (
     allocate,
     error_rate,

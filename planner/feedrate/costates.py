@@ -23,9 +23,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Multipliers
-from planner.kernels import njit
 
 # A row, or x, within this share of its limit holds it [-]: the passes of the solver end there to rounding.
 HOLDS = 1e-6

@@ -25,13 +25,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.constraints.assemble import feedrate_problem, interval_feed_sq_max
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
-from planner.path import PathSamples, insert_points, straight
+from planner.path.samples import PathSamples, insert_points, straight
 
 # Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit.
 SWITCH_MIN = 1e-9

@@ -2,7 +2,7 @@
 
     L = sum_i  h_i + sum_r lam_ir g_ir + pi_i (x_i + (2 u_i + p_i) ds_i + p_i (2 u_i + p_i) h_i^2/12 - x_{i+1})
 
-with the rows g and the kinematics of jerk_rows.py, and the multipliers lam, pi that the solver ends with. At the optimum L is
+with the rows g and the kinematics of jerk/rows.py, and the multipliers lam, pi that the solver ends with. At the optimum L is
 stationary in the profile. So if the limits, or the path under the grid, change with some theta, the shortest time changes by
 
     dT/dtheta = dL/dtheta       with profile and multipliers as they are (envelope theorem):
@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk_rows import duration
+from planner.feedrate.jerk.rows import duration
 from planner.feedrate.solution import FeedrateSolution
-from planner.kernels import njit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
-from planner.kernels import njit
 
 # Newton steps at most; each step drops at least one of the 4A + 2 rows for good, so this is never reached with A <= 6.
 NEWTON_STEPS = 60

@@ -9,9 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.errors import NotSolvedError
 from planner.constraints.problem import FeedrateProblem
-from planner.errors import NotSolvedError
 
 
 class Status(Enum):

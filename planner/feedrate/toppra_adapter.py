@@ -39,7 +39,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 

@@ -21,10 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
+from planner.base.kernels import njit
 from planner.fir.course import Course
 from planner.fir.superpose import Pieces
-from planner.kernels import njit
 from planner.machine import Machine
 
 # Normal acceleration, which is not linear on a piece, is looked at this many times on either half of it, and may use this share of

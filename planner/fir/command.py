@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
 from planner.fir.course import Course
-from planner.kernels import njit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

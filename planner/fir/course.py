@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 from planner.geometry.chords import chorded, parted_by_feed
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath

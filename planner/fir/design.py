@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners.fir import overlap_time
-from planner.filters import damped_period, lengths_from_limits, suppressing
 from planner.fir.course import Course
+from planner.fir.filters import damped_period, lengths_from_limits, suppressing
 from planner.fir.schedule import Schedule, schedule
 from planner.machine import Machine
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
 from planner.corners.elements import element_point, to_arc_length
 from planner.fir.schedule import lower_between
 from planner.geometry.nurbs import Nurbs
-from planner.kernels import njit
 from planner.machine import Machine
-from planner.path import PathSamples
+from planner.path.samples import PathSamples
 
 SAGITTA = 0.01  # deviation of the chords from the path [share of the tolerance]
 TURN = 0.1  # from one chord to the next [rad]

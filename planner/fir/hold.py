@@ -22,13 +22,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.fir.audit import slowest
 from planner.fir.command import Command
 from planner.fir.guide import STRAIGHT, Guide, feeds_held
 from planner.fir.spline_speeds import filter_lengths, first_speeds, guide_point
 from planner.fir.superpose import Pieces, superpose
-from planner.kernels import njit
 from planner.machine import LINEAR_AXES, Machine
 
 # Rounds until the filters are no longer shortened again, until everything gets slower, and at most.

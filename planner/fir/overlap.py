@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners.fir import overlap_time
 
 # Pulses that were made to reach their limits exactly may exceed them by rounding [-].

@@ -28,13 +28,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
+from planner.base.search import last_not_after
 from planner.fir.command import Cells
 from planner.fir.course import Course
 from planner.fir.overlap import overlap_beside, overlap_within, overlap_within_limits
-from planner.kernels import njit
 from planner.machine import Machine
-from planner.search import last_not_after
 
 # Legs are cut where a speed limit ends on them only if they take longer than this share of Td at their own speed [-].
 CUT_LEGS = 0.25

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.feedrate.rest_to_rest import rest_to_rest_times
+from planner.base.arrays import Array, FloatArray
 from planner.fir.course import Course
 from planner.fir.design import plan_for
 from planner.fir.schedule import Schedule, plan_time
 from planner.fir.settle import settle
+from planner.lookahead.rest_to_rest import rest_to_rest_times
 from planner.machine import Machine
 
 # Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.fir.audit import Audit, audit, slowest
 from planner.fir.command import Cells, Command, command_of
 from planner.fir.course import Course

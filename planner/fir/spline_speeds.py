@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.constraints.bounds import filter_error, phase_lag
 from planner.corners.fir import overlap_time
 from planner.fir.guide import Guide

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
 from planner.fir.command import Command
-from planner.kernels import njit
 
 # Pieces shorter than this are left out, the jerk is that of the piece behind [s]: the order of edges that close is rounding.
 SHORTEST_PIECE = 1e-12

@@ -11,8 +11,8 @@ import dataclasses
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.errors import InputError
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import Machine
 from planner.nc.program import Kind, PathControl, Program

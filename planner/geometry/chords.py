@@ -11,7 +11,7 @@ import dataclasses
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
 from planner.geometry.toolpath import Joint, Toolpath
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.kernels import njit
 
 # Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
 JOINED_ANGLE = 1e-7

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline
 
-from planner.arrays import Array, FloatArray, freeze
-from planner.errors import InputError
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.errors import InputError
 from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind, PathControl, Program

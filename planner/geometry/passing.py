@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.geometry.chords import arc_point, arc_sagitta
 from planner.geometry.toolpath import Toolpath
-from planner.kernels import njit
 
 CHORD_SHARE = 1e-3  # sagitta of an arc's chords over its tolerance [-]
 SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
-from planner.kernels import njit
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
 
 DEGREE = 5
 

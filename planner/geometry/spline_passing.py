@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
 from planner.geometry.legs import Legs
 from planner.geometry.passing import CHORD_SHARE, chain_of, in_order
 from planner.geometry.spline import Spline, span_point
 from planner.geometry.toolpath import Toolpath
-from planner.kernels import njit
 
 LOOKED_AT = 5  # places on a span at which its bend is looked at
 

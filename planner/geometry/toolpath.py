@@ -20,7 +20,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 
 
 class Joint(IntEnum):

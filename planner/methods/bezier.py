@@ -3,9 +3,9 @@
 1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the share of the tolerance
    that eq. (20) gives it (three sources: rounding, chord error, filters that follow).
 2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes' limits, jerk included, allow
-   from its one end to the other (feedrate/constant_speed.py).
+   from its one end to the other (lookahead/constant_speed_corners.py).
 3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop at its vertex where that
-   is faster (feedrate/stretches.py); on arcs the limits are constant.
+   is faster (lookahead/stretches.py); on arcs the limits are constant.
 4. What the samples of a corner may have missed is made good by slowing down, as in method `optimal`; usually nothing.
 """
 
@@ -16,21 +16,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import SmoothPath, round_corners
-from planner.feedrate.constant_speed import CornerSpeeds, constant_speeds, stretches_of
 from planner.feedrate.solution import Status
-from planner.feedrate.stretches import better_stopped, largest_speeds, phases
 from planner.geometry.toolpath import Joint
+from planner.job.job import Job, Method
+from planner.job.plan import Plan
+from planner.job.records import CornerTable
+from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, stretches_of
+from planner.lookahead.stretches import better_stopped, largest_speeds, phases
 from planner.machine import Machine
-from planner.methods.closed_form import CornerTable, corner_apexes, corners_at
-from planner.methods.job import Job, Method
-from planner.methods.plan import Plan
-from planner.methods.slowing import slowed
-from planner.path import PathSamples, sample_path
-from planner.time_law import law_of_moves
-from planner.timing import Motion
+from planner.motion.time_law import law_of_moves
+from planner.motion.timing import Motion
+from planner.optimal.between_points import slowed
+from planner.path.samples import PathSamples, sample_path
+from planner.sensitivity.closed_form import corner_apexes, corners_at
 
 # The share of every leg that its corners leave free, to change the speed on it [-]. Circle of chords 5.5 s with 0 (all corners as slow
 # as the first), 2.62 with 0.2, 2.54 with 0.3, 2.71 with 0.4; 100 random paths 2.4, 2.4, 2.8, 3.2 % faster than stopping.

@@ -19,17 +19,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.axis_motion import AxisMotion
 from planner.feedrate.solution import Status
 from planner.fir.course import Course, course_of
 from planner.fir.design import plain_plan
+from planner.fir.filtered import axes_of, check_profile_filters, reached
 from planner.fir.schedule import Schedule
 from planner.fir.search import fastest
 from planner.fir.settle import make
 from planner.fir.superpose import Pieces
-from planner.methods.filtered import axes_of, check_profile_filters, reached
-from planner.methods.job import Job, Method
-from planner.methods.plan import Plan
+from planner.job.job import Job, Method
+from planner.job.plan import Plan
+from planner.motion.axis_motion import AxisMotion
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.axis_motion import AxisMotion
+from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.errors import InputError
 from planner.feedrate.solution import Status
+from planner.fir.filtered import axes_of, check_profile_filters, reached
 from planner.fir.guide import Guide, guide_of_curve, guide_of_path
 from planner.fir.hold import Held, command_of, fastest, promised
 from planner.fir.spline_speeds import v_sc
@@ -30,17 +30,17 @@ from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.job import Job, Method, faster
+from planner.job.plan import Plan
+from planner.job.stages import Progress, Stages
 from planner.machine import Machine
-from planner.methods.filtered import axes_of, check_profile_filters, reached
-from planner.methods.job import Job, Method, faster
-from planner.methods.plan import Plan
-from planner.methods.stages import Progress, Stages
-from planner.path import sample_path
+from planner.motion.axis_motion import AxisMotion
+from planner.path.samples import sample_path
 
 # Share of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
 # zig-zag 2.93, 2.66, 2.65 s with 0.5, 0.1, 0.05; circle and spiral of chords do not care.
 ROUNDING_SHARE = 0.1
-# Interpolation error of the grid that the chords start from, as of path.py: they are refined by the angle they turn.
+# Interpolation error of the grid that the chords start from, as of path/samples.py: they are refined by the angle they turn.
 RESOLUTION = 0.05
 # Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))

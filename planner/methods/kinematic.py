@@ -4,8 +4,8 @@
 2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry acceleration, entry
    deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the vertex itself at that step.
 3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full stop, so that the whole
-   is fastest (feedrate/look_ahead.py).
-4. Legs and corners are pieces of constant jerk of every axis (feedrate/corner_pieces.py): the motion itself, nothing is sampled.
+   is fastest (lookahead/look_ahead.py).
+4. Legs and corners are pieces of constant jerk of every axis (lookahead/corner_pieces.py): the motion itself, nothing is sampled.
 
 A stretch between full stops that is not faster than stopping at every block is run as method `stop` runs it.
 """
@@ -16,30 +16,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.axis_motion import AxisMotion
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
 from planner.corners import kinematic as corner
 from planner.corners.allocation import (
     error_rate,
     normal_acceleration_max,
     normal_acceleration_of_axes,
 )
-from planner.errors import InputError
-from planner.feedrate.candidates import candidates, fitted, leg_limits
-from planner.feedrate.corner_pieces import along_axes, pieces_of
-from planner.feedrate.look_ahead import Legs, Passage, look_ahead
-from planner.feedrate.ramps import Kind
-from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
 from planner.geometry.legs import Legs as PathLegs
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.job import Job, Method
+from planner.job.plan import Plan
+from planner.job.records import CornerTable
+from planner.lookahead.corner_pieces import along_axes, pieces_of
+from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
+from planner.lookahead.look_ahead import Legs, Passage, look_ahead
+from planner.lookahead.ramps import Kind
+from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
-from planner.methods.closed_form import CornerTable
-from planner.methods.job import Job, Method
-from planner.methods.plan import Plan
+from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl
 
 # Share of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill their

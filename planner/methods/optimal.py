@@ -2,9 +2,9 @@
 
 1. Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
 2. The second-order problem is solved first: it says where straight stretches need grid points (feedrate/grid.py).
-3. The jerk-limited problem is solved on that grid (feedrate/jerk.py).
+3. The jerk-limited problem is solved on that grid (feedrate/jerk/solver.py).
 4. Where the densely sampled motion exceeds a limit between grid points the problem is tightened and solved again; what is left,
-   less than 0.05 % as a rule, every run between full stops is slowed down by (methods/slowing.py).
+   less than 0.05 % as a rule, every run between full stops is slowed down by (optimal/between_points.py).
 5. With corner "auto", full stops, other corner shapes and method `kinematic` take its place where they take less time, or pass
    where it does not (methods/rivals.py).
 """
@@ -20,23 +20,23 @@ from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import refine_for_jerk
-from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.job.job import Job, Method
+from planner.job.plan import Plan
+from planner.job.stages import Stages
 from planner.machine import Machine
-from planner.methods.creeping import within_filters
-from planner.methods.geometry import AUTO
-from planner.methods.job import Job, Method
 from planner.methods.kinematic import KinematicMethod
-from planner.methods.on_path import best_on_path, corner_shape, plan_of_solution
-from planner.methods.plan import Plan
-from planner.methods.prices import MORE_TOLERANCE, SitePrices, price_list
-from planner.methods.reshape import OnPath, tube_prices
 from planner.methods.rivals import fastest
-from planner.methods.shaped import shaped_plan
-from planner.methods.slowing import within_limits, without_seen_excess
-from planner.methods.stages import Stages
 from planner.methods.stop import StopMethod
-from planner.path import RESOLUTION, sample_path
-from planner.timing import Motion
+from planner.motion.timing import Motion
+from planner.optimal.between_points import within_limits, without_seen_excess
+from planner.optimal.geometry import AUTO
+from planner.optimal.on_path import best_on_path, corner_shape, plan_of_solution
+from planner.optimal.reshape import OnPath, tube_prices
+from planner.optimal.shaped import shaped_plan
+from planner.optimal.within_filters import within_filters
+from planner.path.samples import RESOLUTION, sample_path
+from planner.sensitivity.prices import MORE_TOLERANCE, SitePrices, price_list
 
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
 # (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
@@ -50,8 +50,8 @@ class OptimalMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : a solver of third order
-    rounds : of reshaping splines (methods/reshape.py); None for as many as the size of the job lets pay
-    shaped : deliver set points that leave the machine's vibration modes at rest (methods/shaped.py)
+    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job lets pay
+    shaped : deliver set points that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO

@@ -4,7 +4,7 @@ A smooth path is not always the fastest: where every corner is sharp and the leg
 grid; other corner shapes use the tolerance otherwise; and a verdict that fails at a long interpolation period may be another's pass.
 
 stop         its time is known before it is planned, as the sum of closed forms over the blocks
-corner shape its time without jerk limits on a coarse grid is less than what it takes (methods/geometry.py); where that leaves a chance,
+corner shape its time without jerk limits on a coarse grid is less than what it takes (optimal/geometry.py); where that leaves a chance,
              its time with jerk limits on a coarse grid is more, by less than `CHANCE` says
 kinematic    runs, with less freedom, on the corners of its own shape: a chance like theirs
 
@@ -18,13 +18,13 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from planner.corners.smooth import SmoothPath, round_corners
-from planner.methods.geometry import corner_bounds
-from planner.methods.job import Job
+from planner.job.job import Job
+from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
-from planner.methods.on_path import corner_shape
-from planner.methods.plan import Plan
-from planner.methods.reshape import OnPath
 from planner.methods.stop import StopMethod
+from planner.optimal.geometry import corner_bounds
+from planner.optimal.on_path import corner_shape
+from planner.optimal.reshape import OnPath
 
 RIVAL_POINTS = 20_000
 SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
@@ -93,7 +93,7 @@ def _alone(job: Job, plan: Callable[[Job], Plan]) -> Plan:
 
 def _time(plan: Plan) -> float:
     """Cycle time [s], inf unless the verdict is passed, or nothing but chords between samples stands against it: then the job is
-    planned again with less tolerance (methods/periods.py)."""
+    planned again with less tolerance (delivery/periods.py)."""
     if plan.trajectory is None or plan.verdict is None:
         return float("inf")
     chords = all(fault.startswith(("vertex", "contour", "eq. 18")) for fault in plan.verdict.faults)

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.base.errors import NotSolvedError
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.errors import NotSolvedError
-from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_phases
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
-from planner.methods.job import Job, Method
-from planner.methods.plan import Plan
-from planner.path import sample_path
-from planner.time_law import law_of_phases
-from planner.timing import Motion
+from planner.job.job import Job, Method
+from planner.job.plan import Plan
+from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_phases
+from planner.motion.time_law import law_of_phases
+from planner.motion.timing import Motion
+from planner.path.samples import sample_path
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,20 +19,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.axis_motion import AxisMotion
-from planner.errors import InputError
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.delivery.periods import missed
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
-from planner.methods.job import Delivered, Job, Method
+from planner.job.job import Delivered, Job, Method
+from planner.job.plan import Plan
+from planner.job.stages import Stages
 from planner.methods.optimal import OptimalMethod
-from planner.methods.periods import missed
-from planner.methods.plan import Plan
-from planner.methods.stages import Stages
+from planner.motion.axis_motion import AxisMotion
+from planner.motion.passing import passing_times, standstills
+from planner.motion.timing import MotionInTime, in_chunks
+from planner.motion.trajectory import Trajectory, joined
 from planner.nc.program import Program
-from planner.passing import passing_times, standstills
-from planner.timing import MotionInTime, in_chunks
-from planner.trajectory import Trajectory, joined
 from planner.tube.course import Course, courses_of
 from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of

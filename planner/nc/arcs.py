@@ -20,8 +20,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from planner.arrays import FloatArray
-from planner.units import MM_PER_INCH
+from planner.base.arrays import FloatArray
+from planner.base.units import MM_PER_INCH
 
 AXES = "xyz"
 IN_PLANE = {2: (0, 1), 1: (2, 0), 0: (1, 2)}  # the plane's axes by its normal, right-handed

@@ -9,7 +9,7 @@ from typing import overload
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 from planner.nc.program import Event
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.nc.lexer import Words
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine
 from planner.nc.arcs import IN_PLANE
 from planner.nc.events import EventTable, plain

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import Machine
 from planner.nc import codes, moves
 from planner.nc.block import Block, read_block
@@ -24,7 +25,6 @@ from planner.nc.plain import run_plain
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
-from planner.units import SECONDS_PER_MINUTE
 
 _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
 _ROWS_AT_ONCE = 2  # blocks that one line can give beyond one per line (G28 through an intermediate point, a dwell, M6, M0)

@@ -20,8 +20,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.kernels import njit
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 
 # The longest source line [bytes]. RS274NGC stops at 255; programs with long comments exist, a line beyond this is not a program's.
 LINE_MAX = 4096

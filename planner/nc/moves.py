@@ -6,7 +6,7 @@ relative to the start (G91.1), or absolute like the coordinates of G90 (G90.1), 
 
 from __future__ import annotations
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_from_radius, closes
 from planner.nc.block import Block

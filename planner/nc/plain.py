@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.block import NUMBER_MAX
 from planner.nc.codes import LETTERS_REFUSED
 from planner.nc.lexer import Words
 from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.store import Store
-from planner.units import SECONDS_PER_MINUTE
 
 _F, _G, _N, _S, _X, _Z = 70, 71, 78, 83, 88, 90
 _REFUSED = np.zeros(256, dtype=np.bool_)

@@ -12,7 +12,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 
 
 class Kind(IntEnum):

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from planner.errors import InputError
-from planner.files import require_ending
+from planner.base.errors import InputError
+from planner.base.files import require_ending
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.units import MM_PER_INCH
 from planner.machine import LINEAR_AXES, Machine
 from planner.nc.program import PathControl
-from planner.units import MM_PER_INCH
 
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
 REFUSED_MOTION = -2  # a motion code that is not supported is in force (only `info` reads on)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable

@@ -6,11 +6,11 @@ pen or tool that is chosen at a stop becomes T... M6. Coordinates are rounded to
 
 from __future__ import annotations
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.events import plain
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.writer import FEED_MIN, round_down
-from planner.units import SECONDS_PER_MINUTE
 
 DECIMALS = 7  # of a coordinate in mm
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")

@@ -17,10 +17,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Kind, Program
-from planner.units import MM_PER_INCH, SECONDS_PER_MINUTE
 
 SIGNIFICANT = 4  # digits of a feed
 # The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.

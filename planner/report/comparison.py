@@ -19,16 +19,16 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.errors import InputError
+from planner.base.errors import InputError
+from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES
 from planner.report.export import summary, verdict_summary, versions
 from planner.report.replace import check_file, replacing_file, starts_with
 from planner.report.tables import ratio_text
-from planner.units import MICROMETRE
 
 if TYPE_CHECKING:
+    from planner.job.plan import Plan
     from planner.machine import Machine
-    from planner.methods.plan import Plan
     from planner.verify import Verdict
 
 SUFFIXES = (".json", ".csv")

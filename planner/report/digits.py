@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 
 DIGITS_MAX = 11  # a column that needs more is taken as exact: at 100 mm the twelfth digit is 1e-9 mm
 DISTINCT_MIN = 16  # numbers; fewer may be round by chance

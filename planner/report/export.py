@@ -21,15 +21,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.errors import InputError
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_notes, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
 if TYPE_CHECKING:
-    from planner.methods.plan import Plan
+    from planner.job.plan import Plan
     from planner.nc.info import ProgramInfo
     from planner.verify import CornerCheck, Verdict
 

@@ -1,6 +1,6 @@
 """What a plan tells about the job beside its motion: what holds it, what more of it would save, and which corners are dear.
 
-The figures are those of methods/activity.py and methods/prices.py, in words for the terminal and as numbers for `summary.json`.
+The figures are those of sensitivity/activity.py and sensitivity/prices.py, in words for the terminal and as numbers for `summary.json`.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.units import MICROMETRE
+from planner.base.units import MICROMETRE
 
 if TYPE_CHECKING:
-    from planner.methods.plan import GridHistory
-    from planner.methods.prices import PriceList
+    from planner.job.records import GridHistory, PriceList
 
 SHARE_SHOWN = 0.01  # what holds less of the time is told as "others" [-]
 LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
@@ -37,7 +36,7 @@ def held_by_text(grid: GridHistory) -> str:
 
 def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
     """Rows of the plan's table: what more of the limits saves, what more tolerance saves, and where."""
-    from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
 
     least = SAVED_SHOWN * cycle_time
     ranked = [name for name, saved in prices.ranked() if name != "tolerance" and saved >= least]
@@ -83,7 +82,7 @@ def optimum_summary(grid: GridHistory | None, prices: PriceList | None) -> dict[
 
 
 def _price_summary(prices: PriceList) -> dict[str, Any]:
-    from planner.methods.prices import MORE_LIMIT, MORE_TOLERANCE
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
 
     dear = prices.corners
     return {

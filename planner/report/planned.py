@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.errors import InputError
-from planner.methods.block_feeds import block_feeds, block_times
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.nc.dialects import is_plotter_file
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.text import program_text
 from planner.nc.writer import retimed
+from planner.report.block_feeds import block_feeds, block_times
 
 if TYPE_CHECKING:
-    from planner.methods.plan import Plan
+    from planner.job.plan import Plan
 
 _MOTION = (
     "kind", "end", "dwell", "line", "path_control", "tolerance",

@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES, RAD_PER_DEG
 
 if TYPE_CHECKING:
-    from planner.methods.plan import Plan
+    from planner.job.plan import Plan
 
 COLUMNS = 1500  # about the width of a profile in pixels
 FAR = 4.0  # peaks beyond this multiple of the limit are drawn on a scale that is logarithmic beyond the limit

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.errors import InputError
-from planner.pulses import AxisPulses
+from planner.base.errors import InputError
+from planner.motion.pulses import AxisPulses
 from planner.report.replace import check_file, replacing_file, starts_with
 
 SUFFIXES = (".parquet", ".csv")

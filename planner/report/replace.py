@@ -30,7 +30,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 
 if sys.platform != "win32":
     import fcntl

@@ -10,13 +10,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.optimum import held_by_text, price_rows
-from planner.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
-    from planner.arrays import FloatArray
-    from planner.methods.plan import Plan
+    from planner.base.arrays import FloatArray
+    from planner.job.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
     from planner.verify import CornerCheck, Ringing, Verdict

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind
 
 if TYPE_CHECKING:
-    from planner.methods.plan import Plan
+    from planner.job.plan import Plan
 
 PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are no more

@@ -26,12 +26,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.errors import InputError
-from planner.files import require_ending
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.files import require_ending
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.motion.trajectory import Trajectory
 from planner.report.digits import on_grid, rounding
-from planner.trajectory import Trajectory
 from planner.verify.given import DERIVATIVES, Given
 
 KNOWN = {"t", "s", "feed", "line", "block"} | {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
 
 DEGREE = 5
 ORDER = DEGREE + 1

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER
 
 PARTS = 8  # into which a piece is cut if its bound is too large

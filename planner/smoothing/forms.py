@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -65,7 +65,7 @@ def add_square(band, i, row, weight):
 
 @njit(cache=True, error_model="numpy")
 def _add_prices(basis, control, cut, i, tau, v, a, jerk, weight, limits, own, H, Q):
-    """Add what one end of a grid interval pays to H, and its own weight to Q (methods/reshape.py).
+    """Add what one end of a grid interval pays to H, and its own weight to Q (optimal/reshape.py).
 
     v, a, jerk : along the path; weight (A, 3) of squared velocity, acceleration and jerk over their `limits` (2, A); own: of Q [s]
     """

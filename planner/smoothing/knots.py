@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
 
 # Control points on the path leave a corner by sin(theta/2) sqrt(h^2/2) sqrt(2/pi) = 0.28 theta h, so by 0.56 of the tolerance.
 FITTING = 2.0

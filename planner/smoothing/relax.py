@@ -1,7 +1,7 @@
 """Smooth curves inside the tube: each run relaxed to the least integral of its squared third derivative, and proved to be inside.
 
 Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed is known yet;
-methods/reshape.py weights them by what the time-optimal motion pays for.
+optimal/reshape.py weights them by what the time-optimal motion pays for.
 
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are tightened by as much as the bound
 is too large, and relaxed again.
@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.kernels import njit
+from planner.base.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.certificate import certify
 from planner.smoothing.forms import third_derivative_energy
-from planner.smoothing.interior import minimise, site_distance
-from planner.smoothing.lay import follow
+from planner.smoothing.initial import follow
+from planner.smoothing.interior_point import minimise, site_distance
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
@@ -162,7 +162,7 @@ def relax(
     used         : (J,) radius that each site may use, smaller afterwards where the certificate asked for it
     left         : (S,) what the certificate leaves of the tolerance; of a run that is not good, of its last try: negative where it
                    fails
-    multiplier   : (J,) of the sites' constraints (interior.py)
+    multiplier   : (J,) of the sites' constraints (interior_point.py)
     H_all, Q_all : (A, n, 6) bands of all runs
     force        : (Q,) of each run
     gap, relative : where to end: gap (Q,) in the units of H, or that share of the integral of squared third derivatives with the

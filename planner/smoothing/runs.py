@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine

@@ -6,17 +6,17 @@ import dataclasses
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.corners.allocation import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
-from planner.kernels import njit
 from planner.machine import Machine
 from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
+from planner.smoothing.corridor import Guide, guide
 from planner.smoothing.forms import third_derivative_forms
-from planner.smoothing.guide import Guide, guide
-from planner.smoothing.lay import Laid, lay
+from planner.smoothing.initial import Laid, lay
 from planner.smoothing.relax import TUBE, relax
 from planner.smoothing.runs import Runs, find_runs, longest_span
 

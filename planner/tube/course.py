@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 from planner.corners.allocation import allocate, error_rate, normal_acceleration_max
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath

@@ -18,8 +18,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
-from planner.trajectory import Trajectory
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.motion.trajectory import Trajectory
 from planner.tube.course import Course
 
 # Twice as many find motions 2e-5 to 5e-5 faster in three times the time; half as many do not converge (corner of 90 degrees, pentagon).

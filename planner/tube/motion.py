@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.tube.course import Course
 from planner.tube.guess import Guess
 from planner.tube.nlp import TubeSolution

@@ -38,7 +38,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.feedrate.solution import Status
 from planner.tube.course import Course
 from planner.tube.guess import Guess

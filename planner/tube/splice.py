@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.axis_motion import AxisMotion
-from planner.timing import MotionInTime
-from planner.trajectory import Trajectory, joined
+from planner.base.arrays import FloatArray
+from planner.motion.axis_motion import AxisMotion
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory, joined
 
 # Times closer than this are the same [s]: rounding of sums of durations.
 SAME_TIME = 1e-9

@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.errors import InputError
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.matching import STILL
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, line_of
 from planner.verify.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT

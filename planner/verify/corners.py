@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 
 # A corner passed at less than this fraction of what eq. 20 and the programmed feed allow counts as a stop [-]: samples 1 ms apart show

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify.findings import Look, measured
 from planner.verify.limits import ACCELERATION
 from planner.verify.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING

@@ -41,10 +41,10 @@ from functools import reduce
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
 from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS

@@ -23,10 +23,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify import contour, findings
 from planner.verify import limits as rows
 from planner.verify.findings import Look

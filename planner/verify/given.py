@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.arrays import FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 
 DERIVATIVES = ("velocity", "acceleration", "jerk")
 

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.errors import InputError
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
 from planner.verify.dense import Comparison
 from planner.verify.filtered import after_filters

@@ -36,7 +36,7 @@ from __future__ import annotations
 
 import math
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.verify.pieces import RATIO_ROUNDING, kernel
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from

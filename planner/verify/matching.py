@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.verify.pieces import (
     CONTOUR_ROUNDING,
     PLACE_ROUNDING,

@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.kernels import njit
 
 PIECE_ANGLE = (
     np.pi / 8

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from planner.arrays import FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 from planner.machine import Machine, Mode
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify.pieces import kernel
 
 STEP = 0.2  # [rad] of the mode's phase between two looks: a peak is missed by less than 1 - cos(0.1) = 0.5 %

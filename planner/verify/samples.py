@@ -26,11 +26,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.errors import InputError
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 from planner.verify.findings import QUANTITIES, Look, measured
 from planner.verify.given import Given
 from planner.verify.limits import ACCELERATION, JERK, ROUNDING_ULPS

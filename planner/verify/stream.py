@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.arrays import Array, FloatArray
-from planner.trajectory import Trajectory
+from planner.base.arrays import Array, FloatArray
+from planner.motion.trajectory import Trajectory
 from planner.verify.limits import GROUPS, ROWS_ALONE, scan
 from planner.verify.matching import Match, follow, new_match
 from planner.verify.pieces import Pieces

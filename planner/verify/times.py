@@ -19,8 +19,8 @@ from typing import Protocol
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.trajectory import Trajectory
+from planner.base.arrays import FloatArray
+from planner.motion.trajectory import Trajectory
 
 PER_PIECE = 4  # cells; the planner's own places are three a piece
 PER_PERIOD = 2  # cells: chords between neighbouring times last less than a period, and cut no corner more than the machine's do

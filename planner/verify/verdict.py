@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from planner.arrays import FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 from planner.verify.corners import CornerCheck
 from planner.verify.pieces import RATIO_ROUNDING
 from planner.verify.ringing import Ringing

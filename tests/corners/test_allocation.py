@@ -17,7 +17,7 @@ from planner.corners.allocation import (
 )
 from planner.corners.bezier import BezierCorner
 from planner.machine import Fir
-from planner.methods.closed_form import corner_table
+from planner.sensitivity.closed_form import corner_table
 
 budgets = st.floats(1e-4, 0.5)
 accelerations = st.floats(10.0, 1e5)

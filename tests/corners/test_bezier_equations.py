@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 
 
 def derivatives(points: FloatArray, weights: FloatArray, t: float) -> FloatArray:

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from whole_plans import evaluate_corner, smooth_path
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner, kappa_max
 from planner.corners.blend import BEND_MAX, error_from_middle, middle_from_tolerance, shape_at
 from planner.corners.elements import element_table
 from planner.corners.fir import FirCorner
-from planner.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import leg_point
 from planner.geometry.toolpath import Joint

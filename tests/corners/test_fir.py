@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from whole_plans import evaluate_corner, smooth_path
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.corners.fir import FirCorner, overlap_time
 from planner.geometry.build import toolpath_from_program

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from whole_plans import evaluate_corner, smooth_path
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners import kinematic
 from planner.corners.bezier import BezierCorner
 from planner.corners.fir import FirCorner

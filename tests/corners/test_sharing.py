@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from whole_plans import smooth_path
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.corners.sharing import share_legs
 

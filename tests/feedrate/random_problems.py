@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 
 AXES = "xyzabc"

@@ -15,13 +15,13 @@ from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.grid import refine_for_jerk
-from planner.feedrate.jerk import JerkLimited
-from planner.feedrate.jerk_window import ScaledWindow
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.rest_to_rest import rest_to_rest_times
 from planner.feedrate.solution import Status, constraint_ratios
 from planner.geometry.build import toolpath_from_program
-from planner.path import sample_path
+from planner.lookahead.rest_to_rest import rest_to_rest_times
+from planner.path.samples import sample_path
 
 
 def third_order(program, machine):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks.jerk_campaign import faults, small_problem
-from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.jerk.solver import JerkLimited
 
 
 @pytest.mark.parametrize("first", range(0, 200, 20))

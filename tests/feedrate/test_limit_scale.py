@@ -10,11 +10,11 @@ from random_problems import random_problem
 
 from benchmarks.jerk_campaign import small_problem
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk import JerkLimited
+from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.lagrangian import lagrangian
-from planner.feedrate.nlp import JerkLimitedNLP
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.sequential_convex import SequentialConvex
+from planner.feedrate.reference.nlp import JerkLimitedNLP
+from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.solution import constraint_ratios, ratios_by_limit
 from planner.feedrate.toppra_adapter import ToppraSolver
 

@@ -12,15 +12,15 @@ from benchmarks import problems
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
-from planner.feedrate.nlp import JerkLimitedNLP
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.rest_to_rest import rest_to_rest_times
+from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import Status, active_names, constraint_ratios
+from planner.lookahead.rest_to_rest import rest_to_rest_times
 from planner.machine import Machine
+from planner.motion.time_law import law_of_solution
+from planner.motion.timing import Motion, dense_motion
 from planner.nc.program import Program
-from planner.path import sample_path
-from planner.time_law import law_of_solution
-from planner.timing import Motion, dense_motion
+from planner.path.samples import sample_path
 
 SOLVERS = ("ipopt", "fatrop")
 

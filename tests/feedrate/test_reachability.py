@@ -13,9 +13,9 @@ from scipy.optimize import linprog
 from whole_plans import solve
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.errors import NotSolvedError
 from planner.constraints.problem import FeedrateProblem
-from planner.errors import NotSolvedError
 from planner.feedrate.reachability import Reachability, _largest
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 

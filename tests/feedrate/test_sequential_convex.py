@@ -12,9 +12,9 @@ from scipy.integrate import quad
 
 from benchmarks.random_paths import nurbs, random_path
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk import JerkLimited
-from planner.feedrate.nlp import JerkLimitedNLP
-from planner.feedrate.sequential_convex import NEAR, SequentialConvex
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.reference.nlp import JerkLimitedNLP
+from planner.feedrate.reference.sequential_convex import NEAR, SequentialConvex
 from planner.feedrate.solution import FeedrateSolution, Status
 
 ROWS = 1e-6  # by which a row may exceed its limit [relative]

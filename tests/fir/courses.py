@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.fir.course import Course, course_of
 from planner.fir.schedule import Schedule
 from planner.geometry.build import toolpath_from_program

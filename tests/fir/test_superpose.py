@@ -10,9 +10,9 @@ from courses import course_through, machine_of, overlapping
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.filters import Filters
 from planner.fir.command import Cells, command_of
 from planner.fir.course import course_of
+from planner.fir.filters import Filters
 from planner.fir.settle import make
 from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program

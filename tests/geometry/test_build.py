@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.geometry.build import COORDINATE_MAX, REVERSAL_ANGLE, toolpath_from_program, turning_angle
 from planner.geometry.legs import leg_point, leg_tangent, legs_of
 from planner.geometry.toolpath import Joint, Toolpath

@@ -11,13 +11,13 @@ import pytest
 from scipy.spatial import cKDTree
 
 from benchmarks import problems
+from planner.job import job as job_module
 from planner.machine import Fir
-from planner.methods import job as job_module
 from planner.methods import optimal as optimal_module
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
-from planner.methods.names import plan
 from planner.methods.optimal import OptimalMethod
+from planner.methods.registry import plan
 from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
 

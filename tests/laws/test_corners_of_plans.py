@@ -10,8 +10,8 @@ import pytest
 import planner
 from benchmarks import problems
 from planner.constraints import bounds
+from planner.job import job
 from planner.machine import Machine
-from planner.methods import job
 from planner.methods.bezier import BezierMethod
 from planner.nc.reader import parse_program
 from planner.verify import CornerCheck, verify
@@ -144,7 +144,7 @@ def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch)
     repaired = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
     assert not any(
         laws_broken(repaired.corners)
-    )  # planned again with less of the tolerance (methods/periods.py)
+    )  # planned again with less of the tolerance (delivery/periods.py)
     monkeypatch.setattr(job, "PERIOD_ROUNDS", 0)
     free = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
     assert not free.verdict.passed

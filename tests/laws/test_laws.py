@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from whole_plans import CORNERS, solve
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.geometry.build import turning_angle
 from planner.machine import Axis, Machine
 from planner.nc.program import PathControl, Program

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from benchmarks import problems
 from planner.machine import Axis, Machine
-from planner.methods.names import METHODS, plan
+from planner.methods.registry import METHODS, plan
 from planner.nc.program import Program
 from planner.verify.pieces import RATIO_ROUNDING
 

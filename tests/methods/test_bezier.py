@@ -8,11 +8,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.machine import Axis, Machine
 from planner.methods.bezier import BezierMethod
-from planner.methods.names import plan
+from planner.methods.registry import plan
 from planner.methods.stop import StopMethod
 from planner.nc.program import PathControl
 from planner.nc.reader import parse_program

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
-from planner.errors import InputError
-from planner.filters import damped_period, residual_vibration
+from planner.base.errors import InputError
+from planner.fir.filters import damped_period, residual_vibration
 from planner.machine import Mode
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
-from planner.methods.names import plan
+from planner.methods.registry import plan
 from planner.nc.program import PathControl
 from planner.nc.reader import parse_program
 from planner.verify.pieces import RATIO_ROUNDING

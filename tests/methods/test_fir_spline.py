@@ -16,15 +16,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.arrays import FloatArray
-from planner.errors import InputError
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.fir.guide import Guide, guide_of_curve
 from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint
 from planner.machine import Axis, Machine
 from planner.methods.fir_spline import CHORD_SHARE, FirSplineMethod
-from planner.methods.names import plan
+from planner.methods.registry import plan
 from planner.nc.reader import parse_program
 from planner.verify.pieces import RATIO_ROUNDING
 

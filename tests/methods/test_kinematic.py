@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import arc_point, arc_sagitta, chorded
 from planner.geometry.toolpath import Joint
 from planner.machine import Axis
 from planner.methods.kinematic import CHORD_SHARE, KinematicMethod
-from planner.methods.names import plan
+from planner.methods.registry import plan
 from planner.methods.stop import StopMethod
 from planner.nc.program import PathControl
 from planner.nc.reader import parse_program

@@ -11,9 +11,9 @@ from planner.constraints.assemble import CURVATURE_MARGIN
 from planner.corners.bezier import kappa_max
 from planner.corners.smooth import CLOSE
 from planner.geometry.build import toolpath_from_program
-from planner.methods.job import Job
+from planner.job.job import Job
+from planner.job.stages import Stages
 from planner.methods.optimal import SIGMA2, OptimalMethod
-from planner.methods.stages import Stages
 
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
@@ -44,7 +44,7 @@ ISOLATED = 20.0  # legs [mm]: far more than what a corner takes of them and need
 
 def isolated_corners(jerk, dt, tolerance, normal):
     """A plan through corners with nothing but their own speed to hold them: legs long, feed and velocities high. Planned once, with all
-    of the tolerance, whatever chords between samples may take of it where the period is long (methods/periods.py)."""
+    of the tolerance, whatever chords between samples may take of it where the period is long (delivery/periods.py)."""
     direction = np.concatenate([[0.0], np.cumsum(TURNS)])
     steps = ISOLATED * np.stack([np.cos(direction), np.sin(direction)], axis=1)
     program = problems.polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), feed=1e4)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
-from planner.feedrate.rest_to_rest import block_limits, rest_to_rest_times
 from planner.geometry.build import toolpath_from_program
+from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.methods.stop import StopMethod
 from planner.nc.reader import parse_program
 

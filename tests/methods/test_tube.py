@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 
 import planner
 from benchmarks import problems
-from planner.errors import InputError, NotSolvedError
+from planner.base.errors import InputError, NotSolvedError
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
+from planner.job.plan import Plan
 from planner.machine import Fir
 from planner.methods.optimal import OptimalMethod
-from planner.methods.plan import Plan
 from planner.methods.tube import LEGS_MAX, TubeMethod
 from planner.nc.reader import parse_program
 from planner.tube import course as courses

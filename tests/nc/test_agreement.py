@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.arrays import Array
-from planner.errors import InputError
+from planner.base.arrays import Array
+from planner.base.errors import InputError
+from planner.base.units import MM_PER_INCH
 from planner.machine import Machine
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
-from planner.units import MM_PER_INCH
 
 HERE = Path(__file__).parent
 SHARED = HERE.parents[1].parent / "shared"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.nc import codes
 from planner.nc.info import inspect_program
 from planner.nc.lexer import LINE_MAX

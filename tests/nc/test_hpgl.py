@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine, Plotter, load_machine

@@ -20,8 +20,8 @@ from test_agreement import (
     random_program,
 )
 
-from planner.arrays import Array, FloatArray
-from planner.errors import InputError
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
 from planner.nc.writer import FEED_MIN, SAME_FEED, SIGNIFICANT, retimed, round_down

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner import path as path_module
 from planner.corners.bezier import BezierCorner
 from planner.corners.elements import element_table
 from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program
-from planner.path_calm import GROWTH, calm, interval_ends, quiet_way
+from planner.path import samples as path_module
+from planner.path.calm import GROWTH, calm, interval_ends, quiet_way
 
 EVERYWHERE = np.array([[-np.inf, np.inf]])
 SHORT = problems.machine(acceleration=200.0, jerk=2e6)  # a/j = 0.1 ms

@@ -13,16 +13,16 @@ from scipy.special import ellipe, ellipk
 from whole_plans import CORNERS, smooth_path, solve
 
 from benchmarks import problems
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner
 from planner.corners.elements import element_length, element_point, to_arc_length
 from planner.corners.kinematic import KinematicCorner
 from planner.corners.smooth import round_corners
-from planner.errors import InputError
 from planner.geometry.build import toolpath_from_program
+from planner.motion.timing import dense_motion
 from planner.nc.reader import parse_program
-from planner.path import RESOLUTION, PathSamples, insert_points, sample_path
-from planner.timing import dense_motion
+from planner.path.samples import RESOLUTION, PathSamples, insert_points, sample_path
 
 MACHINE = problems.machine()
 JOBS = problems.all_jobs()

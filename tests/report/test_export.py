@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hand_made import SQUARE, make_plan
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.machine import machine_from_dict
 from planner.nc.info import describe
 from planner.nc.reader import parse_program

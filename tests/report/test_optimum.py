@@ -11,8 +11,8 @@ from hand_made import make_plan
 from test_tables import text
 
 import planner
+from planner.job.records import DearCorners, PriceList
 from planner.machine import load_machine
-from planner.methods.prices import DearCorners, PriceList
 from planner.nc.reader import parse_program
 from planner.report.export import summary
 from planner.report.optimum import held_by_text, price_rows

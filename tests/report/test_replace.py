@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.report import replace
 from planner.report.replace import check_output, checksums, replacing, replacing_file
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hand_made import make_plan
 
-from planner.errors import InputError
+from planner.base.errors import InputError
+from planner.motion.trajectory import Trajectory
 from planner.report.trajectory_file import (
     FORMATS,
     divided_difference,
@@ -17,7 +18,6 @@ from planner.report.trajectory_file import (
     units,
     write_trajectory,
 )
-from planner.trajectory import Trajectory
 
 TRAJECTORY = make_plan().trajectory
 FIELDS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")

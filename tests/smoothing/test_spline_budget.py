@@ -10,7 +10,7 @@ from planner.corners.allocation import error_rate
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
-from planner.path import sample_path
+from planner.path.samples import sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
 
 

@@ -16,12 +16,13 @@ from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.spline import DEGREE, span_point
 from planner.geometry.toolpath import Joint
-from planner.methods.geometry import splined_with_stops
 from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program, read_program
-from planner.smoothing import lay, spline_path
-from planner.smoothing.interior import site_distance
-from planner.smoothing.lay import follow
+from planner.optimal.geometry import splined_with_stops
+from planner.smoothing import initial as lay
+from planner.smoothing import spline_path
+from planner.smoothing.initial import follow
+from planner.smoothing.interior_point import site_distance
 from planner.smoothing.relax import OVERLAP, _tighten, relax
 from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
 

@@ -8,7 +8,7 @@ import pytest
 
 from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
 from planner.smoothing.forms import third_derivative_forms
-from planner.smoothing.interior import minimise
+from planner.smoothing.interior_point import minimise
 
 
 def random_tube(seed, spans, axes, sites):

@@ -14,8 +14,8 @@ import numpy as np
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine, machine_from_dict
+from planner.motion.trajectory import Trajectory
 from planner.nc.program import Kind, PathControl, Program
-from planner.trajectory import Trajectory
 
 Motion = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
 JERK_FREE = ("jerk",)

@@ -19,7 +19,7 @@ from motions import (
     straight,
 )
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.nc.program import PathControl
 from planner.verify import verify
 

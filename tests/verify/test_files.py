@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from motions import JERK_FREE, Moves, along, chain, helix, machine, polyline, rest_to_rest, sample, stay
 
-from planner.errors import InputError
+from planner.base.errors import InputError
 from planner.report.trajectory_file import read_trajectory
 from planner.verify import Given, verify
 from planner.verify.axes import fit_axes

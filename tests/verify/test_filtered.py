@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
-from planner.filters import Filters
+from planner.fir.filters import Filters
 from planner.machine import Fir
-from planner.methods.names import plan
+from planner.methods.registry import plan
 from planner.verify import filtered as module
 from planner.verify import verify
 from planner.verify.filtered import filtered, motion_of_samples

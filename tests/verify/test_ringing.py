@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks import problems
-from planner.filters import residual_vibration
+from planner.fir.filters import residual_vibration
 from planner.machine import Mode
-from planner.methods.names import plan
-from planner.trajectory import Trajectory
+from planner.methods.registry import plan
+from planner.motion.trajectory import Trajectory
 from planner.verify.ringing import ringing_of
 
 AMPLITUDE, PULSE = 2000.0, 0.05  # [mm/s2], [s]: to and fro, at rest in the end

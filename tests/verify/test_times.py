@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from motions import JERK_FREE, Asked, Moves, machine, polyline, sample
 
-from planner.timing import WATCHED
+from planner.motion.timing import WATCHED
 from planner.verify import verify
 from planner.verify.times import PER_PERIOD, PER_PIECE, cells_per_period, look
 

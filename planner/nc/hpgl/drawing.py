@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.base.arrays import FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.events import EventTable
 from planner.nc.program import Kind, PathControl, Program

@@ -16,7 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from planner.errors import InputError
+from planner.base.errors import InputError
+from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault
 from planner.nc.hpgl.drawing import PEN_DOWN, PEN_UP, Drawing, Point
@@ -25,7 +26,6 @@ from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError
 from planner.nc.program import Kind, Program
 from planner.nc.state import Setup
-from planner.units import RAD_PER_DEG
 
 MM_PER_CM = 10.0
 FULL_TURN = 360.0  # [deg]

@@ -1,0 +1,1 @@
+"""What everything else stands on: arrays in records, errors, units, files, searches, compiled kernels."""

@@ -1,0 +1,26 @@
+"""Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer never."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from planner.base.errors import InputError
+
+STREAMS = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")  # where a shell's pipes and process substitutions are
+
+
+def require_ending(path: str | Path) -> None:
+    """Raise InputError if `path` is a device, a socket or a named pipe; the pipes of a shell under `STREAMS` are fine.
+
+    Raises OSError where there is no such file.
+    """
+    mode = os.stat(path).st_mode
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode) or (stat.S_ISFIFO(mode) and str(path).startswith(STREAMS)):
+        return
+    what = "a named pipe" if stat.S_ISFIFO(mode) else "a device or a socket"
+    raise InputError(
+        f"this is {what}; give a regular file, or the output of a program by | and /dev/stdin",
+        source=str(path),
+    )

@@ -1,0 +1,88 @@
+"""numba's `njit` with a cache that may fail: `from planner.base.kernels import njit` instead of `from numba import njit`.
+
+Compiled kernels are kept on disk, beside the package or, where that is read-only, in the user's cache directory. numba refuses to start
+where neither can be written, and fails where the disk is full. A kernel that cannot be kept is compiled again by the next run, which
+takes a minute for all of them, and is nothing to fail for: one warning says so.
+
+numba itself is imported with the first kernel.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+_told: Callable[[bool], None] | None = None
+_warned = False
+
+
+class KernelCacheWarning(UserWarning):
+    """Compiled kernels cannot be kept."""
+
+
+def at_compilation(tell: Callable[[bool], None] | None) -> None:
+    """Call `tell` whenever a kernel is about to be compiled, with True if it is kept for the next run; None for no more calls."""
+    global _told
+    _told = tell
+
+
+def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]], Any]:
+    """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is possible."""
+    import numba
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        dispatcher = numba.njit(**settings)(function)
+        if cache and hasattr(dispatcher, "enable_caching"):  # a plain function with NUMBA_DISABLE_JIT
+            try:
+                dispatcher.enable_caching()
+            except (RuntimeError, OSError) as fault:  # "no locator available"
+                _warn(fault)
+            dispatcher._cache = _Cache(dispatcher._cache)
+        return dispatcher
+
+    return compiled
+
+
+class _Cache:
+    """The cache of one kernel: numba's, without its OSErrors."""
+
+    def __init__(self, numba_s: Any):
+        self._numba_s = numba_s
+        self._kept = type(numba_s).__name__ != "NullCache"
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        try:
+            found = self._numba_s.load_overload(signature, context)
+        except (OSError, EOFError) as fault:
+            self._failed(fault)
+            found = None
+        if found is None and _told is not None:
+            _told(self._kept)
+        return found
+
+    def save_overload(self, signature: Any, made: Any) -> None:
+        try:
+            self._numba_s.save_overload(signature, made)
+        except OSError as fault:
+            self._failed(fault)
+
+    def _failed(self, fault: OSError | EOFError) -> None:
+        self._kept = False
+        _warn(fault)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._numba_s, name)
+
+
+def _warn(fault: Exception) -> None:
+    global _warned
+    if not _warned:
+        _warned = True
+        said = getattr(fault, "strerror", None) or str(fault).partition(" for file ")[0]
+        warnings.warn(
+            f"compiled kernels cannot be kept ({said}): they are compiled again by every run, which takes a minute; "
+            "set NUMBA_CACHE_DIR to a directory that can be written",
+            KernelCacheWarning,
+            stacklevel=3,
+        )

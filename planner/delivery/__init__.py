@@ -1,0 +1,1 @@
+"""From a motion to setpoints that hold behind samples and filters."""

@@ -1,0 +1,232 @@
+"""Motions that stay within the tolerance behind the machine's own filters (`[fir]`).
+
+A filter of kernel h on [0, Td] makes of the motion p the mean of its last Td. About p(t - Td/2) that is off by at most
+max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (docs/papers.md D), and a time Td after a motion comes to
+rest the
+filtered one has come to rest at the same point. So there are two ways to leave less of an error, and both always end:
+
+  slower   a run between full stops slowed down by f has 1/f^2 of the error; what a path that rounds its corners within less than the
+           tolerance leaves, it leaves again
+  rest     two runs that are Td apart do not know of each other: the stop between them is reached. Paper 000's dwell is Td - Tk, the
+           shortest rest at which the filtered motion still comes near enough: here it is found for the motion as it is. With what runs
+           into the stop, a(t), and what runs out of it, b(t), both seen from the vertex, behind the filters the motion is a + b shifted
+           by the rest.
+
+The motion is measured as the verifier measures it (verify/filtered.py), the errors are put down to runs and stops, and those are slowed
+down and lengthened until nothing is left. Behind the last run nothing is added: the filtered motion ends Td after the setpoints do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.delivery.pacing import Runs, Timed, TimedT, paced, runs_of
+from planner.fir.filters import Filters
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.motion.timing import MotionInTime
+from planner.verify.filtered import look_behind, motion_asked
+from planner.verify.pieces import pieces_of, widened
+
+# Of the tolerance, what measuring at other times may find more [-].
+SPARE = 2e-3
+# The motion is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
+WIDER = 16.0
+# The kernel is taken in so many cells where rests are sought [-]; a rest is found to 2^-HALVINGS of Td.
+CELLS, HALVINGS = 128, 10
+STOPS_AT_ONCE = 500  # 5 MB an array
+# At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
+# together by up to 240, which leaves 1/57,600 of any filter's error.
+ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5
+FLOOR_STEP = 1.0 / 32.0  # of Td: by so much a rest grows that was too short, twice as much each time again
+# What the path leaves of the tolerance for filters counts as this share at least [-], or the first step would be too large.
+ROOM_LEAST = 0.1
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Places:
+    """Where the filtered motion leaves the tolerance.
+
+    time  : (n,) behind the filters [s]
+    ratio : (n,) error over budget [-]
+    path  : (n,) what of the ratio is there without filters [-]
+    vertex : (n,) index of the vertex that is missed, -1 for places off the contour
+    near, near_time : (N+1,) of every vertex: error over budget [-], and when the filtered motion is nearest [s]
+    """
+
+    time: FloatArray
+    ratio: FloatArray
+    path: FloatArray
+    vertex: Array
+    near: FloatArray
+    near_time: FloatArray
+
+    @property
+    def less(self) -> FloatArray:
+        """(n,) by what factor accelerations have to be smaller there [-], < 1."""
+        room = 1.0 - SPARE - np.minimum(self.path, 1.0 - SPARE - ROOM_LEAST)
+        return room / (self.ratio - (1.0 - SPARE) + room)
+
+
+class Behind:
+    """The measuring of motions along one path behind one machine's filters."""
+
+    def __init__(self, toolpath: Toolpath, machine: Machine):
+        self.toolpath, self.machine = toolpath, machine
+        self.tolerance = float(toolpath.tolerance.min())
+        self.pieces = pieces_of(toolpath)
+        self._wide = widened(self.pieces, WIDER)
+        if machine.fir is None:
+            return  # `errors` of the motion itself can be asked for
+        self.filters = Filters(machine.fir.time_constants)
+        weights = self.filters.step(self.filters.delay * np.arange(CELLS + 1) / CELLS)
+        self._weights = np.diff(weights)
+
+    def errors(
+        self, motion: MotionInTime, filters: tuple[float, ...]
+    ) -> tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]:
+        """Of the contour: times, ratios and pieces where large (n,); of the vertices: ratio and time (N+1,)."""
+        kept: list[tuple[FloatArray, FloatArray, Array]] = []
+        worst = np.zeros(len(self.pieces.piece))
+
+        def each(t: FloatArray, ratio: FloatArray, piece: Array) -> None:
+            ratio = ratio * WIDER
+            np.maximum.at(worst, piece, ratio)
+            over = ratio > 1.0 - SPARE
+            kept.append((t[over], ratio[over], piece[over]))
+
+        at = motion_asked(motion, self.machine.dt)
+        look = look_behind(at, motion.end, filters, self.machine.dt, self._wide, each)
+        near = look.seen.match.passed["near"] / self.pieces.joint["budget"]
+        near[np.isinf(near)] = 2.0 * WIDER
+        t, ratio, piece = (np.concatenate(column) for column in zip(*kept, strict=True))
+        self._worst = worst
+        return t, ratio, piece, near, look.seen.match.passed["near_time"]
+
+    def path_shares(self, motion: Timed) -> tuple[FloatArray, FloatArray]:
+        """What the path itself, without filters, uses of the budgets: at worst on each piece (N,), and at the vertices (N+1,)."""
+        near = self.errors(motion, ())[3]
+        return self._worst, near
+
+    def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Places:
+        """Where a motion leaves the tolerance behind the filters; path: `path_shares` of any motion along the same path."""
+        t, ratio, piece, near, near_time = self.errors(motion, self.filters.times)
+        missed = np.flatnonzero(near > 1.0 - SPARE)
+        return Places(
+            time=np.concatenate([t, near_time[missed]]),
+            ratio=np.concatenate([ratio, near[missed]]),
+            path=np.concatenate([path[0][piece], path[1][missed]]),
+            vertex=np.concatenate([np.full(len(t), -1), missed]),
+            near=near,
+            near_time=near_time,
+        )
+
+    def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
+        """(n,) True for times at which the filters hold what two runs did: there longer rests help, and nothing else has to."""
+        early, late = self.runs_within(runs_of(motion), time)
+        return early < late
+
+    def runs_within(self, runs: Runs, time: FloatArray) -> tuple[Array, Array]:
+        """First and last of the runs (n,) that the filters hold something of at the times (n,) [s]."""
+        early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
+        late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
+        return np.minimum(early, late), late
+
+    def rests(self, motion: Timed, runs: Runs) -> FloatArray:
+        """(G,) the shortest rest [s] behind each run with which the filtered motion comes near enough; 0 behind the last."""
+        found = np.zeros(len(runs))
+        for low in range(0, len(runs) - 1, STOPS_AT_ONCE):
+            stop = np.arange(low, min(low + STOPS_AT_ONCE, len(runs) - 1))
+            found[stop] = self._rests(motion, runs.end[stop], runs.begin[stop + 1])
+        return found
+
+    def _rests(self, motion: Timed, end: FloatArray, begin: FloatArray) -> FloatArray:
+        delay, cells = self.filters.delay, CELLS
+        cell = delay / cells
+        inside = cell * (np.arange(cells) + 0.5)
+        times = np.stack([end[:, None] - inside, begin[:, None] + inside], axis=1)
+        place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
+        seen = motion.at(place, self.machine.dt)
+        stop = motion.at(np.unique(end), self.machine.dt)
+        off = seen.position[of].reshape(*times.shape, -1) - stop.position[:, None, None]
+        into, out = off[:, 0], off[:, 1]
+        before, after = np.zeros((2, len(end), cells + 1, off.shape[-1]))
+        for j in range(
+            cells + 1
+        ):  # so many cells after the stop the filters still hold the rest of the way in
+            before[:, j] = np.einsum("c,gca->ga", self._weights[j:], into[:, : cells - j])
+            after[:, j] = np.einsum("c,gca->ga", self._weights[:j], out[:, :j][:, ::-1])
+        budget = self._budget(stop.block, stop.position) * (1.0 - SPARE)
+        low, high = np.zeros(len(end)), np.full(len(end), float(cells))
+        fine = self._miss(before, after, low) <= budget
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            enough = self._miss(before, after, middle) <= budget
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        return np.where(fine, 0.0, high * cell)
+
+    def _miss(self, before: FloatArray, after: FloatArray, rest: FloatArray) -> FloatArray:
+        """How far the filtered motion passes by the stops (g,) [mm] if it rests there for so many cells."""
+        j = np.arange(before.shape[1]) - rest[:, None]
+        whole = np.clip(np.floor(j).astype(np.int64), 0, before.shape[1] - 2)
+        share = np.clip(j - whole, 0.0, 1.0)[:, :, None]
+        rows = np.arange(len(rest))[:, None]
+        shifted = (1.0 - share) * after[rows, whole] + share * after[rows, whole + 1]
+        return np.linalg.norm(before + shifted, axis=2).min(axis=1)
+
+    def _budget(self, block: Array, position: FloatArray) -> FloatArray:
+        """Budget of the joints (g,) that are nearest to positions on blocks [mm]."""
+        path = self.toolpath
+        segment = np.searchsorted(path.block, block, side="right") - 1
+        first = np.searchsorted(path.block, block)
+        ends = np.stack([path.start[first], path.end[segment]])
+        nearer = np.linalg.norm(ends - position, axis=2).argmin(axis=0)
+        return np.where(nearer == 0, path.tolerance[first], path.tolerance[segment + 1])
+
+
+def rested(behind: Behind, motion: TimedT) -> TimedT:
+    """The motion with the shortest rests at its full stops, no run slowed down."""
+    runs = runs_of(motion)
+    gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
+    return paced(motion, runs, np.ones(len(runs)), np.maximum(behind.rests(motion, runs) - gap, 0.0))
+
+
+def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
+    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance; the motion itself for a
+    machine without filters."""
+    if machine.fir is None:
+        return motion
+    behind, runs = Behind(toolpath, machine), runs_of(motion)
+    if not len(runs):
+        return motion
+    path = behind.path_shares(motion)
+    delay, least = behind.filters.delay, np.zeros(len(runs))
+    factor, again = np.ones(len(runs)), np.zeros(len(runs))
+    gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
+    made = motion
+    for n in range(ROUNDS):
+        slower = paced(motion, runs, factor, np.zeros(len(runs)))
+        rest = np.maximum(behind.rests(slower, runs_of(slower)), least)
+        made = paced(motion, runs, factor, np.maximum(rest - gap, 0.0))
+        places = behind.places(made, path)
+        if not len(places.time):
+            break
+        early, late = behind.runs_within(runs_of(made), places.time)
+        own = early == late
+        more = np.clip(
+            1.0 / np.sqrt(places.less[own]), min(FACTOR_LEAST ** (n + 1), FACTOR_MOST), FACTOR_MOST
+        )
+        worst = np.ones(len(runs))
+        np.maximum.at(worst, late[own], more)
+        factor = factor * worst
+        short = np.zeros(len(runs), bool)
+        for a, b in set(zip(early[~own].tolist(), late[~own].tolist(), strict=True)):
+            short[a:b] = True
+        least[short] = np.minimum(
+            np.maximum(rest, gap)[short] + FLOOR_STEP * delay * 2.0 ** again[short], delay
+        )
+        again[short] += 1
+    return made

@@ -1,0 +1,176 @@
+"""What the interpolation period adds to the contour, and what is done about it.
+
+The machine gets samples dt apart and runs the chords between them. Within a period the chord is off the motion by
+
+    |e(t)| <= dt^2/8 max |q''|,     whatever the direction of the acceleration q'',
+
+so that a vertex P that the motion q misses by m is missed by the chords by m + dt^2/8 max |q''| at most. Error allocation (eq. 18-20)
+has the normal acceleration in the place of |q''|; along a smooth path that is right, because what the acceleration along the path
+does shifts the chord along itself. At a corner that is run through within some periods, and at a full stop, it is not: braking before
+and speeding up behind point along different legs.
+
+1. Full stops: with the arrival t_a between two samples the chord cuts the vertex off, by |q''| (dt/2)^2/2 at most. Where that is more
+   than the tolerance, `settled` lets the motion stand until the next sample, or for the shorter time that is enough: less than
+   dt per stop.
+2. Corners: `missed` measures what the chords miss every vertex by, with samples at whatever phase. Where that is more than the
+   tolerance, `with_less_tolerance` takes the excess off what the corner is planned with, and stops at corners of which the chords
+   alone would use nearly all.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.motion.passing import STANDING, passing_times
+from planner.motion.timing import CHUNK, MotionInTime, in_chunks
+from planner.motion.trajectory import joined
+
+# Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
+# changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
+PHASES, PLACES = 16, 64
+# A motion is looked at so many times in a period to find its vertices.
+PER_PERIOD = 8
+# Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of the motion of its own, and
+# who looks at the pieces, at whatever times, sees it.
+LEAST_REST = 1e-6
+# Chords may miss a vertex by this share of its tolerance [-]; the rest is for what lies between the phases and places above.
+USED = 0.99
+# Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
+# long, eq. (20).
+REDUCED_BY = 1.5
+# A corner is stopped at instead where less than this share of its tolerance would be left to it [-].
+LEFT_MIN = 0.1
+
+
+def settled(motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool) -> MotionInTime:
+    """The motion with longer standstills where chords between samples would cut off the place by more than the tolerance."""
+    half = machine.dt / 2
+    acceleration, jerk = (
+        float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
+    )
+    from_rest = min(acceleration * half**2 / 2, jerk * half**3 / 6 if jerk_limited else np.inf)
+    if from_rest <= USED * toolpath.tolerance.min():
+        return motion
+    arrival, departure, place, block = _rests(motion, machine.dt)
+    if not len(arrival):
+        return motion
+    segment = np.searchsorted(toolpath.block, block)
+    allowed = USED * np.minimum(toolpath.tolerance[segment], toolpath.tolerance[segment + 1])
+    waits = _waits(motion, arrival, departure, place, allowed, machine.dt)
+    return motion.waiting(arrival[waits > 0], waits[waits > 0]) if waits.any() else motion
+
+
+def _rests(motion: MotionInTime, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, Array]:
+    """When the motion comes to rest between its ends, when it leaves (n,) [s], where (n, A) [mm], and the block there."""
+    seen = joined(list(in_chunks(motion, dt, np.append(motion.t, motion.end))))
+    still = seen.feed <= STANDING * seen.feed.max()
+    begin = np.flatnonzero(still & ~np.append(False, still[:-1]))
+    end = np.flatnonzero(still & ~np.append(still[1:], False))
+    inner = (begin > 0) & (end < len(seen) - 1)
+    begin, end = begin[inner], end[inner]
+    return seen.t[begin], seen.t[end], seen.position[begin], seen.block[begin]
+
+
+def _waits(
+    motion: MotionInTime,
+    arrival: FloatArray,
+    departure: FloatArray,
+    place: FloatArray,
+    allowed: FloatArray,
+    dt: float,
+) -> FloatArray:
+    """(n,) by how much longer the motion has to rest at each place [s]."""
+    tau = np.linspace(0.0, dt, PLACES + 1)
+    waits, waited = np.zeros(len(arrival)), 0.0
+    gap = np.append(arrival[1:] - departure[:-1], np.inf)
+    rows = max(CHUNK // len(tau), 1)
+    for first in range(0, len(arrival), rows):
+        part = slice(first, first + rows)
+        before = _off(motion, arrival[part, None] - tau, place[part], dt)
+        behind = _off(motion, departure[part, None] + tau, place[part], dt)
+        apart = [np.linalg.norm(off, axis=2) for off in (before, behind[:, ::-1])]
+        risky = np.minimum(*apart).max(axis=1) > allowed[part]
+        for r in np.flatnonzero(risky):
+            k = first + r
+            since = (arrival[k] + waited) % dt  # from the last sample
+            rest = dt - since - (departure[k] - arrival[k])  # from leaving to the next one
+            waits[k] = LEAST_REST
+            waited += LEAST_REST
+            if min(since, dt - since) <= 1e-9 * dt or rest <= LEAST_REST:
+                continue
+            last = np.array([np.interp(since, tau, column) for column in before[r].T])
+            at = np.append(rest, tau[(tau < rest) & ((tau <= gap[k]) | (tau == 0.0))][::-1])
+            next_ = np.stack([np.interp(at, tau, column) for column in behind[r].T], axis=1)
+            enough = _from_chord(np.broadcast_to(last, next_.shape), next_) <= allowed[k]
+            enough[-1] = True  # on the sample
+            more = max(rest - at[enough.argmax()] - LEAST_REST, 0.0)
+            waits[k] += more
+            waited += more
+    return waits
+
+
+def _off(motion: MotionInTime, times: FloatArray, place: FloatArray, dt: float) -> FloatArray:
+    """(n, m, A) the motion at the times (n, m) [s], from the places (n, A)."""
+    return _positions(motion, times, dt) - place[:, None]
+
+
+def _positions(motion: MotionInTime, times: FloatArray, dt: float) -> FloatArray:
+    """(*times.shape, A) where the motion is [mm]."""
+    single, which = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
+    found: FloatArray = motion.at(single, dt).position[which.ravel()]
+    return found.reshape(*times.shape, -1)
+
+
+def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(...,) distance of 0 from the chords a to b (..., A)."""
+    step = b - a
+    size = (step**2).sum(axis=-1)
+    share = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
+    near: FloatArray = np.linalg.norm(a + np.clip(share, 0.0, 1.0)[..., None] * step, axis=-1)
+    return near
+
+
+def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatArray, FloatArray]:
+    """(M+1,) what the motion itself misses each vertex by, and what chords between samples dt apart miss it by at their worst
+    phase [mm]; 0 where the motion rests."""
+    fine = np.arange(0.0, motion.end, dt / PER_PERIOD)
+    seen = joined(list(in_chunks(motion, dt, np.concatenate([fine, motion.t, [motion.end]]))))
+    when = passing_times(seen, toolpath)
+    vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
+    moving = np.interp(when, seen.t, seen.feed) > STANDING * seen.feed.max()
+    near, far = np.zeros(len(vertex)), np.zeros(len(vertex))
+    shift = (np.arange(-1, 3)[None, :] - np.arange(PHASES)[:, None] / PHASES) * dt
+    at = np.flatnonzero(moving)
+    rows = max(CHUNK // shift.size, 1)
+    for first in range(0, len(at), rows):
+        part = at[first : first + rows]
+        off = _positions(motion, when[part, None, None] + shift, dt) - vertex[part, None, None]
+        far[part] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
+        fine_off = _positions(motion, when[part, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
+        near[part] = np.linalg.norm(fine_off - vertex[part, None], axis=2).min(axis=1)
+    return near, far
+
+
+def with_less_tolerance(
+    planned: Toolpath, programmed: Toolpath, near: FloatArray, far: FloatArray
+) -> Toolpath | None:
+    """The path to be planned so that chords stay within the tolerance of the programmed one; None if they do.
+
+    planned   : the path that led to the motion
+    near, far : what it and its chords miss the vertices by, as `missed` tells (M+1,) [mm]
+    """
+    allowed = USED * programmed.tolerance
+    over = far > allowed
+    if not over.any():
+        return None
+    tolerance = planned.tolerance - REDUCED_BY * np.where(over, far - allowed, 0.0)
+    hopeless = over & (
+        (tolerance < LEFT_MIN * programmed.tolerance) | (far - near > (1.0 - LEFT_MIN) * allowed)
+    )
+    tolerance[hopeless] = planned.tolerance[hopeless]
+    return dataclasses.replace(planned.with_joints(hopeless, Joint.STOP), tolerance=tolerance)

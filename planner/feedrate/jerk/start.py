@@ -1,0 +1,117 @@
+"""Profiles to start the jerk-limited solver from.
+
+`envelope` is what the solver starts from, turned into a motion where that is found (interior_point.track):
+
+1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
+   allow, |r'''_k| x^(3/2) <= j_k.
+2. The fastest profile under these caps that leaves every dip, and brakes into it, like a motion with a share of the jerk, up to a share
+   of the acceleration. Near rest that is s = j t^3/6.
+
+`plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that acceleration for about
+a quarter of the way, constant speed after one interval of transition, and the same backwards from the end. Every interval has
+constant jerk, so that the kinematics are exact, and slowed down enough it keeps any limits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
+from planner.constraints.problem import FeedrateProblem
+
+ACCELERATION_SHARE = 0.4  # of the limits, for the second-order profile underneath [-]
+NORMAL_SHARE = 0.7  # of the acceleration limits, for the caps [-]
+JERK_SHARE = 0.5  # of the jerk limits, for the caps and the first motion from rest [-]
+
+PLAIN_SHARE = 0.25  # of the way, on which the plain start accelerates, and again brakes [-]
+CAP_SHARE = 0.8  # of all other bounds on feed^2 [-]
+NEWTON_STEPS = (
+    4  # for the time on an interval; from the bound they start at, one in a thousand is left at worst
+)
+FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between the ends [-]
+
+
+def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
+    """Feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
+    own = slice(begin, end + 1)
+    acceleration, jerk_limit = problem.acceleration_limit[own], problem.jerk_limit[own]
+    curve = np.maximum(np.abs(problem.d2_left[own]), np.abs(problem.d2_right[own])) / acceleration
+    slope = np.maximum(np.abs(problem.d3_left[own]), np.abs(problem.d3_right[own])) / jerk_limit
+    with np.errstate(divide="ignore"):
+        by_acceleration = NORMAL_SHARE / curve.max(axis=1)
+        by_jerk = (JERK_SHARE / slope.max(axis=1)) ** (2 / 3)
+        rate = ACCELERATION_SHARE / (np.abs(problem.d1[own]) / acceleration).max(axis=1)
+        jerk = JERK_SHARE / (np.abs(problem.d1[own]) / jerk_limit).max(axis=1)
+    caps = np.minimum(CAP_SHARE * problem.feed_sq_limit[own], np.minimum(by_acceleration, by_jerk))
+    caps[0] = caps[-1] = 0.0
+    x = _growing(
+        _growing(caps, rate, jerk, np.diff(problem.s[own]), 1), rate, jerk, np.diff(problem.s[own]), -1
+    )
+    x = np.maximum(x, FEED_SQ_MIN * x.max())
+    x[0] = x[-1] = 0.0
+    return x
+
+
+def envelope_profile(x: FloatArray, ds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over n >= 4 intervals ds, in any units: harmonic means of
+    the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals grow), and constant
+    jerk on the first and the last interval, with no more of it than the next interval can take back."""
+    x, u = x.copy(), np.zeros(len(x))
+    for at, beside, first, second in ((1, 2, ds[0], ds[1]), (-2, -3, ds[-1], ds[-2])):
+        x[at] = min(x[at], x[beside] * 1.5 * first / (1.5 * first + second))
+    rate = np.diff(x) / (2.0 * ds)
+    before, after = rate[:-1], rate[1:]
+    u[1:-1] = np.divide(2.0 * before * after, before + after, out=u[1:-1], where=before * after > 0.0)
+    u[1], u[-2] = x[1] / (1.5 * ds[0]), -x[-2] / (1.5 * ds[-1])
+    return x, u
+
+
+def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Feed^2 and acceleration (n + 1,) over the points s of a piece with n >= 4 intervals, in units with fastest speed 1."""
+    n = len(s) - 1
+    x, u = np.zeros(n + 1), np.zeros(n + 1)
+    tops = []
+    for ds, last in ((np.diff(s), n // 2), (np.diff(s)[::-1], n - n // 2)):
+        quarter = int(np.searchsorted(np.cumsum(ds), PLAIN_SHARE * (s[-1] - s[0])))
+        i = min(max(quarter, 1), last - 1)  # transition on the interval after point i
+        rising = 1.5 * ds[0] + 2.0 * np.concatenate(
+            [[0.0], np.cumsum(ds[1:i])]
+        )  # x at points 1..i of unit acceleration
+        v = np.sqrt(rising[-1])
+        top = (
+            v + 0.75 * (np.sqrt(v * v + 4.0 * ds[i] / 3.0) - v)
+        ) ** 2  # with jerk -1/h for the time h of that interval
+        tops.append((i, rising / top, top))
+    (i, rising, top), (k, falling, end_top) = tops
+    x[1:-1] = 1.0
+    x[1 : i + 1], u[1 : i + 1] = rising, 1.0 / top
+    x[n - k : n], u[n - k : n] = falling[::-1], -1.0 / end_top
+    return x, u
+
+
+@njit(cache=True, error_model="numpy")
+def _growing(caps, rate, jerk, ds, way):
+    """The largest x (N+1,) below the caps that grows, forward (way 1) or backward (-1), with no more than a jerk from u = 0 up to an
+    acceleration: from every dip like a motion that starts there."""
+    n = len(ds)
+    x = caps.copy()
+    i, u = (0, 0.0) if way > 0 else (n, 0.0)
+    for _ in range(n):
+        step = ds[i] if way > 0 else ds[i - 1]
+        j, a = min(jerk[i], jerk[i + way]), min(rate[i], rate[i + way])
+        v = np.sqrt(x[i])
+        # v h + u h^2/2 + j h^3/6 = step; each term alone bounds h, Newton's steps go down from there
+        h = np.cbrt(6.0 * step / j)
+        if v * h > step:
+            h = step / v
+        for _newton in range(NEWTON_STEPS):
+            h -= (h * (v + h * (u / 2.0 + h * j / 6.0)) - step) / (v + h * (u + h * j / 2.0))
+        grown = min((v + h * (u + h * j / 2.0)) ** 2, x[i] + 2.0 * a * step)
+        if grown < x[i + way]:
+            x[i + way] = grown
+            u = min(u + j * h, a)
+        else:
+            u = min(max((x[i + way] - x[i]) / (2.0 * step), 0.0), u + j * h, a)
+        i += way
+    return x

@@ -1,0 +1,202 @@
+"""One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point kernel, to its result.
+
+A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the envelope tracked by a motion,
+where that is found, then from the envelope itself, whose kinematics are not exact, and from rest then from the plain start
+(start.py): as fast as the envelope, and so slow that it keeps all limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk import interior_point as kernel
+from planner.feedrate.jerk.rows import Grid, empty_model, linearise
+from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
+
+START_ROOM = 0.9  # a start keeps every limit times this [-] ...
+SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
+TRACKING_ROUNDS = 20  # at most, of a start; 2 to 6 are the rule
+POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
+POLISHED = 1e-14  # defect, share of the largest feed [-]
+GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
+RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
+DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
+JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
+
+_Profile = tuple[FloatArray, FloatArray, FloatArray]  # x, u (N+1,), p (N,) of rows.py
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Window:
+    """The profile of a window in the problem's units; rows (N, A, 4), feed (N, 2) and dynamics (N,) as in `Multipliers`."""
+
+    x: FloatArray
+    u: FloatArray
+    jerk: FloatArray
+    duration: FloatArray
+    rows: FloatArray
+    feed: FloatArray
+    dynamics: FloatArray
+
+    def after(self, point: int) -> Window:
+        """The part from a point on."""
+        own = slice(point, None)
+        return replace(
+            self,
+            x=self.x[own],
+            u=self.u[own],
+            jerk=self.jerk[own],
+            duration=self.duration[own],
+            rows=self.rows[own],
+            feed=self.feed[own],
+            dynamics=self.dynamics[own],
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScaledWindow:
+    """A window's problem in units of its own: fastest feed 1, largest acceleration 1; `asked` is its envelope (start.py)."""
+
+    grid: Grid
+    jumps: int
+    asked: FloatArray
+    feed: float
+    time: float
+
+    @classmethod
+    def of(cls, problem: FeedrateProblem, acceleration: FloatArray, begin: int, end: int) -> ScaledWindow:
+        """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
+        own = slice(begin, end + 1)
+        feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
+        t = float(feed / problem.acceleration.max())
+        length = feed * t
+        grid = Grid(
+            ds=np.diff(problem.s[own]) / length,
+            x_max=problem.feed_sq_limit[own] / feed**2,
+            d1=problem.d1[own],
+            d2_left=problem.d2_left[own] * length,
+            d2_right=problem.d2_right[own] * length,
+            d3_left=problem.d3_left[own] * length**2,
+            d3_right=problem.d3_right[own] * length**2,
+            per_acceleration=feed / t / acceleration[own],
+            per_jerk=feed / (t * t) / problem.jerk_limit[own],
+        )
+        return cls(
+            grid=grid,
+            jumps=_jumps(grid),
+            asked=envelope(problem, begin, end) / feed**2,
+            feed=feed,
+            time=t,
+        )
+
+    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int]:
+        """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
+        Also the iterations of the longest try."""
+        most = 0
+        for x, u, p in self._starts(behind):
+            done, gap, residual, defect, lam, pi = kernel.minimise(
+                self.grid, x, u, p, self.jumps, tol, iterations
+            )
+            most = max(most, done)
+            if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
+                kernel.track(self.grid, self._jerk, x, u, p, 0.0, POLISHING_ROUNDS, POLISHED)
+                return self._window(x, u, p, lam, pi), most
+        return None, most
+
+    def plain(self) -> Window:
+        """The plain start as a profile from rest: feasible, and slow."""
+        x, u, p = self._slowed(*self._plain(1.0))
+        n = len(p)
+        return self._window(x, u, p, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+
+    def _starts(self, behind: Window | None) -> Iterator[_Profile]:
+        """Profiles to start from, the best first."""
+        for start in self._from_rest():
+            if behind is None:
+                yield start
+            else:
+                joined = self._joined(behind, *start)
+                yield self._tracked(*joined) or joined
+
+    def _from_rest(self) -> Iterator[_Profile]:
+        """The same from rest."""
+        asked, rate = envelope_profile(self.asked, self.grid.ds)
+        near = asked, rate, np.diff(rate)
+        tracked = self._tracked(*near)
+        if tracked is not None:
+            yield self._slowed(*tracked, SLOWER_MAX)
+        yield self._slowed(*near, SLOWER_MAX)
+        yield self._slowed(*self._plain(asked.max()), SLOWER_MAX)
+        yield self._slowed(*self._plain(1.0))
+
+    def _joined(self, behind: Window, x: FloatArray, u: FloatArray, p: FloatArray) -> _Profile:
+        """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
+        ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
+        beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
+        x, u = np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
+        return x, u, np.diff(u)
+
+    def _tracked(self, x: FloatArray, u: FloatArray, p: FloatArray) -> _Profile | None:
+        """A profile near to the given one with exact kinematics; None where that is not found."""
+        x, u, p = x.copy(), u.copy(), p.copy()
+        defect = kernel.track(self.grid, self._jerk, x, u, p, 1.0, TRACKING_ROUNDS, kernel.DEFECT)
+        return (x, u, p) if defect <= kernel.DEFECT else None
+
+    def _plain(self, fastest: float) -> _Profile:
+        """The plain start with a largest feed^2, whatever its limits."""
+        x, u = plain_start(np.concatenate([[0.0], np.cumsum(self.grid.ds)]))
+        return fastest * x, fastest * u, fastest * np.diff(u)
+
+    @property
+    def _jerk(self) -> float:
+        """Of the slowest axis."""
+        return float(1.0 / self.grid.per_jerk.max())
+
+    @property
+    def _rows(self) -> int:
+        """Rows per interval."""
+        return (3 + self.jumps) * self.grid.d1.shape[1] + 2
+
+    def _slowed(self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf) -> _Profile:
+        """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
+        n, axes = len(p), self.grid.d1.shape[1]
+        model, h = empty_model(n, self._rows), np.empty(n)
+        lam = np.zeros((n, 2 * self._rows - 2))
+        linearise(self.grid, x, u, p, h, lam, np.zeros(n), model, self.jumps)
+        worst = np.abs(model.values).max(axis=0)
+        jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
+        worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
+        slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
+        return x / slower**2, u / slower**2, p / slower**2
+
+    def _window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray, pi: FloatArray) -> Window:
+        """A profile in the problem's units, with the multipliers of its rows and dynamics."""
+        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
+        h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
+        feed, t, lower = self.feed, self.time, self._rows - 2
+        rows = np.zeros((len(p), self.grid.d1.shape[1], 4))
+        rows[:, :, : 3 + self.jumps] = (lam[:, :lower] - lam[:, self._rows :]).reshape(
+            len(p), -1, 3 + self.jumps
+        )
+        of_feed = lam[:, lower : self._rows].copy()
+        of_feed[[0, -1], 1] = 0.0  # these limit the kinematics, not the feed
+        return Window(
+            x=x * feed**2,
+            u=u * feed / t,
+            jerk=p / h * feed / t**2,
+            duration=h * t,
+            rows=rows * t,
+            feed=of_feed * t,
+            dynamics=pi * t / feed**2,
+        )
+
+
+def _jumps(grid: Grid) -> int:
+    """1 if r'' jumps by more than rounding at an inner point."""
+    left, right = grid.d2_left[1:-1], grid.d2_right[1:-1]
+    return int((np.abs(left - right).max(axis=1) > JUMP_ROUNDING * np.abs(right).max(axis=1)).any())

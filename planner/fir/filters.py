@@ -1,0 +1,215 @@
+"""FIR filters: moving averages in series, what they make of a velocity pulse, and how long they should be (paper 000, eq. 1-10).
+
+A moving average of length T has unit area; n of them in series have the kernel h = m_1 * ... * m_n on [0, Td], Td = sum T_i.
+With S = integral of h and R = integral of S (step and ramp response), a pulse of length L and speed V, Tv = L/V, that starts at
+t = 0 leaves the filters as the velocity
+
+    V [S(t) - S(t - Tv)]                                                            for every Tv > 0     (eq. 5 holds for Tv >= Td)
+
+All three are piecewise polynomials; with the sums T_s of all subsets s of the lengths, and m = 1, 2, 3 for h, S, R,
+
+    (1 / (T_1 ... T_n)) sum_s (-1)^|s| (t - T_s)_+^(n + m - 2) / (n + m - 2)!
+
+used up to the middle, where little cancels, and mirrored beyond: h(t) = h(Td - t), S(t) + S(Td - t) = 1,
+R(t) = t - Td/2 + R(Td - t). Delay of the mean Td/2, variance sum T_i^2 / 12.
+
+In the frequency domain |M(w)| = prod |sin(w T_i / 2) / (w T_i / 2)| (eq. 8, 9: with absolute values, or the product would be
+negative where an odd number of factors is). The acceleration of a full move of speed V is V [delta(t) - delta(t - Tv)] before the
+filters, a Dirac impulse at each end (eq. 6), of spectrum V |1 - exp(-i w Tv)| |M(w)| after them.
+
+M is zero at w_r for T = k 2 pi / w_r (eq. 10). A mode with damping ratio z rings at w_d = w_r sqrt(1 - z^2); what then remains of it
+is |M| at its pole -z w_r + i w_d, about z for small z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import factorial
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+
+# Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this share of a period [-].
+PERIOD_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Filters:
+    """Moving averages of the given lengths [s] in series."""
+
+    times: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.times or not all(0 < T < np.inf for T in self.times):
+            raise InputError(
+                f"filters of {', '.join(f'{T:g}' for T in self.times) or 'no'} s; give one or more, positive and finite"
+            )
+
+    @property
+    def delay(self) -> float:
+        """Td: how long the output goes on after the input [s]; its mean is delayed by half of it."""
+        return sum(self.times)
+
+    @property
+    def variance(self) -> float:
+        """Variance of the kernel [s2]."""
+        return sum(T * T for T in self.times) / 12.0
+
+    def kernel(self, t: FloatArray) -> FloatArray:
+        """h(t) [1/s]."""
+        return self._response(t, 0)
+
+    def step(self, t: FloatArray) -> FloatArray:
+        """S(t), the answer to a unit step [-]."""
+        return self._response(t, 1)
+
+    def ramp(self, t: FloatArray) -> FloatArray:
+        """R(t), the integral of S [s]."""
+        return self._response(t, 2)
+
+    def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
+        """Velocity at t [mm/s] of a pulse of `speed` [mm/s] and any `duration` Tv [s] that starts at 0."""
+        t = np.asarray(t, float)
+        return speed * (self.step(t) - self.step(t - duration))
+
+    def taps(self, dt: float) -> FloatArray:
+        """The discrete kernel at the period dt [s], of unit sum; each length in whole periods, one at least.
+
+        Its variance is dt^2 (sum N_i^2 - n) / 12.
+        """
+        taps = np.ones(1)
+        for T in self.times:
+            count = max(1, round(T / dt))
+            taps = np.convolve(taps, np.full(count, 1.0 / count))
+        return taps
+
+    def magnitude(self, w: FloatArray) -> FloatArray:
+        """|M| at the frequencies w [rad/s]: prod |sinc| (eq. 8, 9)."""
+        return np.prod([np.abs(np.sinc(np.asarray(w) * T / (2.0 * np.pi))) for T in self.times], axis=0)
+
+    def residue(self, frequency: float, damping: float) -> float:
+        """Share of its vibration that a mode of `frequency` [Hz] and `damping` ratio keeps: |M| at its pole [-]."""
+        w = 2.0 * np.pi * frequency
+        pole = w * (-damping + 1j * np.sqrt(1.0 - damping**2))
+        return float(np.prod([np.abs((1.0 - np.exp(-pole * T)) / (pole * T)) for T in self.times]))
+
+    def move_spectrum(self, w: FloatArray, speed: float, duration: float) -> FloatArray:
+        """|A| [mm/s] of the acceleration of a full move, a pulse of `speed` [mm/s] and `duration` [s], at w [rad/s]."""
+        return speed * np.abs(1.0 - np.exp(-1j * np.asarray(w) * duration)) * self.magnitude(w)
+
+    def _response(self, t: FloatArray, integrals: int) -> FloatArray:
+        t = np.asarray(t, float)
+        early = np.clip(np.minimum(t, self.delay - t), 0.0, None)
+        power = len(self.times) + integrals - 1
+        total = np.zeros_like(early)
+        for size in range(len(self.times) + 1):
+            for chosen in combinations(self.times, size):
+                reach = early - sum(chosen)
+                total += (-1) ** size * np.where(reach >= 0, reach, 0.0) ** power * (reach >= 0)
+        total /= factorial(power) * np.prod(self.times)
+        inside = (t >= 0) & (t <= self.delay)
+        late = t > self.delay / 2
+        if integrals == 0:
+            return np.where(inside, total, 0.0)
+        if integrals == 1:
+            return np.where(late, 1.0 - total, total)
+        return np.where(late, t - self.delay / 2 + total, total)
+
+
+def lengths_from_limits(
+    V: FloatArray, A: FloatArray, J: FloatArray, margin: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """T1 = V/A and T2 = margin A/J [s] (paper 001 par. 19), or both sqrt(margin V/J) where V is too small to reach A.
+
+    V, A, J : speed, acceleration and jerk along a line [mm/s, mm/s2, mm/s3]
+    margin  : 1 is enough for a pulse that is no shorter than Td; an isolated corner needs `corner_margin`, chains of pulses 2 to 4
+    """
+    T1, T2 = np.asarray(V / A), np.asarray(margin * A / J)
+    equal = np.sqrt(T1 * T2)
+    return np.where(T1 >= T2, T1, equal), np.where(T1 >= T2, T2, equal)
+
+
+def corner_margin(u1: FloatArray, u2: FloatArray, overlap: FloatArray, T1: float, T2: float) -> FloatArray:
+    """Factor on T2 = A/J that keeps the axis jerks of an isolated corner within J: largest of 1, max_k |u1k + u2k| for an overlap
+    Tk < 2 T2, and max_k |u2k - u1k| for Tk > T1 (docs/papers.md, peaks inside the corner). u1, u2 (n, A), overlap (n,) [s]."""
+    plus, minus = np.abs(u1 + u2).max(axis=-1), np.abs(u2 - u1).max(axis=-1)
+    partial = (overlap > 0) & (overlap < 2.0 * T2)
+    return np.maximum(1.0, np.maximum(np.where(partial, plus, 0.0), np.where(overlap > T1, minus, 0.0)))
+
+
+def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """T1 >= T2 lengthened to whole multiples of the periods [s] of one or two modes (eq. 10), at the least sum of both.
+
+    With one mode one filter is made a multiple of its period, the other stays as it is.
+    """
+    if len(periods) == 1:
+        one = (_multiple(T1, periods[0]), T2), (T1, _multiple(T2, periods[0]))
+    elif len(periods) == 2:
+        one = (
+            (_multiple(T1, periods[0]), _multiple(T2, periods[1])),
+            (_multiple(T1, periods[1]), _multiple(T2, periods[0])),
+        )
+    else:
+        raise ValueError(f"{len(periods)} periods; two filters suppress one or two modes")
+    (a1, a2), (b1, b2) = one
+    first = a1 + a2 <= b1 + b2
+    x, y = np.where(first, a1, b1), np.where(first, a2, b2)
+    return np.maximum(x, y), np.minimum(x, y)
+
+
+def damped_period(frequency: float, damping: float) -> float:
+    """Period 2 pi / w_d [s] of a mode's free vibration; `frequency` [Hz] without damping."""
+    return 1.0 / (frequency * float(np.sqrt(1.0 - damping**2)))
+
+
+def _multiple(T: FloatArray, period: float) -> FloatArray:
+    return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
+
+
+def acceleration_spectrum(t: FloatArray, acceleration: FloatArray, w: FloatArray) -> FloatArray:
+    """|integral of a(t) exp(-i w t) dt| (len(w), A) [mm/s] of samples (T, A) at times t (T,), straight between the samples.
+
+    w : frequencies [rad/s]
+    """
+    h, slope = np.diff(t)[:, None], np.diff(acceleration, axis=0) / np.diff(t)[:, None]
+    out = np.empty((len(w), acceleration.shape[1]))
+    for n, wn in enumerate(np.asarray(w, float)):
+        z = 1j * wn * h
+        # integral over one period, in (a0 + slope tau): phi1 = int exp(-z x), phi2 = int x exp(-z x) over [0, 1]
+        small = np.abs(z) < 1e-3  # below, the closed forms cancel; the series are good to 1e-13
+        safe = np.where(small, 1.0, z)
+        phi1 = np.where(small, 1 - z / 2 + z**2 / 6 - z**3 / 24, (1 - np.exp(-safe)) / safe)
+        phi2 = np.where(small, 0.5 - z / 3 + z**2 / 8 - z**3 / 30, (1 - (1 + safe) * np.exp(-safe)) / safe**2)
+        parts = np.exp(-1j * wn * t[:-1])[:, None] * h * (acceleration[:-1] * phi1 + slope * h * phi2)
+        out[n] = np.abs(parts.sum(axis=0))
+    return out
+
+
+def residual_vibration(
+    t: FloatArray, acceleration: FloatArray, frequency: float, damping: float
+) -> FloatArray:
+    """Amplitude (A,) [mm] at which a mode still rings when the motion is over.
+
+    Each axis carries an oscillator x'' + 2 z w x' + w^2 x = -a(t), at rest before; a is straight between its samples (T, A) at
+    times t (T,). By Duhamel's integral the state at the end is that of the pole, and its envelope |pole integral| / w_d.
+
+    frequency : of the undamped mode [Hz];  damping : ratio z, 0 <= z < 1
+    """
+    w = 2.0 * np.pi * frequency
+    damped = w * np.sqrt(1.0 - damping**2)
+    pole = -damping * w + 1j * damped
+    h = np.diff(t)[:, None]
+    z = pole * h
+    small = np.abs(z) < 1e-3
+    safe = np.where(small, 1.0, z)
+    grow = np.exp(z)
+    # integrals of exp(z (1 - x)) and x exp(z (1 - x)) over [0, 1]
+    phi1 = np.where(small, 1 + z / 2 + z**2 / 6 + z**3 / 24, (grow - 1) / safe)
+    phi2 = np.where(small, 0.5 + z / 6 + z**2 / 24 + z**3 / 120, (grow - 1 - safe) / safe**2)
+    rise = np.diff(acceleration, axis=0)
+    parts = h * (acceleration[:-1] * phi1 + rise * phi2)
+    after: Array = np.exp(pole * (t[-1] - t[1:]))[:, None]
+    return np.abs((after * parts).sum(axis=0)) / damped

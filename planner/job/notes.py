@@ -1,0 +1,54 @@
+"""What a plan assumed and what it gave up, in short sentences, each with its first place and how often.
+
+The reader's notes (`Program.notes`) come first, then what machine and tolerance make of the program, then what the method says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.units import SECONDS_PER_MINUTE
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.nc.program import Program
+
+# A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is rounded by more has
+# little left of its shape.
+TOLERANCE_OF_PART = 0.02
+
+
+def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
+    """What the reader assumed, feeds that the machine lowers, and a tolerance that is large beside the part."""
+    return [*program.notes, *_feed_notes(program, machine), *_tolerance_notes(toolpath)]
+
+
+def _feed_notes(program: Program, machine: Machine) -> list[str]:
+    if machine.feed_max is None:
+        return []
+    above = np.flatnonzero(np.isfinite(program.feed) & (program.feed > machine.feed_max))
+    if not len(above):
+        return []
+    highest = float(program.feed[above].max()) * SECONDS_PER_MINUTE
+    return [
+        f"line {program.line[above[0]]}: F above the machine's feed_max is planned at "
+        f"{machine.feed_max * SECONDS_PER_MINUTE:g} mm/min ({len(above):,} blocks, up to F{highest:g})"
+    ]
+
+
+def _tolerance_notes(toolpath: Toolpath) -> list[str]:
+    if not len(toolpath):
+        return []
+    moved = ~toolpath.rapid if not toolpath.rapid.all() else np.ones(len(toolpath), bool)
+    arc = toolpath.arc[moved & (toolpath.arc >= 0)]
+    points = np.vstack([toolpath.start[moved], toolpath.end[moved]])
+    swept = np.minimum(2.0 * toolpath.arcs.radius[arc], toolpath.length[moved & (toolpath.arc >= 0)])
+    part = float(max(np.ptp(points, axis=0).max(), swept.max(initial=0.0)))
+    joint = int(toolpath.tolerance.argmax())
+    tolerance = float(toolpath.tolerance[joint])
+    if tolerance <= TOLERANCE_OF_PART * part:
+        return []
+    line = int(toolpath.line[max(joint - 1, 0)])
+    return [
+        f"line {line}: the tolerance of {tolerance:g} mm is {tolerance / part:.3g} times the part's largest extent, {part:.4g} mm: "
+        "little may be left of its shape"
+    ]

@@ -1,0 +1,131 @@
+"""What a plan is told in, whatever the method: tables of corners, the profile on the grid, prices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+
+SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CornerTable:
+    """One row per blended corner, in the order of the path.
+
+    line             : (C,) source line of the block that ends there
+    theta            : (C,) turning angle [rad]
+    d_in, d_out      : (C,) tangent lengths before and after the vertex [mm]
+    tol_ap           : (C,) budget used by the rounding, eps_ap [mm]
+    kappa_max        : (C,) curvature at the apex [1/mm]
+    feed_closed_form : (C,) error-allocation speed [mm/s]
+    feed_planned     : (C,) planned speed at the apex [mm/s]
+    limited_by       : (C,) name of the constraint that is closest to its limit there
+    """
+
+    line: Array
+    theta: FloatArray
+    d_in: FloatArray
+    d_out: FloatArray
+    tol_ap: FloatArray
+    kappa_max: FloatArray
+    feed_closed_form: FloatArray
+    feed_planned: FloatArray
+    limited_by: Array
+
+    def __post_init__(self) -> None:
+        corners = len(self.line)
+        freeze(self, "line", np.int32, (corners,))
+        for name in ("theta", "d_in", "d_out", "tol_ap", "kappa_max", "feed_closed_form", "feed_planned"):
+            freeze(self, name, np.float64, (corners,))
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def worst_ratio(self) -> float:
+        """Largest planned over closed-form speed; 0 without corners."""
+        return float((self.feed_planned / self.feed_closed_form).max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GridHistory:
+    """The profile at the solver's grid points, and which limit holds it there (sensitivity/activity.py).
+
+    t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
+    active       : (P,) index in `active_names` of what holds the interval to the right of each point
+    active_names : limits, then "none" and "rest"
+    share        : of the cycle time that each of them holds [-]; they add up to 1
+    """
+
+    t: FloatArray
+    s: FloatArray
+    feed: FloatArray
+    active: Array
+    active_names: tuple[str, ...]
+    share: FloatArray
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """What holds any time, with its share: limits, the largest first, then "none" and "rest"."""
+        limits, others = (
+            np.flatnonzero(self.share[:-2]),
+            len(self.share) - 2 + np.flatnonzero(self.share[-2:]),
+        )
+        order = [*limits[np.argsort(-self.share[limits], kind="stable")], *others]
+        return [(self.active_names[k], float(self.share[k])) for k in order]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DearCorners:
+    """The corners where more tolerance saves most, the dearest first.
+
+    line     : (C,) source line of the block that ends there
+    position : (C, A) vertex [mm]
+    theta    : (C,) turning angle [rad]
+    price    : (C,) dT/d(tolerance at that corner alone) [s/mm]
+    saved    : (C,) by `MORE_TOLERANCE` there [s]
+    """
+
+    line: Array
+    position: FloatArray
+    theta: FloatArray
+    price: FloatArray
+    saved: FloatArray
+
+    def __post_init__(self) -> None:
+        corners = len(self.line)
+        freeze(self, "line", np.int32, (corners,))
+        freeze(self, "position", np.float64, (corners, None))
+        for name in ("theta", "price", "saved"):
+            freeze(self, name, np.float64, (corners,))
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PriceList:
+    """Derivatives of the cycle time T [s]; negative where more saves time.
+
+    limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]
+    feed      : dT/d(ln feed override) [s]
+    tolerance : dT/d(tolerance) [s/mm]; None where it is not known: on splines that nothing priced
+    saved     : by `MORE_LIMIT` more of each axis limit and of the "feed", by `MORE_TOLERANCE` more "tolerance" if known [s]
+    ranges    : least and most that this may be in a plan made again [s]
+    hints     : what is told by its range only: `saved`, its middle, is no more than a hint
+    corners   : the dearest ones; None where they are not known
+    """
+
+    limits: dict[str, float]
+    feed: float
+    tolerance: float | None
+    saved: dict[str, float]
+    corners: DearCorners | None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    hints: tuple[str, ...] = ()
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """What saves time, with the time saved by `MORE_LIMIT` or `MORE_TOLERANCE` more of it [s]; the most valuable first."""
+        worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
+        return sorted(worth, key=lambda entry: -entry[1])

@@ -1,0 +1,145 @@
+"""Corners at constant speed: how fast each may be, and the chain of stretches that a smooth path is with them.
+
+At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k v^2 and the jerk r'''_k v^3, so that over a corner
+
+    v <= v_k / max |r'_k|,   v <= (a_k / max |r''_k|)^(1/2),   v <= (j_k / max |r'''_k|)^(1/3)         for every axis k,
+
+besides the bounds on kappa v^2 of eq. (18)-(20), the chord error and the programmed feed (constraints/assemble.py). The maxima of
+r'' and r''' are taken from five samples per grid interval; with the samples g_i of one component a smooth function exceeds them by
+at most max |g_{i-1} - 2 g_i + g_{i+1}| / 8 but for terms of fourth order, which is added.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.constraints.assemble import feedrate_problem
+from planner.corners.allocation import filter_rate
+from planner.corners.elements import element_point, to_arc_length
+from planner.geometry.toolpath import Toolpath
+from planner.lookahead.rest_to_rest import block_limits
+from planner.lookahead.stretches import Stretches
+from planner.machine import Machine
+from planner.path.samples import PathSamples
+
+PARTS = 4  # of a grid interval, for its samples
+# Limits along blocks that differ by less than this share are the same [-]: coordinates rounded to 1e-9 of a block's length.
+SAME = 1e-9
+QUANTITIES = ("acceleration", "jerk")
+
+
+class CornerSpeeds(NamedTuple):
+    """The largest constant speed in each of R+1 joints' corners.
+
+    speed      : (R+1,) [mm/s]; inf where there is no corner
+    limited_by : (R+1,) name of the limit
+    """
+
+    speed: FloatArray
+    limited_by: Array
+
+
+def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
+    """The largest speed at which each corner of a path can be run through from end to end."""
+    axes = samples.path.toolpath.axes
+    limits = np.array([machine.limits("acceleration", axes), machine.limits("jerk", axes)])
+    problem = feedrate_problem(samples, machine)
+    interval = samples.intervals
+    at = interval[samples.element[interval] < 0]
+    joint = ~samples.element[at]
+    bends = np.zeros((len(at), 2))
+    which = np.zeros((len(at), 2), np.int64)
+    _bends(*samples.table, samples.element[at], samples.w0[at], samples.w1[at], limits, bends, which)
+    ends = np.where(problem.feed_sq_max[at] <= problem.feed_sq_max[at + 1], at, at + 1)
+    with np.errstate(divide="ignore"):
+        bounds = np.stack(
+            [np.sqrt(problem.feed_sq_max[ends]), bends[:, 0] ** -0.5, bends[:, 1] ** (-1.0 / 3.0)]
+        )
+    names = np.array(problem.bound_names + tuple(f"{q}.{axis}" for q in QUANTITIES for axis in axes))
+    first = len(problem.bound_names)
+    name = np.stack([problem.feed_sq_bound[ends], first + which[:, 0], first + len(axes) + which[:, 1]])
+    tightest = bounds.argmin(axis=0)
+    bound, name = (np.take_along_axis(rows, tightest[None], axis=0)[0] for rows in (bounds, name))
+
+    speed, limited_by = np.full(len(samples.path.d), np.inf), np.zeros(len(samples.path.d), np.int64)
+    np.minimum.at(speed, joint, bound)
+    lowest = bound == speed[joint]
+    limited_by[joint[lowest]] = name[lowest]
+    return CornerSpeeds(speed, names[limited_by])
+
+
+def stretches_of(
+    samples: PathSamples, machine: Machine, corner_speed: FloatArray
+) -> tuple[Stretches, FloatArray]:
+    """The chain of stretches of a sampled path, and where (M,) each begins [mm].
+
+    corner_speed : (R+1,) largest speed of each joint's corner [mm/s]
+
+    Raises ValueError if two corners, or a corner and a full stop, leave nothing of the leg between them free.
+    """
+    path, at = samples.path, samples.intervals
+    element = samples.element[at]
+    run = np.searchsorted(samples.piece, at, side="right") - 1
+    joint = np.where(element < 0, ~element, -1)
+    limits = _block_limits(path.toolpath, machine)[:, samples.segment[at]]
+    # Where a line is cut into blocks must not part it, and the directions of its blocks differ by rounding.
+    other = (np.abs(np.diff(limits)) > SAME * limits[:, 1:]).any(axis=0) & (joint[1:] < 0)
+    change = (np.diff(run) != 0) | (np.diff(joint) != 0) | other
+    first = np.insert(np.flatnonzero(change) + 1, 0, 0)
+    joint, run, (v, a, j) = joint[first], run[first], np.minimum.reduceat(limits, first, axis=1)
+    begin = samples.s[at[first]]
+    corner = joint >= 0
+    bare = (corner[:-1] & corner[1:]) | ((np.diff(run) != 0) & (corner[:-1] | corner[1:]))
+    if bare.any() or corner[0] or corner[-1]:
+        raise ValueError("stretches_of: corners must leave a part of every leg free")
+    return Stretches(
+        run=run,
+        joint=joint,
+        length=samples.s[at[np.append(first[1:], len(at)) - 1] + 1] - begin,
+        v=np.where(corner, corner_speed[joint], v),
+        a=a,
+        j=j,
+        d_in=np.where(corner, path.d_in[joint], 0.0),
+        d_out=np.where(corner, path.d_out[joint], 0.0),
+    ), begin
+
+
+def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
+    """Limits v, a, j (3, M) along every segment; a is at most the tolerance over the rate at which filters err: a full stop is rounded
+    by them."""
+    v, a, j = block_limits(toolpath, machine)
+    if machine.fir is not None:
+        a = np.minimum(a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_rate(machine))
+    return np.stack([v, a, j])
+
+
+@njit(cache=True, error_model="numpy")
+def _bends(legs, corners, spans, element, w0, w1, limits, bends, which):
+    """max_k |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and the axes k into which (n, 2)."""
+    axes = limits.shape[1]
+    work, here = np.empty((2, 4, axes)), np.empty((4, axes))
+    values = np.empty((2, axes, PARTS + 1))
+    for i in range(len(element)):
+        w_ref = 0.5 * (w0[i] + w1[i])
+        for p in range(PARTS + 1):
+            element_point(
+                legs, corners, spans, element[i], w0[i] + (w1[i] - w0[i]) * p / PARTS, w_ref, work, here
+            )
+            to_arc_length(here)
+            for k in range(axes):
+                values[0, k, p], values[1, k, p] = here[2, k], here[3, k]
+        for q in range(2):
+            for k in range(axes):
+                g = values[q, k]
+                largest, second = 0.0, 0.0
+                for p in range(PARTS + 1):
+                    largest = max(largest, abs(g[p]))
+                    if 0 < p < PARTS:
+                        second = max(second, abs(g[p - 1] - 2.0 * g[p] + g[p + 1]))
+                ratio = (largest + second / 8.0) / limits[q, k]
+                if ratio > bends[i, q]:
+                    bends[i, q], which[i, q] = ratio, k

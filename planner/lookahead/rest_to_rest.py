@@ -1,0 +1,105 @@
+"""From rest to rest along one block: the point-to-point reference of the papers.
+
+Along a block of length L with limits v, a, j on speed, acceleration and jerk along the path, the fastest move is symmetric:
+
+    peak speed p = min(v, p_L),   p_L from   p^2/a + p a/j = L   (a is reached),   or   (j L^2 / 4)^(1/3)   (it is not: p_L < a^2/j)
+    T = L/p + p/a + a/j   for p >= a^2/j,      L/p + 2 sqrt(p/j)   below.
+
+`rest_to_rest_times` is this closed form, for a whole program at once; `rest_to_rest_phases` asks ruckig for the motion itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import NotSolvedError
+from planner.corners.allocation import error_rate
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+
+AT_REST = 1e-12  # an axis with a smaller share of the direction does not limit; below the rounding of unit vectors [-]
+PHASES = 7  # a jerk-limited move from rest to rest
+
+
+def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> FloatArray:
+    """Shortest times (n,) [s] from rest to rest over `length` (n,) [mm] with limits v, a, j (n,)."""
+    threshold = a**2 / j  # the speed at which a trapezoid of acceleration becomes a triangle
+    without = np.cbrt(j * length**2 / 4)
+    with_plateau = (np.sqrt(threshold**2 + 4 * a * length) - threshold) / 2
+    peak = np.minimum(v, np.where(without < threshold, without, with_plateau))
+    return length / peak + np.where(peak < threshold, 2 * np.sqrt(peak / j), peak / a + a / j)
+
+
+def rest_to_rest_phases(
+    length: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+    j: FloatArray,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Durations [s] and jerks [mm/s3], each (n, 7), of the moves that ruckig makes of the same data.
+
+    Raises NotSolvedError if ruckig does not return a finished move.
+    """
+    import ruckig
+
+    solver = ruckig.Ruckig(1)
+    move = ruckig.InputParameter(1)
+    found = ruckig.Trajectory(1)
+    duration, jerk = np.empty((len(length), PHASES)), np.empty((len(length), PHASES))
+    for k in range(len(length)):
+        # In units of the block (length 1, jerk 1): ruckig's own epsilons are absolute and lose moves of a micrometre.
+        unit = (length[k] / j[k]) ** (1 / 3)
+        move.target_position = [1.0]
+        move.max_velocity = [v[k] * unit / length[k]]
+        move.max_acceleration = [a[k] * unit**2 / length[k]]
+        move.max_jerk = [1.0]
+        result = solver.calculate(move, found)
+        if result != ruckig.Result.Working:
+            raise NotSolvedError(
+                f"ruckig ended with {result.name} on a block of {length[k]:g} mm (v {v[k]:g}, a {a[k]:g}, j {j[k]:g}); "
+                "check the machine's limits for values many orders of magnitude apart"
+            )
+        profile = found.profiles[0][0]
+        duration[k], jerk[k] = profile.t, profile.j
+        duration[k] *= unit
+        jerk[k] *= j[k]
+        if progress is not None and k % 4096 == 0:
+            progress(k / len(length))
+    return duration, jerk
+
+
+def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Limits v, a, j (M,) along each segment such that every axis keeps its own, wherever on the segment.
+
+    On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest axis limit must hold
+    for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with
+    kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a/sqrt2 <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
+    (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well.
+    """
+    axes = toolpath.axes
+    direction = np.abs(toolpath.tangent_start)
+    v, a, j = (
+        (machine.limits(q, axes) / np.maximum(direction, AT_REST)).min(axis=1)
+        for q in ("velocity", "acceleration", "jerk")
+    )
+    curved = toolpath.arc >= 0
+    kappa = toolpath.curvature[curved]
+    v_all, a_all, j_all = (machine.limits(q, axes).min() for q in ("velocity", "acceleration", "jerk"))
+    half = np.sqrt(0.5)
+    budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
+    normal = np.minimum(half * a_all, np.minimum(budget, machine.normal_acceleration or np.inf))
+    v[curved] = np.min(
+        [
+            np.full(len(kappa), v_all),
+            np.sqrt(normal / kappa),
+            np.cbrt(half * j_all / (2 * kappa**2)),
+            j_all / (3 * kappa * a_all),
+        ],
+        axis=0,
+    )
+    a[curved], j[curved] = half * a_all, half * j_all / 2
+    return np.minimum(v, toolpath.feed), a, j

@@ -1,0 +1,211 @@
+"""A motion in time that is given axis by axis: pieces on which the jerk of every axis is constant.
+
+On the piece that begins at t_m, with tau = t - t_m, every axis follows
+
+    p + v tau + a tau^2/2 + j tau^3/6,
+
+so that position, velocity, acceleration and jerk are exact at any time. Its arc length is not given but measured,
+
+    s(t) = integral of |velocity|,
+
+by Gauss quadrature with steps that adapt: the speed is the root of a polynomial of degree 4, a polynomial itself on straight
+pieces. It has a kink where the motion turns back, hence steps end where an axis does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.kernels import njit
+from planner.base.search import last_not_after, nearest
+from planner.motion.trajectory import Trajectory
+
+# Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this share of it [-]; the better one is then good to rounding.
+QUADRATURE_ROUNDING = 1e-9
+# Smallest step of the quadrature [share of the piece]; near a kink it is worth its square of the piece's length.
+SMALLEST_STEP = 2.0**-30
+GAUSS_X, GAUSS_W = (
+    (1.0 + np.polynomial.legendre.leggauss(5)[0]) / 2.0,
+    np.polynomial.legendre.leggauss(5)[1] / 2.0,
+)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AxisMotion:
+    """L pieces of constant jerk over A axes; a standstill is a piece without velocity. After the last piece everything is at rest.
+
+    axes         : axis letters
+    t            : (L,) start of each piece [s], non-decreasing; the first is 0
+    position     : (L, A) there [mm]
+    velocity     : (L, A) just after t [mm/s]
+    acceleration : (L, A) just after t [mm/s2]
+    jerk         : (L, A) on the piece [mm/s3]
+    block        : (L,) index of the program's block
+    line         : (L,) source line of that block
+    end          : end of the last piece [s]
+    """
+
+    axes: tuple[str, ...]
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    block: Array
+    line: Array
+    end: float
+
+    def __post_init__(self) -> None:
+        pieces, axes = len(self.t), len(self.axes)
+        freeze(self, "t", np.float64, (pieces,))
+        for name in ("position", "velocity", "acceleration", "jerk"):
+            freeze(self, name, np.float64, (pieces, axes))
+        freeze(self, "block", np.int64, (pieces,))
+        freeze(self, "line", np.int32, (pieces,))
+        if not pieces or self.t[0] != 0.0:
+            raise ValueError("AxisMotion.t: the first piece must begin at 0 s")
+        if not (np.diff(self.t) >= 0).all() or not self.t[-1] <= self.end < np.inf:
+            raise ValueError("AxisMotion.t: pieces must follow one another, the last one ending at `end`")
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @cached_property
+    def s(self) -> FloatArray:
+        """(L+1,) arc length at the start of each piece, and at the end of the motion [mm]."""
+        s = np.empty(len(self) + 1)
+        _arc_lengths(np.append(self.t, self.end), self.velocity, self.acceleration, self.jerk, s)
+        return s
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
+        samples, axes = len(times), len(self.axes)
+        columns = np.empty((4, samples, axes))
+        s, feed, piece = np.empty(samples), np.empty(samples), np.empty(samples, np.int64)
+        _sample(
+            times,
+            self.t,
+            self.end,
+            self.position,
+            self.velocity,
+            self.acceleration,
+            self.jerk,
+            self.s,
+            columns,
+            s,
+            feed,
+            piece,
+        )
+        return Trajectory(
+            axes=self.axes,
+            dt=dt,
+            t=times,
+            position=columns[0],
+            velocity=columns[1],
+            acceleration=columns[2],
+            jerk=columns[3],
+            s=s,
+            feed=feed,
+            block=self.block[piece],
+            line=self.line[piece],
+        )
+
+    def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
+        """The motion standing longer by `by` (n,) [s] at the ends of its pieces nearest to the times `at` (n,) [s], where it rests."""
+        before = nearest(np.append(self.t, self.end), at)
+        place = self.at(self.t[before], 1.0).position  # a piece begins there
+        later = np.zeros(len(self) + 1)
+        np.add.at(later, before, by)
+        later = np.cumsum(later)[:-1]
+        rest = {name: np.zeros_like(place) for name in ("velocity", "acceleration", "jerk")}
+        columns = {
+            name: np.insert(getattr(self, name), before, row, axis=0)
+            for name, row in ({"position": place} | rest).items()
+        }
+        segment = np.maximum(before - 1, 0)
+        return AxisMotion(
+            axes=self.axes,
+            t=np.insert(self.t + later, before, (self.t + later)[before] - by),
+            block=np.insert(self.block, before, self.block[segment]),
+            line=np.insert(self.line, before, self.line[segment]),
+            end=self.end + float(by.sum()),
+            **columns,
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def _gauss(v, a, j, begin, h):
+    """Arc length over [begin, begin + h] of one piece with velocity v, acceleration a and jerk j (A,) at its start."""
+    total = 0.0
+    for n in range(len(GAUSS_X)):
+        tau, speed_sq = begin + h * GAUSS_X[n], 0.0
+        for k in range(len(v)):
+            speed_sq += (v[k] + tau * (a[k] + 0.5 * tau * j[k])) ** 2
+        total += GAUSS_W[n] * np.sqrt(speed_sq)
+    return h * total
+
+
+@njit(cache=True, error_model="numpy")
+def _next_reversal(v, a, j, begin, end):
+    """First time in (begin, end) at which an axis reverses, v + a t + j t^2/2 = 0; `end` if there is none."""
+    first = end
+    for k in range(len(v)):
+        under = a[k] * a[k] - 2.0 * j[k] * v[k]
+        if under < 0.0:
+            continue
+        q = -(a[k] + np.copysign(np.sqrt(under), a[k]))
+        for root in (q / j[k], 2.0 * v[k] / q):  # infinite or NaN where there is none
+            if begin < root < first:
+                first = root
+    return first
+
+
+@njit(cache=True, error_model="numpy")
+def _arc_length(v, a, j, tau):
+    """Arc length over [0, tau] of one piece."""
+    begin, length = 0.0, 0.0
+    while begin < tau:
+        turn = _next_reversal(v, a, j, begin, tau)  # kinks at the ends of a step do no harm
+        h = turn - begin
+        while begin < turn:
+            whole, half = _gauss(v, a, j, begin, h), 0.5 * h
+            halves = _gauss(v, a, j, begin, half) + _gauss(v, a, j, begin + half, half)
+            if abs(whole - halves) <= QUADRATURE_ROUNDING * halves or half <= SMALLEST_STEP * tau:
+                begin, length, h = begin + h, length + halves, 4.0 * h
+            h = min(0.5 * h, turn - begin)
+        begin = turn
+    return length
+
+
+@njit(cache=True, error_model="numpy")
+def _arc_lengths(t, velocity, acceleration, jerk, s):
+    """Arc length s (L+1,) [mm] at the times t (L+1,) between the pieces."""
+    s[0] = 0.0
+    for m in range(len(velocity)):
+        s[m + 1] = s[m] + _arc_length(velocity[m], acceleration[m], jerk[m], t[m + 1] - t[m])
+
+
+@njit(cache=True, error_model="numpy")
+def _sample(times, t, end, position, velocity, acceleration, jerk, s, columns, s_out, feed, piece):
+    """Write position and derivatives at ascending times (T,) into columns (4, T, A), and s, feed and piece (T,)."""
+    last = len(t) - 1
+    m = last_not_after(t, times[0], 0, last)
+    for n in range(len(times)):
+        while m < last and t[m + 1] <= times[n]:
+            m += 1
+        over = times[n] >= end
+        tau, speed_sq = min(times[n], end) - t[m], 0.0
+        for k in range(position.shape[1]):
+            p, v, a, j = position[m, k], velocity[m, k], acceleration[m, k], jerk[m, k]
+            columns[0, n, k] = p + tau * (v + tau * (a / 2.0 + tau * j / 6.0))
+            columns[1, n, k] = 0.0 if over else v + tau * (a + tau * j / 2.0)
+            columns[2, n, k] = 0.0 if over else a + tau * j
+            columns[3, n, k] = 0.0 if over else j
+            speed_sq += columns[1, n, k] ** 2
+        here = s[m] + _arc_length(velocity[m], acceleration[m], jerk[m], tau)
+        s_out[n] = min(here, s[m + 1])
+        feed[n], piece[n] = np.sqrt(speed_sq), m

@@ -1,0 +1,252 @@
+"""Step and direction pulses of a trajectory (paper 003's synchronisation of axes, corrected).
+
+Every axis counts its own pulses. Between two samples its position is the cubic with the samples' positions and velocities, which is
+the motion itself wherever the jerk is constant over the period. With the resolution K [pulses per mm] and the counter c, both relative
+to the start, a pulse is sent at the moment at which
+
+    K x(t) = c + 1/2 + H   (up)        K x(t) = c - 1/2 - H   (down),
+
+so that |K x(t) - c| <= 1/2 + H < 1 at every instant, on all axes, however long the job is: what a period leaves over stays in the
+position and is never added up. The numbers of pulses per period are n_k = c_k - c_{k-1}. H keeps an axis that stands on the edge
+between two counts from sending pulses up and down.
+
+The paper floors the long axis' pulses, n'_x = floor(T V_x), and carries the short axis' remainder as a time (eq. (10)-(12)): the first
+loses up to a pulse per period, the second drifts when the speed changes (benchmarks/pulse_variants.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.errors import InputError
+from planner.base.kernels import njit
+from planner.base.units import RAD_PER_DEG
+from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.motion.trajectory import Trajectory
+
+HYSTERESIS = 0.05  # H [pulses]; the rounding of coordinates is 1e-10 of a pulse
+PULSES_MAX = 2e8  # more pulses than this are refused: in memory and in a file they fill gigabytes
+GAP_MIN = 1e-12  # [s] the rounding of times; two pulses are never closer
+SOLVE_STEPS = 60  # Newton on a monotone cubic, safeguarded by bisection
+TIME_ROUNDING = 1e-13  # of a period: where a pulse is on it [-]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AxisPulses:
+    """The n pulses of one axis.
+
+    axis      : its letter
+    steps     : pulses per mm (rotary axes: per degree)
+    time      : (n,) when each pulse is sent [s], non-decreasing
+    direction : (n,) +1 or -1
+    line      : (n,) source line of the NC program
+    per_period : (T-1,) pulses between two samples, up minus down
+    """
+
+    axis: str
+    steps: float
+    time: FloatArray
+    direction: Array
+    line: Array
+    per_period: Array
+
+    def __post_init__(self) -> None:
+        pulses = len(self.time)
+        freeze(self, "time", np.float64, (pulses,))
+        freeze(self, "direction", np.int8, (pulses,))
+        freeze(self, "line", np.int32, (pulses,))
+        freeze(self, "per_period", np.int64, (None,))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def count(self) -> Array:
+        """(n,) counter after each pulse, 0 at the start."""
+        return np.cumsum(self.direction, dtype=np.int64)
+
+    @property
+    def changes(self) -> int:
+        """How often the direction changes."""
+        return int((self.direction[1:] != self.direction[:-1]).sum())
+
+    @property
+    def frequency_max(self) -> float | None:
+        """The reciprocal of the shortest time between two pulses [Hz]; None with fewer than two."""
+        gap = np.diff(self.time)
+        return float(1.0 / max(gap.min(), GAP_MIN)) if len(gap) else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """What the drives' inputs take.
+
+    frequency_max : pulses per second
+    width         : shortest time that the step signal has to be high, and low, for each pulse [s]
+    """
+
+    frequency_max: float | None = None
+    width: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, unit in (("frequency_max", "Hz"), ("width", "s")):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < np.inf:
+                raise InputError(f"drive: {name} = {value} {unit}; it must be positive and finite")
+
+    @property
+    def gap(self) -> float:
+        """Shortest time from one pulse to the next [s]."""
+        return max(1.0 / self.frequency_max if self.frequency_max else 0.0, 2.0 * (self.width or 0.0))
+
+
+def pulses_of(trajectory: Trajectory, steps: dict[str, float]) -> tuple[AxisPulses, ...]:
+    """The pulses of every axis in `steps` [per mm, rotary axes per degree], in the trajectory's order.
+
+    Raises InputError for a resolution that is not positive, an axis that the trajectory lacks, an axis that moves without having a
+    resolution, and for more than `PULSES_MAX` pulses.
+    """
+    _check(trajectory, steps)
+    return tuple(
+        _axis_pulses(trajectory, k, steps[axis]) for k, axis in enumerate(trajectory.axes) if axis in steps
+    )
+
+
+def overrun(trains: tuple[AxisPulses, ...], drive: Drive) -> list[str]:
+    """One sentence per axis whose pulses follow faster than its drive takes them; empty if none does."""
+    said = []
+    for train in trains:
+        gap = np.diff(train.time)
+        if not len(gap) or gap.min() >= drive.gap * (1.0 - TIME_ROUNDING):
+            continue
+        k = int(gap.argmin())
+        rate = 1.0 / max(gap[k], GAP_MIN)
+        text = f"axis {train.axis}, line {train.line[k]}, t = {train.time[k]:.6g} s: two pulses within {1e6 * gap[k]:.4g} us"
+        if drive.frequency_max and rate > drive.frequency_max * (1.0 + TIME_ROUNDING):
+            text += f", {rate:.6g} per second; the drive takes {drive.frequency_max:.6g}"
+        if drive.width and gap[k] < 2.0 * drive.width:
+            text += f"; high and low for {1e6 * drive.width:.4g} us each, a pulse needs {2e6 * drive.width:.4g} us"
+        said.append(text + ": fewer steps per mm, or a lower velocity of this axis in the machine file")
+    return said
+
+
+def _check(trajectory: Trajectory, steps: dict[str, float]) -> None:
+    for axis, value in steps.items():
+        if axis not in trajectory.axes:
+            raise InputError(
+                f"steps: the trajectory has no axis '{axis}'; it has {', '.join(trajectory.axes)}"
+            )
+        if not 0 < value < np.inf:
+            raise InputError(f"steps: {axis} = {value}; pulses per mm must be positive and finite")
+    total = 0.0
+    for k, axis in enumerate(trajectory.axes):
+        way = float(np.abs(np.diff(trajectory.position[:, k])).sum())
+        if axis in steps:
+            total += way * _resolution(axis, steps[axis])
+        elif way > 0:
+            unit = "mm" if axis in LINEAR_AXES else "rad"
+            raise InputError(f"steps: axis {axis} moves by {way:.6g} {unit} in all; give its steps too")
+    if total > PULSES_MAX:
+        raise InputError(f"steps: {total:.3g} pulses; at most {PULSES_MAX:.0e} are made: split the program")
+
+
+def _resolution(axis: str, steps: float) -> float:
+    """Pulses per mm or rad."""
+    return steps / RAD_PER_DEG if axis in ROTARY_AXES else steps
+
+
+def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
+    K = _resolution(trajectory.axes[k], steps)
+    place = K * (trajectory.position[:, k] - trajectory.position[0, k])
+    rate = K * trajectory.velocity[:, k]
+    per_period, number = np.zeros(len(trajectory) - 1, np.int64), np.zeros(len(trajectory) - 1, np.int64)
+    time, direction = np.empty(0), np.empty(0, np.int8)
+    total = _count(trajectory.t, place, rate, per_period, number, time, direction)
+    time, direction = np.empty(total), np.empty(total, np.int8)
+    _count(trajectory.t, place, rate, per_period, number, time, direction)
+    return AxisPulses(
+        axis=trajectory.axes[k],
+        steps=steps,
+        time=time,
+        direction=direction,
+        line=np.repeat(trajectory.line[:-1], number),
+        per_period=per_period,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _count(t, place, rate, per_period, number, time, direction):
+    """Count the pulses of an axis at `place` with `rate` (T,) [pulses, pulses/s], and write them as far as there is room."""
+    n, counter = 0, 0
+    ends = np.empty(4)
+    for k in range(len(t) - 1):
+        h, before, first = t[k + 1] - t[k], counter, n
+        a, b, c = _cubic(place[k + 1] - place[k], rate[k] * h, rate[k + 1] * h)
+        parts = _monotone(a, b, c, ends)
+        for part in range(parts):
+            low, high = ends[part], ends[part + 1]
+            up = _value(a, b, c, high) >= _value(a, b, c, low)
+            sign = 1 if up else -1
+            goal = place[k] + _value(a, b, c, high)
+            if part == parts - 1:
+                goal = place[k + 1]
+            while sign * (goal - counter) >= 0.5 + HYSTERESIS:
+                edge = counter + sign * (0.5 + HYSTERESIS) - place[k]
+                low = _crossing(a, b, c, low, high, edge, sign)
+                if n < len(time):
+                    time[n], direction[n] = t[k] + low * h, sign
+                counter += sign
+                n += 1
+        per_period[k], number[k] = counter - before, n - first
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _cubic(way, v0, v1):
+    """Coefficients a, b, c of a q^3 + b q^2 + c q on [0, 1] with the value `way` at 1 and the slopes v0, v1 at the ends."""
+    return v0 + v1 - 2.0 * way, 3.0 * way - 2.0 * v0 - v1, v0
+
+
+@njit(cache=True, error_model="numpy")
+def _value(a, b, c, q):
+    return q * (c + q * (b + q * a))
+
+
+@njit(cache=True, error_model="numpy")
+def _monotone(a, b, c, ends):
+    """Cut [0, 1] where the slope 3a q^2 + 2b q + c changes its sign; writes the ends, returns how many parts there are."""
+    ends[0], parts = 0.0, 0
+    square = b * b - 3.0 * a * c
+    if square > 0.0:
+        root = -(b + np.copysign(np.sqrt(square), b))
+        one, two = root / (3.0 * a), c / root  # inf or NaN where there is no second one
+        for q in (min(one, two), max(one, two)):
+            if ends[parts] < q < 1.0:
+                parts += 1
+                ends[parts] = q
+    ends[parts + 1] = 1.0
+    return parts + 1
+
+
+@njit(cache=True, error_model="numpy")
+def _crossing(a, b, c, low, high, edge, sign):
+    """Where the cubic, monotone on [low, high] in the direction `sign`, passes `edge`."""
+    q = 0.5 * (low + high)
+    for _ in range(SOLVE_STEPS):
+        miss = _value(a, b, c, q) - edge
+        if sign * miss >= 0.0:
+            high = q
+        else:
+            low = q
+        step = miss / (c + q * (2.0 * b + q * 3.0 * a))
+        if abs(step) <= TIME_ROUNDING:
+            break
+        q -= step
+        if not low < q < high:
+            q = 0.5 * (low + high)
+            if high - low <= TIME_ROUNDING:
+                break
+    return min(max(q, low), high)

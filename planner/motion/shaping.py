@@ -1,0 +1,133 @@
+"""Input shaping: set points that leave no vibration behind.
+
+A mode of frequency w and damping ratio z that is shaken by p(t) rings on after the end with an amplitude that is proportional to
+|integral of p''(t) exp(-P t) dt|, P = -z w + i w sqrt(1 - z^2). Instead of p a machine can be given a mean of delayed copies,
+
+    D(t) = sum_i A_i p(t - t_i),      A_i > 0,  sum A_i = 1,
+
+whose ringing is that of p times |sum_i A_i exp(-P t_i)|. Two copies suffice for one mode (the zero-vibration shaper, Singer and
+Seering 1990, doi 10.1115/1.2894142): half a damped period apart,
+
+    t = 0, pi / (w sqrt(1 - z^2)),      A = 1/(1+K), K/(1+K),      K = exp(-z pi / sqrt(1 - z^2)),
+
+they cancel each other exactly. Shapers in series, one per mode, are the products of their copies. The moving average of paper 000,
+eq. 10, T = 2 pi/w, is this shaper and a moving average of T/2 in series: it has the same zero, twice the delay and 4/3 of the variance,
+to which the error on curves is proportional.
+
+D keeps every limit that p keeps, since it is a mean of such motions, and it may keep limits that p exceeds: of two copies half a period
+apart only one may be accelerating. It leaves the path of p by up to (1/2) max|p''| sum_i A_i (t_i - t_mean)^2, which is for the planner
+to keep within the tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.fir.filters import damped_period
+from planner.machine import Mode
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shaper:
+    """n delayed copies: delays t_i (n,) [s], ascending from 0, and weights A_i (n,) [-], positive, of sum 1."""
+
+    delay: FloatArray
+    weight: FloatArray
+
+    def __post_init__(self) -> None:
+        copies = len(self.delay)
+        for name in ("delay", "weight"):
+            freeze(self, name, np.float64, (copies,))
+
+    @property
+    def length(self) -> float:
+        """How much longer the shaped motion lasts [s]."""
+        return float(self.delay[-1])
+
+    @property
+    def middle(self) -> float:
+        """Mean delay [s]."""
+        return float(self.weight @ self.delay)
+
+    def remains(self, mode: Mode) -> float:
+        """What is left of a mode's ringing, as a fraction of the ringing without shaping [-]."""
+        w = 2.0 * math.pi * mode.frequency
+        pole = -mode.damping * w + 1j * w * math.sqrt(1.0 - mode.damping**2)
+        return float(abs((self.weight * np.exp(-pole * (self.delay - self.length))).sum()))
+
+
+def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
+    """The zero-vibration shaper of all modes: 2^n copies for n modes; one copy without any."""
+    delay, weight = np.zeros(1), np.ones(1)
+    for mode in modes:
+        half = 0.5 * damped_period(mode.frequency, mode.damping)
+        K = math.exp(-mode.damping * math.pi / math.sqrt(1.0 - mode.damping**2))
+        delay = np.concatenate([delay, delay + half])
+        weight = np.concatenate([weight, K * weight]) / (1.0 + K)
+    order = np.argsort(delay, kind="stable")
+    return Shaper(delay=delay[order], weight=weight[order])
+
+
+@dataclass(frozen=True, eq=False)
+class ShapedMotion:
+    """A motion given to a shaper, from which comes the motion that is delivered; before and after, the motion rests."""
+
+    motion: MotionInTime
+    shaper: Shaper
+
+    @cached_property
+    def t(self) -> FloatArray:
+        """(L,) start of each smooth piece [s]: those of all copies."""
+        edges = np.append(self.motion.t, self.motion.end)
+        return np.unique(np.add.outer(self.shaper.delay, edges))[:-1]
+
+    @property
+    def end(self) -> float:
+        """End of the last copy [s]."""
+        return self.motion.end + self.shaper.length
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The mean of the copies at ascending times (T,) [s]; block and line are those at the mean delay, s and feed means as well."""
+        copies = [self._copy(times - delay, dt) for delay in self.shaper.delay]
+        means = {
+            name: np.tensordot(self.shaper.weight, [copy[name] for copy in copies], axes=1)
+            for name in ("position", "velocity", "acceleration", "jerk", "s", "feed")
+        }
+        at_mean = self._copy(times - self.shaper.middle, dt)
+        base = self._ends[0]
+        return Trajectory(
+            axes=base.axes, dt=dt, t=times, block=at_mean["block"], line=at_mean["line"], **means
+        )
+
+    def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:
+        """The motion standing longer by `by` (n,) [s] where all copies have come to rest, at the times `at` (n,) [s]."""
+        return ShapedMotion(self.motion.waiting(at - self.shaper.length, by), self.shaper)
+
+    @cached_property
+    def _ends(self) -> tuple[Trajectory, Trajectory]:
+        first, last = (self.motion.at(np.array([time]), 1.0) for time in (0.0, self.motion.end))
+        return first, last
+
+    def _copy(self, times: FloatArray, dt: float) -> dict[str, Array]:
+        """The columns of the motion at ascending times, at rest outside [0, end]."""
+        inside = (times > 0.0) & (times < self.motion.end)
+        begin = int(np.searchsorted(times, 0.0, side="right"))
+        stop = begin + int(inside.sum())
+        columns: dict[str, Array] = {}
+        there = self.motion.at(times[begin:stop], dt) if stop > begin else None
+        for name in ("position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line"):
+            first, last = (getattr(end, name)[0] for end in self._ends)
+            column = np.empty((len(times), *np.shape(first)), dtype=np.asarray(first).dtype)
+            still = name in ("velocity", "acceleration", "jerk", "feed")
+            column[:begin], column[stop:] = (0.0, 0.0) if still else (first, last)
+            if there is not None:
+                column[begin:stop] = getattr(there, name)
+            columns[name] = column
+        return columns

@@ -1,0 +1,73 @@
+"""The record of a motion in time: samples at the interpolation period, as an axis controller gets them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trajectory:
+    """T samples over A axes. The last sample is the programmed end; the period before it may be shorter than dt.
+
+    axes         : axis letters
+    dt           : interpolation period [s]
+    t            : (T,) time [s], strictly increasing, t[0] = 0
+    position     : (T, A) [mm]
+    velocity     : (T, A) [mm/s]
+    acceleration : (T, A) [mm/s2]; where it jumps, the value after the jump
+    jerk         : (T, A) [mm/s3]; where it jumps, the value after the jump
+    s            : (T,) arc length along the motion's path [mm], non-decreasing
+    feed         : (T,) ds/dt [mm/s]
+    block        : (T,) index of the program's block
+    line         : (T,) source line of that block
+    """
+
+    axes: tuple[str, ...]
+    dt: float
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    s: FloatArray
+    feed: FloatArray
+    block: Array
+    line: Array
+
+    def __post_init__(self) -> None:
+        samples, axes = len(self.t), len(self.axes)
+        for name in ("t", "s", "feed"):
+            freeze(self, name, np.float64, (samples,))
+        for name in ("position", "velocity", "acceleration", "jerk"):
+            freeze(self, name, np.float64, (samples, axes))
+        freeze(self, "block", np.int64, (samples,))
+        freeze(self, "line", np.int32, (samples,))
+        if not self.dt > 0:
+            raise ValueError(f"Trajectory.dt: {self.dt} s; must be positive")
+        if samples and not (np.diff(self.t) > 0).all():
+            raise ValueError("Trajectory.t: times must increase strictly")
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def cycle_time(self) -> float:
+        """Duration of the motion [s]."""
+        return float(self.t[-1] - self.t[0])
+
+
+def joined(chunks: list[Trajectory]) -> Trajectory:
+    """Chunks in order as one trajectory; a sample that a chunk shares with the one before counts once."""
+    names = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
+    fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])
+        for name in names
+    }
+    return dataclasses.replace(chunks[0], **columns)

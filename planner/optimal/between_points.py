@@ -1,0 +1,178 @@
+"""What a motion exceeds a limit by between grid points, and two ways to make up for it.
+
+A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
+divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
+
+`tightened` asks for it where it is needed, by the problem's `limit_scale` around every excess: the solution is slower in these places
+only. What is left, whole runs between full stops are slowed down by; that always ends.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.delivery.pacing import paced, runs_of
+from planner.feedrate.solution import FeedrateSolution
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.motion.time_law import TimeLaw, law_of_solution
+from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
+from planner.optimal.reshape import OnPath
+from planner.verify import Verdict
+
+# The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
+PEAK_MORE = 1.2
+# Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
+# the time it takes counts, by more than the second, once: it leaves less than half of the excess.
+TIGHTENED_EXCESS = 1e-5, 1e-4
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 6, 50_000
+# Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
+SLOWING_ROUNDS = 6
+# What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
+SLOWING_MORE = 1e-5
+EXCESS_ROUNDING = 1e-9
+# A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
+SEEN_EXCESS_MAX = 5e-3
+ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, "jerk": 3}
+
+
+def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
+    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
+    middle, where it is fastest and, if it lies on one grid interval, at the peaks of parabolas through these; <= 1 where it keeps
+    them."""
+    axes = toolpath.axes
+    limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
+    programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
+    programmed[toolpath.block] = toolpath.feed
+    factor = np.zeros(len(motion.law.t))
+    pieces, inside = inside_pieces(motion)
+    smooth = _on_one_interval(motion)
+    for first in range(0, len(pieces), CHUNK // len(WATCHED)):
+        part = slice(first, first + CHUNK // len(WATCHED))
+        own, times = pieces[part], inside[part]
+        seen = motion.at(times.ravel(), machine.dt)
+        worst = (seen.feed / programmed[seen.block]).reshape(times.shape).max(axis=1)
+        motions = (seen.velocity, seen.acceleration, seen.jerk)
+        for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
+            most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
+            worst = np.maximum(worst, most ** (1.0 / order))
+        factor[own] = worst
+    for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
+        worst = np.maximum(
+            chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
+        )
+        at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
+        np.maximum.at(factor, np.maximum(at, 0), worst)
+    return factor
+
+
+def _on_one_interval(motion: Motion) -> Array:
+    """(L,) True for pieces of the law on one interval of the grid, where the path's derivatives do not jump."""
+    s, grid = motion.law.s, motion.samples.s
+    interval = np.searchsorted(grid, s, side="right") - 1
+    beyond = np.append(s[1:], s[-1])
+    return np.asarray(beyond <= grid[np.minimum(interval + 1, len(grid) - 1)])
+
+
+def _most(y: FloatArray, smooth: Array) -> FloatArray:
+    """(n, A) largest |y| of values (n, 3, A) at the shares `WATCHED` of pieces, on smooth ones of the parabolas through them too."""
+    seen = np.abs(y).max(axis=1)
+    slope = (y[:, 2] - y[:, 0]) / (WATCHED[2] - WATCHED[0])
+    bend = (y[:, 2] - 2.0 * y[:, 1] + y[:, 0]) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+    inside = smooth[:, None] & (np.abs(slope) < np.abs(bend))  # less than half of the piece from its middle
+    peak = np.abs(y[:, 1] - np.divide(slope**2, 4.0 * bend, out=np.zeros_like(bend), where=inside))
+    known = np.maximum(seen, 1.0)
+    return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
+
+
+def fastest_inside(law: TimeLaw) -> FloatArray:
+    """When the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    lasting = np.diff(np.append(law.t, law.end))
+    braking = np.flatnonzero(law.jerk_s < 0.0)
+    tau = -law.acc_s[braking] / law.jerk_s[braking]
+    inside = (tau > 0.0) & (tau < lasting[braking])
+    return law.t[braking[inside]] + tau[inside]
+
+
+def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
+    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of each point."""
+    lam = np.maximum(factor, 1.0)
+    lam[1:] = np.maximum(lam[1:], lam[:-1])  # at both ends of an interval
+    return dataclasses.replace(problem, limit_scale=problem.limit_scale * lam)
+
+
+def within_limits(
+    planned: OnPath,
+    solve: Callable[[FeedrateProblem], FeedrateSolution],
+    toolpath: Toolpath,
+    machine: Machine,
+) -> tuple[OnPath, Motion]:
+    """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
+    `planned` has a solution."""
+    motion = _motion(planned)
+    factor = excess(motion, toolpath, machine)
+    best = planned, slowed(motion, toolpath, machine, factor)
+    room = np.ones(len(planned.problem))
+    large = len(room) > TIGHTENED_POINTS
+    for _ in range(1 if large else TIGHTENING_ROUNDS):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS[large]:
+            break
+        room *= np.maximum(factor, 1.0)
+        problem = tightened(planned.problem, room)
+        tighter = dataclasses.replace(planned, problem=problem, solution=solve(problem))
+        if not tighter.solution.solved:
+            break
+        motion = _motion(tighter)
+        factor = excess(motion, toolpath, machine)
+        kept = slowed(motion, toolpath, machine, factor)
+        if kept.end < best[1].end:
+            best = tighter, kept
+    return best
+
+
+def _motion(planned: OnPath) -> Motion:
+    return Motion(samples=planned.samples, law=law_of_solution(planned.samples, planned.solution))
+
+
+def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
+    """The same motion with every run slowed down until it has no `excess` (L,); `factor` is that of the motion, if it is known."""
+    if factor is None:
+        factor = excess(motion, toolpath, machine)
+    for _ in range(SLOWING_ROUNDS):
+        of_run = _of_runs(motion, factor)
+        slow = of_run > 1.0 + EXCESS_ROUNDING
+        if not slow.any():
+            break
+        motion = slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0))
+        if factor.max() <= 1.0 + SEEN_EXCESS_MAX:
+            break  # what the samples of the slower motion may find more, the verifier will see
+        factor = excess(motion, toolpath, machine)
+    return motion
+
+
+def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
+    """(G,) the largest factor of each run."""
+    return np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(motion.law.run[-1] + 1)))
+
+
+def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion | None:
+    """The motion slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing: the verifier looks
+    between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done; `again` counts
+    the times before. The slower motion needs a verdict at other times."""
+    limited = [check for check in verdict.limits.values() if check.limited]
+    over = [check for check in limited if check.broken]
+    if not over or max(check.ratio for check in limited) > 1.0 + SEEN_EXCESS_MAX:
+        return None
+    factor = max(check.ratio ** (1.0 / ORDER[check.name.partition(".")[0]]) for check in over)
+    more = SLOWING_MORE * 10.0**again
+    return slower(motion, np.full(len(motion.samples.piece) - 1, factor * (1.0 + more)))
+
+
+def slower(motion: Motion, factor: FloatArray) -> Motion:
+    """Every run (G,) slowed down by its factor."""
+    return paced(motion, runs_of(motion), factor, np.zeros(len(factor)))

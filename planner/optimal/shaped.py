@@ -1,0 +1,277 @@
+"""Set points that leave the machine's vibration modes at rest: planned for a shaper, and delivered behind it.
+
+The delivered motion D is the mean of delayed copies of a planned one, p (planner/motion/shaping.py). It has to keep the limits and the
+tolerance; p has to do neither. What follows from that:
+
+* Between the copies of one mode lies half a period. Where p accelerates for less than that, D has half of its acceleration and of its
+  jerk: p may be planned with up to twice the limits.
+* D cuts corners on which p moves. A sharp corner costs least time if p stops there for a moment, shorter than the shaper, so that D
+  passes it within the tolerance (paper 000's overlap of two moves): every corner that turns by more than an angle becomes a stop of p,
+  with the shortest rest that is enough. At full stops of the program p rests for the whole length of the shaper: there D stands still.
+* Where D, looked at everywhere, exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the
+  times of all copies, and is solved again; what is left after `ROUNDS` is taken out by slowing down runs of p.
+
+Of the `CANDIDATES` the fastest D is delivered. With the limits as they are, all corners stopped at
+and rests of the whole length every limit and the tolerance are kept, so that there always is one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.smooth import CornerShape
+from planner.delivery.filters import Behind
+from planner.delivery.pacing import paced, runs_of
+from planner.feedrate.solution import FeedrateSolution, Status
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.job import Job
+from planner.job.plan import Plan
+from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion, Shaper, shaper_of
+from planner.motion.time_law import law_of_solution
+from planner.motion.timing import Motion, in_chunks, inside_pieces
+from planner.optimal.between_points import fastest_inside, tightened
+from planner.optimal.on_path import plan_of_solution
+from planner.optimal.reshape import OnPath
+
+# Corners that turn by more than the first of these are stops of p [rad], and p is planned with so many times the accelerations and
+# jerks [-].
+SHARP = float(np.deg2rad(20.0))
+CANDIDATES = ((SHARP, 1.0), (SHARP, 1.5), (SHARP, 1.75), (SHARP, 2.0), (np.inf, 1.75))
+# Share of the tolerance that the path of p may use; the rest is for the shaper [-].
+OF_PATH = 0.5
+ROUNDS = 12
+# D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
+EXCESS, SPARE = 1e-6, 1e-5
+# Of the tolerance, what looking at other times may find more [-].
+SPARE_ERROR = 2e-3
+# What path and samples leave of the tolerance counts as this share at least [-], or the first step would be too large.
+ROOM_LEAST = 0.1
+# Steps of the shaper's length in which rests are sought; found to 2^-HALVINGS of it.
+STEPS, HALVINGS = 96, 12
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shaped:
+    """A planned motion p, what it comes from, and the delivered motion D."""
+
+    planned: OnPath
+    motion: Motion
+    delivered: ShapedMotion
+    sentence: str
+
+
+def shaped(
+    job: Job,
+    plan_on: Callable[[Job], OnPath],
+    solve: Callable[[FeedrateProblem], FeedrateSolution],
+    *,
+    jerk: bool = True,
+) -> Shaped | None:
+    """The fastest shaped motion of the candidates; None if none of their problems has a solution.
+
+    plan_on : the time-optimal motion of a job; it is given jobs with larger limits, a smaller tolerance and more stops
+    solve   : the solver by which it finds that
+    jerk    : jerks are limited
+    """
+    shaper = shaper_of(job.machine.modes)
+    best: Shaped | None = None
+    seen: set[tuple[int, float]] = set()
+    for sharp, more in CANDIDATES:
+        toolpath = _stopping(job.toolpath, sharp)
+        stops = int((toolpath.joint == Joint.STOP).sum())
+        if (stops, more) in seen:
+            continue  # no corner between the angles
+        seen.add((stops, more))
+        planned = plan_on(dataclasses.replace(job, machine=_faster(job.machine, more), toolpath=toolpath))
+        if not planned.solution.solved:
+            continue
+        made = _Settling(job, shaper, jerk).settled(planned, solve, best.delivered.end if best else np.inf)
+        if made is None:
+            continue
+        said = (
+            f"shaped for {len(job.machine.modes)} vibration modes, {1e3 * shaper.length:.4g} ms longer than what was planned with "
+            f"{more:g} times the accelerations and {stops - 2} stops"
+        )
+        best = Shaped(planned=made[0], motion=made[1], delivered=made[2], sentence=said)
+    return best
+
+
+def _stopping(toolpath: Toolpath, sharp: float) -> Toolpath:
+    """The path with a share of its tolerance, and stops at sharp corners."""
+    stop = np.flatnonzero(toolpath.theta > sharp)
+    return dataclasses.replace(toolpath.with_joints(stop, Joint.STOP), tolerance=OF_PATH * toolpath.tolerance)
+
+
+def _faster(machine: Machine, by: float) -> Machine:
+    axes = {
+        letter: axis.model_copy(update={"acceleration": by * axis.acceleration, "jerk": by * axis.jerk})
+        for letter, axis in machine.axes.items()
+    }
+    return machine.model_copy(update={"axes": axes})
+
+
+class _Settling:
+    """Makes p gentler, or rest longer, until D keeps everything."""
+
+    def __init__(self, job: Job, shaper: Shaper, jerk: bool):
+        self.job, self.shaper = job, shaper
+        machine = job.real[0]
+        self.behind = Behind(job.toolpath, machine)
+        self.filters = machine.fir.time_constants if machine.fir else ()
+        # Between two samples D bows by up to this [mm], which the path between the samples does not have.
+        self.bow = (
+            job.machine.dt**2 / 8.0 * np.linalg.norm(job.machine.limits("acceleration", job.toolpath.axes))
+        )
+        self.limits = {
+            "velocity": job.machine.limits("velocity", job.toolpath.axes),
+            "acceleration": job.machine.limits("acceleration", job.toolpath.axes),
+        }
+        if jerk:
+            self.limits["jerk"] = job.machine.limits("jerk", job.toolpath.axes)
+        self.feed = np.full(int(job.toolpath.block[-1]) + 1, np.inf)
+        self.feed[job.toolpath.block] = job.toolpath.feed
+
+    def settled(
+        self, planned: OnPath, solve: Callable[[FeedrateProblem], FeedrateSolution], most: float
+    ) -> tuple[OnPath, Motion, ShapedMotion] | None:
+        """The fastest D found on the path of `planned`, with the p that it is made of; None if it takes `most` [s] or longer."""
+        best: tuple[OnPath, Motion, ShapedMotion] | None = None
+        for _ in range(ROUNDS):
+            if planned.solution.cycle_time + self.shaper.length >= most:
+                break  # gentler problems take longer
+            motion, delivered, factor = self._kept(planned)
+            if motion is not None and delivered.end < most:
+                best, most = (planned, motion, delivered), delivered.end
+            if factor.max() <= 1.0 + EXCESS:
+                break
+            problem = tightened(planned.problem, factor)
+            planned = dataclasses.replace(planned, problem=problem, solution=solve(problem))
+            if not planned.solution.solved:
+                break
+        return best
+
+    def _kept(self, planned: OnPath) -> tuple[Motion | None, ShapedMotion, FloatArray]:
+        """p with rests, slowed down until D keeps everything, None if it never does; D; and what p as planned exceeds (P,)."""
+        plain = Motion(samples=planned.samples, law=law_of_solution(planned.samples, planned.solution))
+        runs = runs_of(plain)
+        slower, first = np.ones(len(runs)), np.ones(len(planned.problem))
+        delivered = ShapedMotion(plain, self.shaper)
+        for n in range(ROUNDS):
+            motion = paced(plain, runs, slower, np.zeros(len(runs)))
+            motion = paced(motion, runs_of(motion), np.ones(len(runs)), self._rests(motion, planned))
+            delivered = ShapedMotion(motion, self.shaper)
+            factor = self._factor(motion, delivered)
+            if n == 0:
+                first = factor
+            if factor.max() <= 1.0 + EXCESS:
+                return motion, delivered, first
+            worst = np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(len(runs))))
+            slower = slower * np.where(worst > 1.0 + EXCESS, worst * (1.0 + SPARE), 1.0)
+        return None, delivered, first
+
+    def _factor(self, motion: Motion, delivered: ShapedMotion) -> FloatArray:
+        """(L,) by what factor p has to be slower on each piece of its law for D to keep everything."""
+        factor = np.ones(len(motion.law.t))
+        peaks = np.add.outer(fastest_inside(motion.law), self.shaper.delay)
+        times = np.append(inside_pieces(delivered)[1], peaks)
+        for chunk in in_chunks(delivered, self.job.machine.dt, times[times < delivered.end]):
+            worst = np.maximum(1.0, chunk.feed / self.feed[chunk.block])
+            for order, (name, limit) in enumerate(self.limits.items(), start=1):
+                worst = np.maximum(worst, (np.abs(getattr(chunk, name)) / limit).max(axis=1) ** (1.0 / order))
+            over = worst > 1.0 + EXCESS
+            for delay in self.shaper.delay:
+                np.maximum.at(factor, self._piece(motion, chunk.t[over] - delay), worst[over])
+        t, ratio, _, near, near_time = self.behind.errors(delivered, self.filters)
+        room = 1.0 - SPARE_ERROR - self.bow / self.job.toolpath.tolerance.min()
+        missed = near > room
+        t, ratio = np.append(t, near_time[missed]), np.append(ratio, near[missed])
+        slower = np.sqrt((ratio - OF_PATH) / max(room - OF_PATH, ROOM_LEAST))
+        seen = self.shaper.length + sum(self.filters)  # what D is made of, back from t
+        first, last = self._piece(motion, t - seen), self._piece(motion, t)
+        for begin, end, by in zip(first, last, slower, strict=True):
+            factor[begin : end + 1] = np.maximum(factor[begin : end + 1], by)
+        return factor
+
+    def _piece(self, motion: Motion, times: FloatArray) -> Array:
+        return np.clip(np.searchsorted(motion.law.t, times, side="right") - 1, 0, len(motion.law.t) - 1)
+
+    def _rests(self, motion: Motion, planned: OnPath) -> FloatArray:
+        """(G,) rest behind each run [s]: at full stops of the job the shaper's length, elsewhere the shortest with which D comes near
+        enough to the corner, behind the last run none."""
+        samples, toolpath = planned.samples, self.job.toolpath
+        runs = runs_of(motion)
+        rest = np.zeros(len(runs))
+        if len(runs) < 2:
+            return rest
+        joint = samples.path.legs.first[samples.stop][1:-1]
+        end, begin = runs.end[:-1], runs.begin[1:]
+        budget = toolpath.tolerance[joint] * (1.0 - SPARE_ERROR) - self.bow
+        delay = self.shaper.delay
+        at = np.linspace(0.0, self.shaper.length, STEPS + 1)
+        into = self._seen(motion, end[:, None] - at) - toolpath.start[joint][:, None]
+        out = self._seen(motion, begin[:, None] + at) - toolpath.start[joint][:, None]
+        low, high = np.zeros(len(end)), np.full(len(end), self.shaper.length)
+        high = np.where(_miss(into, out, low, self.shaper) <= budget, 0.0, high)
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2.0
+            enough = _miss(into, out, middle, self.shaper) <= budget
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        rest[:-1] = np.where(toolpath.joint[joint] == Joint.STOP, delay[-1], high)
+        return rest
+
+    def _seen(self, motion: Motion, times: FloatArray) -> FloatArray:
+        place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
+        return motion.at(place, self.job.machine.dt).position[of].reshape(*times.shape, -1)
+
+
+def _miss(into: FloatArray, out: FloatArray, rest: FloatArray, shaper: Shaper) -> FloatArray:
+    """(g,) how near D comes to stops at which p rests so long (g,) [mm]; into, out (g, STEPS + 1, A) [mm]: where p is, seen from the
+    stop, at equal steps of the shaper's length before and after it."""
+    steps = into.shape[1] - 1
+    rows = np.arange(len(rest))[:, None]
+    after = np.linspace(0.0, 1.0, 2 * steps + 1)[None, :] * (
+        shaper.length + rest[:, None]
+    )  # since p came to rest
+    total = np.zeros((*after.shape, into.shape[2]))
+    for delay, weight in zip(shaper.delay, shaper.weight, strict=True):
+        since = after - delay
+        for table, place in ((into, -since), (out, since - rest[:, None])):
+            x = np.clip(place / shaper.length * steps, 0.0, steps)
+            k = np.minimum(x.astype(np.int64), steps - 1)
+            share = (x - k)[:, :, None]
+            total += weight * ((1.0 - share) * table[rows, k] + share * table[rows, k + 1])
+    return np.linalg.norm(total, axis=2).min(axis=1)
+
+
+def shaped_plan(
+    job: Job,
+    plan_on: Callable[[Job], OnPath],
+    solve: Callable[[FeedrateProblem], FeedrateSolution],
+    *,
+    method: str,
+    corner: str | CornerShape,
+    not_limited: tuple[str, ...] = (),
+) -> Plan:
+    """The plan of a job with shaped set points. Raises InputError for a machine without vibration modes; else as `shaped`."""
+    if not job.machine.modes:
+        raise InputError(
+            f"machine '{job.machine.name}' has no vibration modes to shape set points for; give it tables [[modes]] with frequency "
+            "and damping"
+        )
+    found = shaped(job, plan_on, solve, jerk="jerk" not in not_limited)
+    if found is None:
+        return job.plan(
+            None, method=method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0,
+            sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
+        )  # fmt: skip
+    made = job.deliver(found.delivered, not_limited)
+    plan = plan_of_solution(job, found.planned, made, method=method, corner=corner)
+    return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

@@ -1,0 +1,148 @@
+"""Where nothing happens along a path: stretches on which a motion keeps the programmed feed, or tracks smoothly what the curve allows.
+
+A grid for jerk-limited motions needs intervals of a part of a/j where the acceleration switches; a machine whose a/j is a thousandth of
+the time that its motions last would fill the memory with them. Two bounds say where they are not needed:
+
+* An acceleration that switches over an interval of h seconds instead of at once costs a h^2/(8 v) seconds. With h = 0.03 v/a that is
+  1e-4 of v/a, the time which lies between two such switches because the speed has to change between them.
+* A curve is calm where the programmed feed F is the smallest bound, and leaves half of the axes' accelerations and jerks free:
+
+      F <= v_k,    |r''_k| F^2 <= a_k/2,    |r'''_k| F^3 <= j_k/2                                    for all axes k.
+
+  A time-optimal motion runs there at F, but where it still comes from, or already prepares for, something else. Half of acceleration
+  and jerk change the speed by F within 2 F/a + a/j [s], so within `quiet_way` of it; beyond, intervals grow with the distance.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.corners.elements import ElementTable, element_point, to_arc_length
+from planner.corners.smooth import SmoothPath
+from planner.geometry.toolpath import Joint
+
+SWITCHING_WAY = 0.03  # h above [v/a]
+FREE_SHARE = 0.5  # of accelerations and jerks, on calm curves [-]
+GROWTH = 0.25  # of intervals by their distance from what is not calm [-]: as on straight stretches (feedrate/grid.py, STEP/NEAR)
+PLACES = 9  # on every curve, at which it is looked at
+
+
+class Calm(NamedTuple):
+    """busy (B, 2) ascending stretches of the path that are not calm, counted along the legs [mm]; feed_sq (R+S,) a lower bound of
+    feed^2 that each leg's and span's curvature leaves, inf where it is straight."""
+
+    busy: FloatArray
+    feed_sq: FloatArray
+
+
+def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatArray, FloatArray]) -> Calm:
+    """Where the path is calm; `limits` of velocity, acceleration and jerk (A,) each."""
+    velocity, acceleration, jerk = limits
+    legs, spans = path.legs, table.spans
+    bend, twist = _turning(*table, acceleration, jerk)
+    feed, place, passed = path.toolpath.feed, legs.place, path.passed
+    of_leg = np.maximum.reduceat(feed, legs.first[:-1])
+    ends = np.stack([spans["begin"], spans["begin"] + spans["width"]])
+    of_span = feed[np.clip(np.searchsorted(passed, ends, side="right") - 1, 0, len(feed) - 1)].max(axis=0)
+    F = np.concatenate([of_leg, of_span])
+    with np.errstate(invalid="ignore"):  # rapids: inf times 0
+        lively = (velocity.min() < F) | (bend * F**2 > FREE_SHARE) | (twist * F**3 > FREE_SHARE)
+    with np.errstate(divide="ignore"):
+        feed_sq = np.minimum(1.0 / bend, twist ** (-2.0 / 3.0))
+    joint = place[legs.first]
+    changes = passed[1:-1][feed[1:] != feed[:-1]]
+    leg, span = lively[: len(legs)] & ~_replaced(path), spans[lively[len(legs) :]]
+    alone = ~_inside(path)
+    stretches = [
+        np.stack([joint - path.d_in, joint + path.d_out], axis=1)[alone & (path.joint == Joint.CORNER)],
+        np.stack([joint, joint], axis=1)[alone],
+        np.stack([changes, changes], axis=1),
+        np.stack([joint[:-1], joint[1:]], axis=1)[leg],
+        np.stack([span["begin"], span["begin"] + span["width"]], axis=1),
+    ]
+    return Calm(busy=_merged(np.concatenate(stretches)), feed_sq=feed_sq)
+
+
+def quiet_way(feed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
+    """(M,) how far from what is not calm a motion at `feed` (M,) may still change its speed [mm] (module text)."""
+    slowest = float((1.0 / acceleration).max())
+    return np.asarray(feed * (2.0 * feed * slowest + float((acceleration / jerk).max())))
+
+
+@njit(cache=True, error_model="numpy")
+def _turning(legs, corners, spans, acceleration, jerk):
+    """max_k |r''_k|/a_k (R+S,) [s2/mm2] and max_k |r'''_k|/j_k [s3/mm3] of all legs and spans."""
+    elements = len(legs) + len(spans)
+    bend, twist = np.zeros(elements), np.zeros(elements)
+    axes = len(acceleration)
+    work, out = np.empty((2, 4, axes)), np.empty((4, axes))
+    for e in range(elements):
+        reach = legs[e].length if e < len(legs) else 1.0
+        if e < len(legs) and not legs[e].round:
+            continue
+        for p in range(PLACES):
+            element_point(legs, corners, spans, e, reach * p / (PLACES - 1.0), 0.5 * reach, work, out)
+            to_arc_length(out)
+            for k in range(axes):
+                bend[e] = max(bend[e], abs(out[2, k]) / acceleration[k])
+                twist[e] = max(twist[e], abs(out[3, k]) / jerk[k])
+    return bend, twist
+
+
+def _inside(path: SmoothPath) -> Array:
+    """(R+1,) True for joints that a run of the spline replaces."""
+    covered = np.zeros(len(path.d) + 1, dtype=np.int64)
+    np.add.at(covered, path.spline.joint_first, 1)
+    np.add.at(covered, path.spline.joint_last + 1, -1)
+    return np.asarray(np.cumsum(covered)[:-1] > 0)
+
+
+def _replaced(path: SmoothPath) -> Array:
+    """(R,) True for legs of which a run leaves nothing."""
+    return np.asarray(path.legs.length - path.d_out[:-1] - path.d_in[1:] <= 0.0)
+
+
+def _merged(stretches: FloatArray) -> FloatArray:
+    """Ascending stretches (B, 2) without overlaps."""
+    order = stretches[np.argsort(stretches[:, 0], kind="stable")]
+    end = np.maximum.accumulate(order[:, 1])
+    fresh = np.concatenate([[True], order[1:, 0] > end[:-1]])
+    last = np.append(np.flatnonzero(fresh)[1:] - 1, len(order) - 1)
+    return np.stack([order[fresh, 0], end[last]], axis=1)
+
+
+@njit(cache=True, error_model="numpy")
+def interval_ends(start, left, right, base, most, quiet, busy):
+    """Places (n+1,) from left to right, counted from `start`, at which a stretch of one curve and one block is cut: intervals of `base`
+    at most [mm], longer ones, up to `most`, where it is calm and `quiet` away from anything else."""
+    middle = start + 0.5 * (left + right)
+    gap = np.searchsorted(busy[:, 0], middle, side="right") - 1
+    since = busy[gap, 1] if gap >= 0 else -np.inf
+    until = busy[gap + 1, 0] if gap + 1 < len(busy) else np.inf
+    calm_here = since <= middle
+    since, until = since - start, until - start
+    if not calm_here or not GROWTH * (0.5 * (until - since) - quiet) > base:
+        parts = max(int(np.ceil(max((right - left) / min(base, most), 1.0))), 1)
+        ends = np.empty(parts + 1)
+        for part in range(parts):
+            ends[part] = left + (right - left) * part / parts
+        ends[parts] = right
+        return ends
+    ends = np.empty(0)
+    for sweep in range(2):
+        u, n = left, 0
+        while u < right:
+            away = min(GROWTH * (u - since - quiet), GROWTH / (1.0 + GROWTH) * (until - u - quiet))
+            step = min(max(base, away), most)
+            if sweep == 1:
+                ends[n] = u
+            n += 1
+            u = right if right - u <= 1.5 * step else u + step
+        if sweep == 0:
+            ends = np.empty(n + 1)
+    ends[-1] = right
+    return ends

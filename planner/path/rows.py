@@ -1,0 +1,221 @@
+"""The smooth path cut into rows, the stretches of one element and one block that the grid then divides (kernels of path/samples.py).
+
+In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans that begins there. Free
+parts and corners are cut at all ends of blocks, spans where the motion passes changes of the feed. Where a piece ends there is a
+closing row.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.kernels import njit
+from planner.base.search import last_not_after
+from planner.corners.blend import shape_at
+from planner.path.calm import SWITCHING_WAY, interval_ends
+
+# Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
+ARC_STEP = np.pi / 8
+# ... and with so many at least, so that a short arc between two stops can start and stop.
+ARC_PARTS_MIN = 4
+# Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
+FREE_PART_MIN = 1e-9
+
+# curve, w0, w1: element and its parameters; segment: of the toolpath; begin, end: place along the legs from the start of the job [mm];
+# last: a closing row
+ROW = np.dtype(
+    [
+        ("curve", np.int64),
+        ("segment", np.int64),
+        ("w0", np.float64),
+        ("w1", np.float64),
+        ("begin", np.float64),
+        ("end", np.float64),
+        ("last", np.bool_),
+    ]
+)
+
+
+@njit(cache=True, error_model="numpy")
+def grown(rows, needed):
+    """`rows`, or a larger copy if it does not have room for `needed`."""
+    if needed <= len(rows):
+        return rows
+    out = np.empty(max(2 * len(rows), needed), rows.dtype)
+    for i in range(len(rows)):  # a slice assignment costs 4 s of compilation for its error message
+        out[i] = rows[i]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def set_row(row, curve, segment, w0, w1, begin, end, last):
+    """Fill a row."""
+    row.curve, row.segment = curve, segment
+    row.w0, row.w1, row.begin, row.end, row.last = w0, w1, begin, end, last
+
+
+@njit(cache=True, error_model="numpy")
+def _corner_parameter(corners, k, z):
+    """w of corner k whose matched point lies z [mm] after the vertex, Y(w) - X(w) = z (corners/blend.py)."""
+    wa, wb = 0.0, 1.0
+    for _ in range(60):
+        w = 0.5 * (wa + wb)
+        X, Y = shape_at(corners[k], w, w)
+        if Y[0] - X[0] < z:
+            wa = w
+        else:
+            wb = w
+    return 0.5 * (wa + wb)
+
+
+@njit(cache=True, error_model="numpy")
+def _arc_feed(leg, feed, velocity, acceleration):
+    """A bound of the feed on an arc: programmed, what all axes reach together, and what they can turn with."""
+    v_sq, a_sq = 0.0, 0.0
+    for k in range(len(velocity)):
+        v_sq += velocity[k] * velocity[k]
+        a_sq += acceleration[k] * acceleration[k]
+    return min(feed, np.sqrt(v_sq), np.sqrt(np.sqrt(a_sq) / (leg.radius * leg.rate * leg.rate)))
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_leg(rows, n, leg, seg, start, ends):
+    """Rows of the free part of a leg that starts at the place `start`, cut at `ends` on it; returns the rows and their number."""
+    rows = grown(rows, n + len(ends) - 1)
+    for part in range(len(ends) - 1):
+        left, right = ends[part], ends[part + 1]
+        set_row(rows[n], leg, seg, left, right, start + left, start + right, False)
+        n += 1
+    return rows, n
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks):
+    """Rows of corner k from wa to wb, cut at its breaks; returns the rows and their number."""
+    rows = grown(rows, n + len(breaks) + 1)
+    cut = 0
+    left = wa
+    while left < wb:
+        while cut < len(breaks) and breaks[cut] <= left:
+            cut += 1
+        right = min(wb, breaks[cut]) if cut < len(breaks) else wb
+        X, Y = shape_at(corners[k], left, left)
+        begin = vertex + Y[0] - X[0]
+        X, Y = shape_at(corners[k], right, right)
+        set_row(rows[n], ~k, seg, left, right, begin, vertex + Y[0] - X[0], False)
+        n += 1
+        left = right
+    return rows, n
+
+
+@njit(cache=True, error_model="numpy")
+def _base(longest, feed, feed_sq, acceleration):
+    """Longest interval on a curve [mm] that switches of the acceleration allow (path/calm.py): `longest` [s] at the fastest feed, or by
+    the time to change the speed where feed^2 is at least `feed_sq` by its curvature."""
+    return max(longest * feed, SWITCHING_WAY * min(feed * feed, feed_sq) / acceleration)
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_span(
+    rows, n, span, curve, seg, passed, feed, changes, longest, speed, feed_sq, acceleration, quiet, busy
+):  # fmt: skip
+    """Rows of a span that begins in segment `seg`, cut where the feed changes; returns the rows, their number and the segment in
+    which the span ends.
+
+    changes : segments at whose start the feed changes, ascending
+    """
+    begin, end = span.begin, span.begin + span.width
+    least = FREE_PART_MIN * span.width
+    c = last_not_after(changes, seg, 0, len(changes) - 1) if len(changes) else 0
+    left = begin
+    while left < end:
+        while c < len(changes) and passed[changes[c]] <= left + least:
+            c += 1
+        right = passed[changes[c]] if c < len(changes) and passed[changes[c]] < end - least else end
+        while seg + 1 < len(feed) and passed[seg + 1] <= 0.5 * (left + right):
+            seg += 1
+        base = _base(longest, min(feed[seg], speed), feed_sq, acceleration)
+        ends = interval_ends(0.0, left, right, base, np.inf, quiet[seg], busy)
+        rows = grown(rows, n + len(ends) - 1)
+        for part in range(len(ends) - 1):
+            a, b = ends[part], ends[part + 1]
+            w0 = 0.0 if a == begin else (a - begin) / span.width
+            w1 = 1.0 if b == end else (b - begin) / span.width
+            set_row(rows[n], curve, seg, w0, w1, a, b, False)
+            n += 1
+        left = right
+    while seg + 1 < len(feed) and passed[seg + 1] <= end:
+        seg += 1
+    return rows, n, seg
+
+
+@njit(cache=True, error_model="numpy")
+def cut_path(
+    legs, corners, spans, first, place, passed, d_in, d_out, blended, is_stop, breaks, run, run_first, feed, velocity, acceleration,
+    longest, busy, feed_sq, quiet,
+):  # fmt: skip
+    """Rows (n,) of the whole path in order (module text).
+
+    place   : (M+1,) where each segment starts (geometry/legs.py) [mm]
+    passed  : (M+1,) where the path passes that start; the same but on spans (geometry/spline_passing.py) [mm]
+    blended : (R+1,) True where there is a corner
+    run     : (R+1,) run of spans that begins before each joint, or -1; run_first (Q+1,) its first span
+    longest : duration of an interval on arcs and spans at the fastest feed [s]; inf for second-order solvers, where the rest is not
+              looked at
+    busy, feed_sq : of path/calm.py, where intervals may last longer; quiet (M,) `quiet_way` at each segment's feed
+    """
+    rows = np.empty(8 * len(legs) + 4 * len(spans) + 64, ROW)
+    n = 0
+    speed_sq = 0.0
+    for k in range(len(velocity)):
+        speed_sq += velocity[k] * velocity[k]
+    speed = np.sqrt(speed_sq)
+    strong = np.linalg.norm(acceleration)
+    changes = np.flatnonzero(feed[1:] != feed[:-1]) + 1
+    for leg in range(len(legs)):
+        length = legs[leg].length
+        start = place[first[leg]]
+        k = leg + 1
+        if length - d_out[leg] - d_in[k] > FREE_PART_MIN * length:
+            for seg in range(first[leg], first[k]):
+                end = place[seg + 1] - start if seg + 1 < first[k] else length
+                wa, wb = max(place[seg] - start, d_out[leg]), min(end, length - d_in[k])
+                if wb - wa <= FREE_PART_MIN * length:
+                    continue
+                ends = np.array([wa, wb])
+                if legs[leg].round:
+                    fastest = _arc_feed(legs[leg], feed[seg], velocity, acceleration)
+                    base = _base(longest, fastest, feed_sq[leg], strong)
+                    most = min(ARC_STEP / abs(legs[leg].rate), (wb - wa) / ARC_PARTS_MIN)
+                    ends = interval_ends(start, wa, wb, base, most, quiet[seg], busy)
+                rows, n = _cut_leg(rows, n, leg, seg, start, ends)
+        if run[k] >= 0:
+            seg = first[leg]
+            for i in range(run_first[run[k]], run_first[run[k] + 1]):
+                rows, n, seg = _cut_span(
+                    rows, n, spans[i], len(legs) + i, seg, passed, feed, changes, longest, speed, feed_sq[len(legs) + i],
+                    strong, quiet, busy,
+                )  # fmt: skip
+        elif blended[k]:
+            vertex = start + length
+            for seg in range(first[leg], first[k]):
+                begin, end = place[seg] - start, place[seg + 1] - start if seg + 1 < first[k] else length
+                if end > length - d_in[k]:
+                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d_in[k] else 0.0
+                    wb = _corner_parameter(corners, k, end - length) if seg + 1 < first[k] else 0.5
+                    rows, n = _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks[k])
+            for seg in range(first[k], first[k + 1]):
+                begin = place[seg] - place[first[k]]
+                end = place[seg + 1] - place[first[k]] if seg + 1 < first[k + 1] else legs[k].length
+                if begin >= d_out[k]:
+                    break
+                wa = _corner_parameter(corners, k, begin) if seg > first[k] else 0.5
+                wb = _corner_parameter(corners, k, end) if end < d_out[k] else 1.0
+                rows, n = _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks[k])
+        if is_stop[k]:
+            rows = grown(rows, n + 1)
+            before = rows[n - 1]
+            end = place[first[k]]
+            set_row(rows[n], before.curve, before.segment, before.w1, before.w1, end, end, True)
+            n += 1
+    return rows[:n].copy()

@@ -1,0 +1,1 @@
+"""What limits cost and which of them are active; the closed-form speed at corners."""

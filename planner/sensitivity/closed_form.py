@@ -1,0 +1,53 @@
+"""Corners that a method rounds each by itself: their shape, and their speed next to eq. (19), (20) for this very shape.
+
+    v = sqrt(X / kappa_max),    X = min(A, (eps - eps_ap) / (dt^2/8 + sum T^2/24))
+
+with A as in corners/allocation.py. The planned speed at the apex never exceeds it, and reaches it where normal acceleration or
+the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is largest between straight legs
+(docs/papers.md C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners
+and for all
+methods, is the verifier's business (verify/error_allocation.py), which shares nothing with this.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.solution import FeedrateSolution, active_names, constraint_ratios
+from planner.job.records import CornerTable
+from planner.path.samples import PathSamples
+
+
+def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> CornerTable:
+    """Put the planned speeds at all corners next to the closed form. Raises NotSolvedError without a solution."""
+    apex = corner_apexes(samples)
+    ratio, which = constraint_ratios(problem, solution)
+    before = ratio[apex - 1] > ratio[apex]  # the interval that ends at the apex may be the one that limits it
+    limited_by = np.array(active_names(problem))[np.where(before, which[apex - 1], which[apex])]
+    return corners_at(samples, apex, np.sqrt(solution.feed_sq[apex]), limited_by)
+
+
+def corner_apexes(samples: PathSamples) -> Array:
+    """(C,) grid points in the middle of the corners."""
+    middle = (samples.element < 0) & (samples.w0 == 0.5)
+    middle[samples.piece[1:] - 1] = False  # they repeat what is said of the interval before
+    return np.flatnonzero(middle)
+
+
+def corners_at(samples: PathSamples, apex: Array, feed: FloatArray, limited_by: Array) -> CornerTable:
+    """The table of the corners whose middles are the grid points `apex` (C,), passed at `feed` [mm/s]."""
+    path, joint = samples.path, ~samples.element[apex]
+    kappa = np.linalg.norm(samples.d2_right[apex], axis=1)
+    return CornerTable(
+        line=path.toolpath.line[path.legs.first[joint] - 1],
+        theta=path.theta[joint],
+        d_in=path.d_in[joint],
+        d_out=path.d_out[joint],
+        tol_ap=path.tol_ap[joint],
+        kappa_max=kappa,
+        feed_closed_form=np.sqrt(path.normal_max[joint] / kappa),
+        feed_planned=feed,
+        limited_by=limited_by,
+    )

@@ -1,0 +1,125 @@
+"""The programmed path of each run as a chain of chords, along which a spline is laid.
+
+A straight leg is one chord, or one for each of its programmed feeds: a spline may slide along a chord, but has to pass the place
+where the feed changes. An arc becomes chords whose sagitta is at most `SAGITTA` of the tolerance. The chain stands for the path only
+where distances are bounded; no motion follows it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array
+from planner.base.kernels import njit
+from planner.corners.smooth import SmoothPath
+from planner.geometry.legs import leg_point
+from planner.smoothing.runs import Runs
+
+SAGITTA = 0.01  # of chords on arcs [share of the tolerance]
+APART = 1e-3  # a change of the feed so near to a run's end is there [share of the tolerance]
+
+
+class Guide(NamedTuple):
+    """V vertices of all runs one after the other, run q holds first[q] : first[q+1]; place, point, tolerance, and for the chord that
+    follows a vertex its direction, its sagitta and its tolerance."""
+
+    first: Array  # (Q+1,)
+    place: Array  # (V,) along the legs from the start of the job [mm]
+    point: Array  # (V, A) [mm]
+    turn: Array  # (V,) turning angle between the chords before and after [rad], 0 at the ends of a run
+    along: Array  # (V, A) direction of the chord that follows
+    tol: Array  # (V,) tolerance at the vertex [mm]
+    tol_chord: Array  # (V,) tolerance of the chord that follows, less its sagitta [mm]
+
+
+def guide(path: SmoothPath, runs: Runs, tol: Array) -> Guide:
+    """The chains of all runs; `tol` (M+1,) at the toolpath's joints [mm]."""
+    at = path.legs.first
+    of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
+    place = np.concatenate([[0.0], np.cumsum(path.legs.length)])
+    ends = runs.joint_first, runs.joint_last, runs.x_first, runs.x_last
+    return Guide(*_guide(path.legs.table, place, of_leg, *_feed_changes(path), *ends))
+
+
+def _feed_changes(path: SmoothPath) -> tuple[Array, Array]:
+    """Places on legs [mm] where the programmed feed changes, and which of them (R+1,) are each leg's."""
+    legs, feed = path.legs, path.toolpath.feed
+    inside = np.ones(len(feed), dtype=bool)
+    inside[legs.first[:-1]] = False
+    at = np.flatnonzero(inside & np.append(False, feed[1:] != feed[:-1]))
+    return legs.offset[at], np.searchsorted(at, legs.first)
+
+
+@njit(cache=True, error_model="numpy")
+def _chords(leg, tol, begin, end, changes):
+    """Into how many chords a leg is cut from begin to end, and the index of the first of the feed changes on it."""
+    if leg.round:
+        curvature = abs(leg.radius * leg.rate * leg.rate)
+        return int(np.ceil((end - begin) / np.sqrt(8.0 * SAGITTA * tol / curvature))) + 1, 0
+    chords, first = 1, 0
+    for k in range(len(changes)):
+        if changes[k] < begin + APART * tol:
+            first = k + 1
+        elif changes[k] < end - APART * tol:
+            chords += 1
+    return chords, first
+
+
+@njit(cache=True, error_model="numpy")
+def _guide(legs, starts, tol, feed_changes, change_first, joint_first, joint_last, x_first, x_last):
+    runs, axes = len(joint_first), legs[0].start.shape[0]
+    first = np.zeros(runs + 1, np.int64)
+    for sweep in range(2):
+        if sweep == 1:
+            total = first[runs]
+            place, turn = np.empty(total), np.zeros(total)
+            point, along = np.empty((total, axes)), np.zeros((total, axes))
+            tol_here, tol_chord = np.empty(total), np.empty(total)
+            out = np.empty((4, axes))
+        for q in range(runs):
+            n = first[q]
+            for leg in range(joint_first[q] - 1, joint_last[q] + 1):
+                begin = x_first[q] if leg == joint_first[q] - 1 else 0.0
+                end = x_last[q] if leg == joint_last[q] else legs[leg].length
+                changes = feed_changes[change_first[leg] : change_first[leg + 1]]
+                chords, change = _chords(legs[leg], tol[leg], begin, end, changes)
+                if sweep == 1:
+                    for c in range(chords + (1 if leg == joint_last[q] else 0)):
+                        x = begin + (end - begin) * c / chords
+                        if not legs[leg].round and 0 < c < chords:
+                            x = changes[change + c - 1]
+                        leg_point(legs, leg, x, out)
+                        place[n + c] = starts[leg] + x
+                        for k in range(axes):
+                            point[n + c, k] = out[0, k]
+                        tol_here[n + c] = tol[leg]
+                        if c == 0 and leg >= joint_first[q]:
+                            tol_here[n] = min(tol[leg - 1], tol[leg])
+                        bend = (
+                            abs(legs[leg].radius * legs[leg].rate * legs[leg].rate)
+                            if legs[leg].round
+                            else 0.0
+                        )
+                        sagitta = bend * ((end - begin) / chords) ** 2 / 8.0
+                        tol_chord[n + c] = tol[leg] - sagitta
+                n += chords
+            n += 1
+            if sweep == 0:
+                first[q + 1] = n
+            else:
+                for v in range(first[q], first[q + 1] - 1):
+                    size = 0.0
+                    for k in range(axes):
+                        along[v, k] = point[v + 1, k] - point[v, k]
+                        size += along[v, k] * along[v, k]
+                    size = np.sqrt(size)
+                    for k in range(axes):
+                        along[v, k] /= size
+                    if v > first[q]:
+                        across = 0.0
+                        for k in range(axes):
+                            across += (along[v, k] - along[v - 1, k]) ** 2
+                        turn[v] = 2.0 * np.arcsin(min(0.5 * np.sqrt(across), 1.0))
+    return first, place, point, turn, along, tol_here, tol_chord

@@ -1,0 +1,277 @@
+"""The convex problem of a spline in a tube, by a primal-dual interior-point method that never leaves the tube.
+
+Over the control points c (n, A), minimise a quadratic form, one banded matrix H_k per axis, with every site j inside its ball:
+
+    minimise    1/2 sum_k c_k' H_k c_k
+    subject to  g_j = (|e_j|^2 / r_j^2 - 1)/2 <= 0,     e_j = d_j - (1 - slide_j) t_j (t_j . d_j),     d_j = p(u_j) - q_j
+
+t_j is a direction (of the path) along which the site may leave q_j by r_j/slide_j; slide = 1 is a ball. With z_j >= 0 for g_j, a
+Newton step of z_j g_j = -mu and stationarity solves
+
+    (H + sum z_j G_j + sum z_j/(-g_j) grad g_j grad g_j') dc = -(H c + sum mu/(-g_j) grad g_j),
+
+block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the tube; where the
+method ends early, the path is less smooth than it could be and no less inside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.kernels import njit
+from planner.smoothing.banded import factorise, solve
+from planner.smoothing.basis import ORDER
+
+TO_BOUNDARY = 0.95  # of the way to the nearest bound that a step may go [-]
+CENTRING = 3.0  # a short step is followed by one towards the middle, with up to so much of the gap [-]; 0 takes twice the iterations
+STALLED = 1e-6  # a step shorter than this ends the search [-]
+
+
+@njit(cache=True, error_model="numpy")
+def site_distance(site, c, first, values, place, along, slide, e):
+    """e_j of a site (module text) into e (A,); returns |e_j| [mm]."""
+    axes = len(e)
+    dot = 0.0
+    for k in range(axes):
+        d = -place[site, k]
+        for b in range(ORDER):
+            d += values[site, b] * c[first[site] + b, k]
+        e[k] = d
+        dot += d * along[site, k]
+    square = 0.0
+    for k in range(axes):
+        e[k] -= (1.0 - slide[site]) * dot * along[site, k]
+        square += e[k] * e[k]
+    return np.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def _constraint(c, first, values, place, along, slide, radius, g, e):
+    """g (m,) and the weighted distances e (m, A) over their radii."""
+    for site in range(len(first)):
+        ratio = site_distance(site, c, first, values, place, along, slide, e[site]) / radius[site]
+        for k in range(e.shape[1]):
+            e[site, k] /= radius[site]
+        g[site] = 0.5 * (ratio * ratio - 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _objective(H, linear, c, gradient):
+    """1/2 c'Hc + linear.c, and its gradient (n, A)."""
+    axes, n, width = H.shape
+    total = 0.0
+    for k in range(axes):
+        for i in range(n):
+            gradient[i, k] = 0.0
+        for i in range(n):
+            for d in range(min(i, width - 1) + 1):
+                value = H[k, i, width - 1 - d]
+                gradient[i, k] += value * c[i - d, k]
+                if d > 0:
+                    gradient[i - d, k] += value * c[i, k]
+        for i in range(n):
+            total += (0.5 * gradient[i, k] + linear[i, k]) * c[i, k]
+            gradient[i, k] += linear[i, k]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
+    """The Newton matrix (banded.py), with unit rows for control points that stay."""
+    axes, n, width = H.shape
+    full = band.shape[1]
+    band[:] = 0.0
+    for i in range(n):
+        for k in range(axes):
+            for d in range(min(i, width - 1) + 1):
+                band[(i - d) * axes + k, d * axes] = H[k, i, width - 1 - d]
+    normal = np.empty(axes)
+    spread = np.zeros(
+        (axes, 2 * full)
+    )  # of a site: what its six control points get for each axis; then zeros
+    for site in range(len(first)):
+        # M'M = 1 - (1 - slide^2) t t'; grad g = N (x) M e / r^2, where e is already over r
+        dot = 0.0
+        for k in range(axes):
+            dot += e[site, k] * along[site, k]
+        for k in range(axes):
+            normal[k] = (e[site, k] - (1.0 - slide[site]) * dot * along[site, k]) / radius[site]
+        flat = z[site] / (radius[site] * radius[site])
+        steep = z[site] / -g[site]
+        loose = 1.0 - slide[site] * slide[site]
+        for k in range(axes):
+            for m in range(axes):
+                block = steep * normal[k] * normal[m] - flat * loose * along[site, k] * along[site, m]
+                if k == m:
+                    block += flat
+                for b in range(ORDER):
+                    spread[k, b * axes + m] = values[site, b] * block
+        for a in range(ORDER):
+            value = values[site, a]
+            for k in range(axes):
+                begin = a * axes + k
+                into = band[first[site] * axes + begin]
+                for d in range(full):
+                    into[d] += value * spread[k, begin + d]
+    for i in range(n):
+        if not free[i]:
+            for column in range(i * axes, (i + 1) * axes):
+                for d in range(full):
+                    band[column, d] = 0.0
+                for row in range(max(column - full + 1, 0), column):
+                    band[row, column - row] = 0.0
+                band[column, 0] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _add_gradient(first, values, along, slide, radius, e, factor, out):
+    """out (n, A) += sum_j factor_j grad g_j."""
+    axes = out.shape[1]
+    for site in range(len(first)):
+        dot = 0.0
+        for k in range(axes):
+            dot += e[site, k] * along[site, k]
+        for k in range(axes):
+            normal = (e[site, k] - (1.0 - slide[site]) * dot * along[site, k]) * factor[site] / radius[site]
+            for b in range(ORDER):
+                out[first[site] + b, k] += values[site, b] * normal
+
+
+@njit(cache=True, error_model="numpy")
+def _step_length(step, first, values, along, slide, radius, g, e, slope):
+    """Largest step <= 1/TO_BOUNDARY that keeps every g <= 0; also slope (m,) = grad g . dc."""
+    axes = step.shape[1]
+    longest = 1.0 / TO_BOUNDARY
+    move = np.empty(axes)
+    for site in range(len(first)):
+        dot = 0.0
+        for k in range(axes):
+            total = 0.0
+            for b in range(ORDER):
+                total += values[site, b] * step[first[site] + b, k]
+            move[k] = total / radius[site]
+            dot += move[k] * along[site, k]
+        square, product = 0.0, 0.0
+        for k in range(axes):
+            move[k] -= (1.0 - slide[site]) * dot * along[site, k]
+            square += move[k] * move[k]
+            product += move[k] * e[site, k]
+        slope[site] = product
+        # g + product t + square t^2 / 2 = 0
+        if square > 0.0:
+            root = np.sqrt(product * product - 2.0 * square * g[site])
+            reach = -2.0 * g[site] / (product + root) if product > 0.0 else (root - product) / square
+            longest = min(longest, reach)
+    return longest
+
+
+@njit(cache=True, error_model="numpy")
+def minimise(
+    H,
+    linear,
+    free,
+    first,
+    values,
+    place,
+    along,
+    slide,
+    radius,
+    c,
+    z,
+    value,
+    gap_first,
+    gap_last,
+    relative,
+    iterations,
+):
+    """Move the control points c (n, A), strictly inside the tube, to the optimum; returns the gap and the iterations.
+
+    z         : (m,) becomes the multipliers of g
+    value     : of the objective at the start, in as far as it matters
+    gap_first : guess of the gap there, for the first multipliers
+    gap_last, relative : where to end, gap <= gap_last + relative * value
+    H (A, n, 6) lower bands, linear (n, A); free (n,) False for control points that stay; first (m,) first of the six
+    control points of each site, values (m, 6) of their basis functions there.
+    """
+    axes, n, _ = H.shape
+    m = len(first)
+    g, e = np.empty(m), np.empty((m, axes))
+    gradient = np.empty((n, axes))
+    band = np.empty((n * axes, ORDER * axes))
+    slope, slope_1, factor = np.empty(m), np.empty(m), np.empty(m)
+    step, step_1 = np.empty((n, axes)), np.empty((n, axes))
+    _constraint(c, first, values, place, along, slide, radius, g, e)
+    for site in range(m):
+        z[site] = gap_first / m / -g[site]
+    reach = np.max(radius) if m else 0.0  # what a control point may be from its optimum, about
+    start = _objective(H, linear, c, gradient)
+    gap = np.inf
+    went = 1.0
+    for iteration in range(iterations):
+        small = gap_last + relative * max(value + _objective(H, linear, c, gradient) - start, 0.0)
+        complementarity = 0.0
+        for site in range(m):
+            complementarity += z[site] * -g[site]
+        residual = 0.0
+        for i in range(n):
+            for k in range(axes):
+                step_1[i, k] = gradient[i, k]
+        _add_gradient(first, values, along, slide, radius, e, z, step_1)
+        for i in range(n):
+            if free[i]:
+                for k in range(axes):
+                    residual += abs(step_1[i, k])
+        gap = complementarity + residual * reach
+        if gap <= small:
+            return gap, iteration
+        _assemble(H, free, first, values, along, slide, radius, z, g, e, band)
+        if not factorise(band):
+            return gap, iteration
+        # predictor: mu = 0
+        for i in range(n):
+            for k in range(axes):
+                step_1[i, k] = -gradient[i, k] if free[i] else 0.0
+        solve(band, step_1.reshape(-1))
+        longest = min(1.0, _step_length(step_1, first, values, along, slide, radius, g, e, slope_1))
+        dual = 1.0
+        for site in range(m):
+            dz = -z[site] + z[site] / -g[site] * slope_1[site]
+            if dz < 0.0:
+                dual = min(dual, -z[site] / dz)
+        after = 0.0
+        for site in range(m):
+            dz = -z[site] + z[site] / -g[site] * slope_1[site]
+            after += (z[site] + dual * dz) * max(-(g[site] + longest * slope_1[site]), 0.0)
+        mu = max((after / complementarity) ** 3, CENTRING * (1.0 - went)) * complementarity / m
+        mu = max(mu, 0.1 * small / m)
+        for i in range(n):
+            for k in range(axes):
+                step[i, k] = -gradient[i, k]
+        for site in range(m):
+            # second order: z (g + slope + curvature) with the predictor's products
+            dz = -z[site] + z[site] / -g[site] * slope_1[site]
+            factor[site] = -(mu + dz * slope_1[site] * dual * longest) / -g[site]
+        _add_gradient(first, values, along, slide, radius, e, factor, step)
+        for i in range(n):
+            if not free[i]:
+                for k in range(axes):
+                    step[i, k] = 0.0
+        solve(band, step.reshape(-1))
+        longest = _step_length(step, first, values, along, slide, radius, g, e, slope)
+        longest = min(1.0, TO_BOUNDARY * longest)
+        went = longest
+        dual = 1.0
+        for site in range(m):
+            dz = -factor[site] - z[site] + z[site] / -g[site] * slope[site]
+            if dz < 0.0:
+                dual = min(dual, TO_BOUNDARY * -z[site] / dz)
+            slope_1[site] = dz
+        for i in range(n):
+            for k in range(axes):
+                c[i, k] += longest * step[i, k]
+        for site in range(m):
+            z[site] += dual * slope_1[site]
+        _constraint(c, first, values, place, along, slide, radius, g, e)
+        if longest < STALLED:
+            return gap, iteration
+    return gap, iterations

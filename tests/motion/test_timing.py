@@ -1,0 +1,235 @@
+"""From a profile to samples: analytic trapezoids, the last period, dwells, and derivatives that belong together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import ruckig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from whole_plans import CORNERS, Solved, smooth_path, solve
+
+from benchmarks import problems
+from planner.geometry.build import toolpath_from_program
+from planner.job.job import Job
+from planner.job.stages import Stages
+from planner.lookahead.rest_to_rest import PHASES, rest_to_rest_phases, rest_to_rest_times
+from planner.methods.optimal import OptimalMethod
+from planner.motion.time_law import law_of_phases
+from planner.motion.timing import Motion, dense_motion, sample_motion
+from planner.motion.trajectory import Trajectory
+from planner.nc.reader import parse_program
+from planner.path.samples import sample_path
+
+MACHINE = problems.machine()
+JOBS = problems.all_jobs()
+
+
+def sampled(solved: Solved, dt: float = 1e-3) -> Trajectory:
+    return sample_motion(solved.motion, dt)
+
+
+# --- one line against the closed form -------------------------------------------------------------------------------------
+
+
+@given(length=st.floats(0.01, 500.0), feed=st.floats(5.0, 100.0))
+@settings(max_examples=40)
+def test_a_line_is_the_analytic_trapezoid(length, feed):
+    solved = solve(problems.polyline([[0, 0], [length, 0]], feed=feed), MACHINE)
+    a = 2000.0
+    peak = min(feed, np.sqrt(a * length))
+    ramp = peak / a
+    T = ramp + length / peak
+    assert solved.time == pytest.approx(T, rel=1e-9)
+    got = sampled(solved, 1e-3 if T < 2 else T / 1000)
+    t = got.t
+    back = T - t
+    s = np.where(
+        t < ramp, a * t**2 / 2, np.where(back < ramp, length - a * back**2 / 2, peak * (t - ramp / 2))
+    )
+    v = np.minimum(np.minimum(a * t, peak), a * back)
+    np.testing.assert_allclose(got.position[:, 0], s, atol=1e-9 * length)
+    np.testing.assert_allclose(got.velocity[:, 0], v, atol=1e-7 * peak)
+    np.testing.assert_allclose(got.s, s, atol=1e-9 * length)
+    inside = (np.abs(t - ramp) > 1e-9) & (np.abs(back - ramp) > 1e-9) & (back > 1e-9)
+    expected = np.where(t < ramp, a, np.where(back < ramp, -a, 0.0))
+    np.testing.assert_allclose(got.acceleration[inside, 0], expected[inside], atol=1e-6 * a)
+
+
+@pytest.mark.parametrize(
+    ("end", "dt", "count"),
+    [(0.01, 1e-3, 11), (0.0105, 1e-3, 12), (0.0100000000001, 1e-3, 11), (0.0005, 1e-3, 2)],
+)
+def test_the_last_partial_period_is_included(end, dt, count):
+    """A trapezoid that lasts `end`: samples at k dt, then one at the end, and never two within rounding."""
+    length = 2000.0 * (end / 2) ** 2
+    got = sampled(solve(problems.polyline([[0, 0], [length, 0]]), MACHINE), dt)
+    assert len(got) == count
+    assert got.cycle_time == pytest.approx(end, rel=1e-9)
+    np.testing.assert_allclose(np.diff(got.t)[:-1], dt, rtol=1e-6)
+    assert np.diff(got.t)[-1] <= dt * (1 + 1e-5)
+
+
+@pytest.mark.parametrize("job", list(JOBS))
+@pytest.mark.parametrize("kind", CORNERS)
+def test_it_starts_and_ends_at_rest_on_the_programmed_points(job, kind):
+    solved = solve(JOBS[job], MACHINE, kind)
+    got = sampled(solved)
+    assert got.t[0] == 0.0
+    assert got.t[-1] == solved.time
+    np.testing.assert_allclose(got.position[0], JOBS[job].start, atol=1e-12)
+    np.testing.assert_allclose(got.position[-1], JOBS[job].end[-1], atol=1e-11)
+    for edge in (0, -1):
+        assert not got.velocity[edge].any()
+        assert got.feed[edge] == 0.0
+    assert (np.diff(got.s) >= 0).all()
+    assert (np.diff(got.block) >= 0).all()
+    assert got.block[-1] == len(JOBS[job]) - 1
+    assert set(got.line) <= set(JOBS[job].line)
+
+
+# --- derivatives belong together ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("job", ["pentagon", "arcs", "spiral", "five points"])
+@pytest.mark.parametrize("kind", CORNERS)
+def test_columns_are_derivatives_of_each_other(job, kind):
+    """On samples dt apart: the position changes by the mean velocity to dt^2 jerk/12, the velocity by the mean acceleration
+    where the acceleration does not step in between."""
+    solved = solve(JOBS[job], MACHINE, kind)
+    got = sampled(solved, 5e-5)
+    dt = np.diff(got.t)[:, None]
+    by_position = np.diff(got.position, axis=0) / dt
+    mean = 0.5 * (got.velocity[1:] + got.velocity[:-1])
+    assert (
+        np.abs(by_position - mean).max() <= 4000.0 * 5e-5 / 4 + 1e-6
+    )  # an acceleration step of 2a inside the period
+    by_velocity = np.diff(got.velocity, axis=0) / dt
+    assert np.abs(by_velocity).max() <= 2000.0 * (1 + 1e-6)  # a mean of what is within the limit
+    steady = np.abs(by_velocity - 0.5 * (got.acceleration[1:] + got.acceleration[:-1])).max(axis=1)
+    assert np.median(steady) < 5.0
+
+
+@pytest.mark.parametrize("job", ["pentagon", "spiral", "arcs"])
+def test_the_speed_is_that_of_the_positions(job):
+    """Chords over one period are never longer than the arc length that is claimed, and shorter by the sagitta only."""
+    got = sampled(solve(JOBS[job], MACHINE))
+    chord, claimed = np.linalg.norm(np.diff(got.position, axis=0), axis=1), np.diff(got.s)
+    assert (chord <= claimed + 1e-8).all()
+    assert (np.linalg.norm(got.velocity, axis=1) == pytest.approx(got.feed, abs=1e-9)) is True
+
+
+def test_dense_motion_is_the_same_motion():
+    solved = solve(JOBS["pentagon"], MACHINE)
+    fine = list(dense_motion(solved.motion, MACHINE.dt))
+    t = np.concatenate([c.t for c in fine])
+    assert t[0] == 0.0
+    assert t[-1] == solved.time
+    assert (np.diff(solved.law.t) >= 0).all()
+    got = sampled(solved)
+    for axis in range(3):
+        position = np.concatenate([c.position for c in fine])[:, axis]
+        gap = np.diff(t).max()
+        near = np.interp(got.t, np.unique(t), position[np.unique(t, return_index=True)[1]])
+        assert np.abs(near - got.position[:, axis]).max() <= 2000 * gap**2 / 8 + 1e-9
+
+
+# --- dwells ---------------------------------------------------------------------------------------------------------------
+
+DWELLS = "G21 G90 G94 F6000\nG4 P0.5\nG1 X10\nG4 P0.25\nG4 P0.125\nX20\nG4 P0.1\nM2\n"
+
+
+def test_dwells_hold_the_position_at_start_middle_and_end():
+    solved = solve(parse_program(DWELLS), MACHINE)
+    move = 10 / 100 + 100 / 2000
+    assert solved.time == pytest.approx(2 * move + 0.5 + 0.375 + 0.1, rel=1e-12)
+    got = sampled(solved)
+    for begin, end, x in (
+        (0, 0.5, 0.0),
+        (0.5 + move, 0.875 + move, 10.0),
+        (0.875 + 2 * move, 0.975 + 2 * move, 20.0),
+    ):
+        still = (got.t > begin + 1e-9) & (got.t < end - 1e-9)
+        assert still.sum() >= round((end - begin) / 1e-3) - 2
+        assert (got.position[still] == [x, 0, 0]).all()
+        assert not got.velocity[still].any()
+        if begin > 0:
+            assert not got.acceleration[still].any()
+
+
+def test_a_dwell_at_the_start_has_no_acceleration():
+    got = sampled(solve(parse_program(DWELLS), MACHINE))
+    still = got.t < 0.499
+    assert not got.acceleration[still].any()
+    assert not got.jerk[still].any()
+
+
+# --- from rest to rest ----------------------------------------------------------------------------------------------------
+
+decades = st.floats(-2.0, 2.0).map(lambda e: 10.0**e)
+
+
+@given(length=st.floats(-4.0, 3.0).map(lambda e: 10.0**e), v=decades, a=decades, j=decades)
+@settings(max_examples=150)
+def test_closed_form_times_are_ruckigs(length, v, a, j):
+    v, a, j = 10 * v, 1e3 * a, 1e5 * j
+    limits = tuple(np.array([x]) for x in (length, v, a, j))
+    duration, _ = rest_to_rest_phases(*limits)
+    assert duration.shape == (1, PHASES)
+    assert rest_to_rest_times(*limits)[0] == pytest.approx(duration.sum(), rel=1e-7)
+
+
+def test_known_times():
+    one = [np.array([x]) for x in (1.0, 1e9, 1e9, 1.0)]
+    assert rest_to_rest_times(*one)[0] == pytest.approx(4 * 0.5 ** (1 / 3), rel=1e-12)  # 3.174802
+    trapezoid = [np.array([x]) for x in (1.0, 0.5, 2.0, 1e12)]
+    assert rest_to_rest_times(*trapezoid)[0] == pytest.approx(2.25, rel=1e-9)
+    pentagon = [np.full(5, x) for x in (15.782, 100.0, 2000.0, 2e5)]
+    assert rest_to_rest_times(*pentagon).sum() == pytest.approx(
+        1.089, abs=5e-4
+    )  # along an axis; see methods/test_methods
+
+
+@pytest.mark.parametrize("length", [1e-3, 0.2, 5.0, 80.0])
+def test_the_stop_law_is_ruckigs_own_motion(length):
+    """Position, velocity and acceleration at every sample against ruckig's at_time."""
+    program = problems.polyline([[0, 0], [length, 0]])
+    samples = sample_path(smooth_path(program, MACHINE), MACHINE)
+    limits = [np.array([x]) for x in (length, 100.0, 2000.0, 2e5)]
+    law = law_of_phases(samples, *rest_to_rest_phases(*limits))
+    got = sample_motion(Motion(samples=samples, law=law), 1e-3)
+    move, answer = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    move.target_position = [length]
+    move.max_velocity, move.max_acceleration, move.max_jerk = [100.0], [2000.0], [2e5]
+    assert ruckig.Ruckig(1).calculate(move, answer) == ruckig.Result.Working
+    assert law.end == pytest.approx(answer.duration, rel=1e-7)
+    inner = slice(0, -1)
+    theirs = np.array([answer.at_time(t) for t in got.t[inner]])[:, :, 0]
+    np.testing.assert_allclose(got.position[inner, 0], theirs[:, 0], atol=1e-7 * length)
+    np.testing.assert_allclose(got.velocity[inner, 0], theirs[:, 1], atol=1e-5)
+    np.testing.assert_allclose(got.acceleration[inner, 0], theirs[:, 2], atol=1e-2)
+    assert got.position[-1, 0] == length
+
+
+def test_places_follow_one_another_at_a_crawl():
+    """At 0.1 mm/s intervals are whole spans of a spline; on short and long blocks in turns their parameter is far from the arc length.
+    Between any two times the motion covers what its feed says, and never more than the programmed feed allows."""
+    turns = np.deg2rad(np.tile([4.0, -7.0, 5.0, -2.0], 6))
+    steps = np.tile([0.3, 0.012, 0.2, 0.03], 6)[:, None] * np.stack(
+        [np.cos(turns.cumsum()), np.sin(turns.cumsum())], axis=1
+    )
+    program = problems.polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), feed=0.1)
+    machine = problems.machine()
+    job = Job(
+        program=program,
+        machine=machine,
+        toolpath=toolpath_from_program(program, machine),
+        stages=Stages(None),
+    )
+    made = OptimalMethod(corner="spline", rounds=1).plan_job(job)
+    motion = job.motion_of[made.trajectory]
+    times = np.sort(np.random.default_rng(3).uniform(0.0, motion.end, 20_000))
+    seen = motion.at(times, machine.dt)
+    moved = np.linalg.norm(np.diff(seen.position, axis=0), axis=1)
+    assert (moved <= 0.1 * np.diff(times) * (1 + 1e-6) + 1e-12).all()
+    assert made.verdict.passed

@@ -1,0 +1,128 @@
+"""Making up for excesses between grid points: tightened limits, slower runs, and that both keep what they promise."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from benchmarks.random_paths import random_path
+from planner.constraints.assemble import feedrate_problem
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.solution import ratios_by_limit
+from planner.geometry.build import toolpath_from_program
+from planner.motion.time_law import law_of_solution
+from planner.motion.timing import Motion, sample_motion
+from planner.optimal.between_points import (
+    SLOWING_MORE,
+    excess,
+    slowed,
+    slower,
+    tightened,
+    within_limits,
+    without_seen_excess,
+)
+from planner.optimal.reshape import OnPath
+from planner.path.samples import RESOLUTION, sample_path
+from planner.verify import verify
+
+MACHINE = problems.machine()
+COARSE = 4.0  # times the usual resolution: a grid on which motions exceed their limits visibly
+SOLVE = JerkLimited().solve
+
+
+def test_a_motion_slower_by_a_factor_uses_the_tightened_limits_as_the_motion_itself_uses_its_own():
+    problem, by = random_path(3), 1.25
+    fast = SOLVE(problem)
+    slow = dataclasses.replace(
+        fast,
+        feed_sq=fast.feed_sq / by**2,
+        acc_s=fast.acc_s / by**2,
+        jerk_s=fast.jerk_s / by**3,
+        duration=fast.duration * by,
+    )
+    tighter = tightened(problem, np.full(len(problem), by))
+    own, scaled = list(ratios_by_limit(problem, fast)), list(ratios_by_limit(tighter, slow))
+    for (limit, ratio), (limit_too, ratio_too) in zip(own, scaled, strict=True):
+        assert limit == limit_too
+        np.testing.assert_allclose(ratio_too, ratio, rtol=1e-9, atol=1e-12)
+
+
+def test_only_the_ends_of_an_interval_with_an_excess_are_tightened():
+    problem = random_path(3)
+    factor = np.zeros(len(problem))
+    factor[40] = 1.1
+    tighter = tightened(problem, factor)
+    changed = np.flatnonzero(tighter.limit_scale != 1.0)
+    assert list(changed) == [40, 41]
+    assert factor.max() == 1.1
+    assert factor.sum() == 1.1
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """A motion on too coarse a grid, its toolpath, and how much too fast it is anywhere."""
+    toolpath = toolpath_from_program(problems.pentagon(), MACHINE, None)
+    path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    samples = sample_path(path, MACHINE, RESOLUTION * COARSE, third_order=True)
+    problem = feedrate_problem(samples, MACHINE)
+    planned = OnPath(path=path, samples=samples, problem=problem, solution=SOLVE(problem))
+    motion = Motion(samples=samples, law=law_of_solution(samples, planned.solution))
+    return planned, motion, toolpath, excess(motion, toolpath, MACHINE).max()
+
+
+def test_the_slowed_motion_has_no_excess(coarse):
+    _, motion, toolpath, before = coarse
+    assert before > 1.0 + 1e-3  # else this test shows nothing
+    kept = slowed(motion, toolpath, MACHINE)
+    assert excess(kept, toolpath, MACHINE).max() <= 1.0 + SLOWING_MORE
+    assert kept.end <= motion.end * before * (1.0 + 2.0 * SLOWING_MORE)
+
+
+def test_tightening_costs_less_than_slowing_down(coarse):
+    planned, motion, toolpath, _ = coarse
+    best, kept = within_limits(planned, SOLVE, toolpath, MACHINE)
+    assert excess(kept, toolpath, MACHINE).max() <= 1.0 + SLOWING_MORE
+    plain = slowed(motion, toolpath, MACHINE)
+    assert kept.end - motion.end < 0.5 * (plain.end - motion.end)
+    assert best.problem is not planned.problem
+    assert best.solution.solved
+
+
+def test_a_small_excess_of_the_verdict_is_made_good_and_a_large_one_left_to_be_seen(coarse):
+    _, motion, toolpath, _ = coarse
+    kept = slowed(motion, toolpath, MACHINE)
+
+    def verdict_of(motion):
+        return verify(sample_motion(motion, MACHINE.dt), toolpath, MACHINE)
+
+    runs = len(kept.samples.piece) - 1
+    near_limit = slower(kept, np.full(runs, 1.0 - 1.6e-3))
+    seen = verdict_of(near_limit)
+    assert not seen.passed
+    assert verdict_of(without_seen_excess(near_limit, seen, 0)).passed
+    assert without_seen_excess(near_limit, verdict_of(slower(kept, np.full(runs, 0.9))), 0) is None
+    assert without_seen_excess(kept, verdict_of(kept), 0) is None
+
+
+def test_peaks_between_the_places_looked_at_are_seen():
+    toolpath = toolpath_from_program(problems.star_spiral(40), MACHINE, None)
+    path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    samples = sample_path(path, MACHINE, third_order=True)
+    problem = feedrate_problem(samples, MACHINE)
+    motion = Motion(samples=samples, law=law_of_solution(samples, SOLVE(problem)))
+    edges = np.append(motion.t, motion.end)
+    pieces = np.flatnonzero(np.diff(edges) > 1e-6)
+    shares = np.linspace(0.05, 0.95, 41)
+    times = edges[pieces, None] + np.diff(edges)[pieces, None] * shares
+    jerk = np.abs(motion.at(times.ravel(), MACHINE.dt).jerk) / MACHINE.limits("jerk", toolpath.axes)
+    jerk = jerk.reshape(*times.shape, -1).max(axis=2)
+    unseen = jerk.max(axis=1) - jerk[:, [0, 20, 40]].max(axis=1)
+    missed = jerk.max(axis=1) - excess(motion, toolpath, MACHINE)[pieces] ** 3
+    near = jerk.max(axis=1) > 1.0 - 1e-4
+    assert unseen[near].max() > 1e-4  # else this test shows nothing
+    assert missed[near].max() < 0.1 * unseen[near].max()

@@ -1,0 +1,142 @@
+"""Reshaping: the prices are the derivatives of the cycle time by the shape, and rounds only ever gain."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner.constraints.assemble import feedrate_problem
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.grid import refine_for_jerk
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.reachability import Reachability
+from planner.geometry.build import toolpath_from_program
+from planner.methods.optimal import OptimalMethod
+from planner.optimal.geometry import COMPARED_POINTS, CornerBounds, _piece_times, _with_corners, corner_bounds
+from planner.optimal.reshape import OnPath, price_bands
+from planner.optimal.second_order import second_order
+from planner.path.samples import sample_path
+from planner.smoothing.spline_path import spline_shape, with_spline
+
+MACHINE = problems.machine()
+SOLVER = JerkLimited(tol=1e-7)
+JOBS = problems.all_jobs()
+
+
+def planned_on(path, grid=None):
+    samples = grid or refine_for_jerk(sample_path(path, MACHINE, third_order=True), MACHINE)
+    problem = feedrate_problem(samples, MACHINE)
+    return OnPath(path=path, samples=samples, problem=problem, solution=SOLVER.solve(problem))
+
+
+def shaped(program):
+    toolpath = toolpath_from_program(program, MACHINE)
+    rounded = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    return rounded, spline_shape(rounded, MACHINE)
+
+
+@pytest.mark.parametrize("name", ["pentagon", "zigzag"])
+def test_prices_are_the_derivatives_of_the_time(name):
+    """dT = c' H dc for changes of the control points, against plans made again on the changed shape."""
+    rounded, shape = shaped(JOBS[name])
+    before = planned_on(with_spline(rounded, shape))
+    H, _ = price_bands(before, shape)
+    control, rng = shape.laid.control, np.random.default_rng(1)
+    gradient = np.zeros_like(control)
+    for k in range(control.shape[1]):
+        for d in range(6):
+            h = H[k, d:, 5 - d]
+            gradient[d:, k] += h * control[: len(control) - d, k]
+            if d:
+                gradient[: len(control) - d, k] += h * control[d:, k]
+    places = np.arange(len(control))
+    for _ in range(6):
+        bump = np.exp(-(((places - rng.uniform(8, len(control) - 8)) / 4.0) ** 2))
+        bump[:6] = bump[-6:] = 0.0
+        change = bump[:, None] * rng.normal(size=control.shape[1])
+        change *= 2e-3 / np.abs(change).max()
+        times = []
+        for sign in (1.0, -1.0):
+            laid = shape.laid._replace(control=control + sign * change)
+            times.append(
+                planned_on(with_spline(rounded, dataclasses.replace(shape, laid=laid))).solution.cycle_time
+            )
+        expected = float((gradient * change).sum())
+        slack = 2e-2 * float(np.abs(gradient * change).sum()) + 2e-5 * times[0]
+        assert (times[0] - times[1]) / 2.0 == pytest.approx(expected, abs=slack)
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_rounds_gain_and_stay_inside(name):
+    times = []
+    for rounds in (0, 3):
+        plan = OptimalMethod(corner="spline", rounds=rounds).plan(JOBS[name], MACHINE)
+        assert plan.verdict.passed, plan.verdict.faults
+        times.append(plan.trajectory.cycle_time)
+    assert times[1] <= times[0] * (1 + 1e-4)
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_auto_is_never_slower_than_single_corners(name):
+    auto = OptimalMethod().plan(JOBS[name], MACHINE)
+    assert auto.corner == "auto"
+    for corner in ("bezier", "spline"):
+        single = OptimalMethod(corner=corner).plan(JOBS[name], MACHINE)
+        assert auto.trajectory.cycle_time <= single.trajectory.cycle_time * (1 + 5e-3)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [problems.zigzag(), problems.star_spiral(60), problems.chord_circle(60)],
+    ids=lambda own: own.source,
+)
+def test_the_coarse_time_is_less_than_what_corners_take(program):
+    """What `auto` does not even try could not have been faster."""
+    rounded = round_corners(toolpath_from_program(program, MACHINE, None), MACHINE, BezierCorner())
+    exact = second_order(rounded, sample_path(rounded, MACHINE), MACHINE, Reachability())
+    bounds = corner_bounds(rounded, MACHINE)
+    assert (bounds.time < _piece_times(exact)).all()
+    grid = sample_path(rounded, MACHINE, third_order=True)
+    assert 0.5 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
+
+
+def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_are():
+    points = np.array([[k, 0.6 * (k % 2)] for k in range(8)] + [[7.0, 20.0], [7.0, 5.0]])
+    rounded, shape = shaped(problems.polyline(points))
+    splines = planned_on(with_spline(rounded, shape))
+    first = splines.samples.piece[1]
+    duration = splines.solution.duration * np.where(np.arange(len(splines.samples)) < first, 2.0, 1.0)
+    slow = dataclasses.replace(splines, solution=dataclasses.replace(splines.solution, duration=duration))
+    calls = []
+
+    def plan_on(path):
+        calls.append(path)
+        return planned_on(path)
+
+    pieces = len(splines.samples.piece) - 1
+    assert pieces == 2
+    corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
+    mixed, best, left = _with_corners(rounded, shape, slow, plan_on, corners)
+    assert not len(left)
+    assert len(calls) == 1
+    assert not mixed.laid.fits.any()
+    assert best.solution.cycle_time < slow.solution.cycle_time
+
+
+def test_corners_that_need_too_large_a_grid_are_left_and_named():
+    points = np.array([[k, 0.6 * (k % 2)] for k in range(8)] + [[7.0, 20.0], [7.0, 5.0]])
+    rounded, shape = shaped(problems.polyline(points))
+    splines = planned_on(with_spline(rounded, shape))
+    corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
+
+    def never(path):
+        raise AssertionError("nothing is to be planned")
+
+    mixed, best, left = _with_corners(rounded, shape, splines, never, corners)
+    assert list(left) == [0]
+    assert best is splines
+    assert mixed is shape

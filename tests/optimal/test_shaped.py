@@ -1,0 +1,79 @@
+"""Shaped set points: nothing rings on, limits and tolerance hold, and it costs less time than filters that do the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner.base.errors import InputError
+from planner.machine import Fir, Mode
+from planner.methods.registry import plan
+from planner.nc.reader import parse_program
+
+SHAKEN = problems.machine(modes=(Mode(frequency=18.0),))
+LEFT = 1e-3  # [mm] what may ring on
+
+
+def left(made) -> float:
+    return max(float(mode.after.max()) for mode in made.verdict.ringing)
+
+
+@pytest.fixture(scope="module")
+def pentagon():
+    return problems.all_jobs()["pentagon"]
+
+
+@pytest.mark.parametrize("method", ["optimal", "toppra"])
+def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
+    """Without shaping it rings with 0.8 mm; method fir, which chooses its filters for the mode, takes 1.0419 s."""
+    made = plan(pentagon, SHAKEN, method=method, shaped=True)
+    assert made.verdict.passed
+    assert left(made) < LEFT
+    assert made.trajectory.cycle_time < plan(pentagon, SHAKEN, method="fir").trajectory.cycle_time
+    assert "shaped for 1 vibration modes" in made.sentence
+
+
+def test_without_shaping_it_rings(pentagon):
+    made = plan(pentagon, SHAKEN, method="bezier")
+    assert left(made) > 0.1
+    assert any("does not shape its set points" in note for note in made.notes)
+
+
+PROGRAM = b"""G21 G90 G17 G94 G64 P0.04 F3000
+G1 X6
+G2 X10 Y4 I0 J4
+G1 X10 Y9
+G61.1 G1 X4 Y12
+G4 P0.05
+G64 P0.04 G1 X0 Y12
+G1 X-0.3 Y12.2
+G1 X-0.3 Y15 Z1
+M2
+"""
+
+
+def test_arcs_stops_and_dwells_with_two_modes_and_filters():
+    """The verdict judges the exact stop, the dwell, and what comes out of the machine's own filters."""
+    machine = problems.machine(
+        modes=(Mode(frequency=25.0, damping=0.02), Mode(frequency=60.0)),
+        fir=Fir(time_constants=(0.01, 0.004)),
+    )
+    made = plan(parse_program(PROGRAM, machine), machine, method="toppra", corner="bezier", shaped=True)
+    assert made.verdict.passed, made.verdict.faults
+    assert left(made) < LEFT
+
+
+def test_an_exact_stop_stands_still():
+    machine = problems.machine(modes=(Mode(frequency=25.0),))
+    made = plan(parse_program(PROGRAM, machine), machine, method="toppra", corner="bezier", shaped=True)
+    corner = np.linalg.norm(made.trajectory.position - [4.0, 12.0, 0.0], axis=1)
+    assert ((corner < 1e-6).sum() - 1) * machine.dt >= 0.05 - 2 * machine.dt
+    assert made.verdict.passed
+
+
+def test_refusals(pentagon):
+    with pytest.raises(InputError, match="has no vibration modes"):
+        plan(pentagon, problems.machine(), shaped=True)
+    with pytest.raises(InputError, match="shaped = True: method kinematic does not use it"):
+        plan(pentagon, SHAKEN, method="kinematic", shaped=True)

@@ -1,0 +1,314 @@
+"""What the limits cost: every price against plans made again with that limit changed, and against laws that need no second plan."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import planner
+from benchmarks import problems
+from planner.constraints.assemble import feedrate_problem
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.grid import refine_for_jerk
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.geometry.build import toolpath_from_program
+from planner.job.records import SAVED_MIN
+from planner.machine import Fir
+from planner.methods.optimal import SIGMA2, OptimalMethod
+from planner.nc.reader import parse_program
+from planner.optimal.on_path import corner_shape
+from planner.path.samples import sample_path
+from planner.sensitivity import prices
+from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, price_list
+
+MACHINE = problems.machine()
+LINES = "G21 G90 G17\nF4800\nG1 X3\nX4 Y2.5\nX9 Y3\nX9.2 Y6\nX6 Y9\nX0 Y9.5\n"
+ARCS = "G21 G90 G17\nF4800\nG1 X5\nG2 X9 Y-4 I0 J-4\nG1 Y-8\nX5 Y-10\nG3 X2 Y-13 I0 J-3\nG1 X0\n"
+# A leg that is too short for its two corners, the second of which is the slower one.
+SHARED = [[0, 0], [0.901, 2.025], [1.157, 2.648], [-0.097, 3.752], [0.016, 4.212], [-0.086, 6.879]]
+QUANTITIES = ("velocity", "acceleration", "jerk")
+STEP = 0.02  # of differences between plans [-]; below it the grid, which changes with the limits, is seen
+NOTHING = 1e-3  # a derivative dT/d(ln limit) below this share of T is nothing: the grid's own changes
+
+
+@dataclass(frozen=True)
+class Job:
+    """A program on a machine, planned as method `optimal` does, up to the solution on the grid."""
+
+    program: object
+    machine: object = MACHINE
+    corner: str = "bezier"
+    more: tuple[int, float] = (0, 0.0)  # joint, and what is added to its tolerance [mm]
+
+    def __post_init__(self):
+        toolpath = toolpath_from_program(self.program, self.machine)
+        tolerance = toolpath.tolerance.copy()
+        tolerance[self.more[0]] += self.more[1]
+        toolpath = dataclasses.replace(toolpath, tolerance=tolerance)
+        shape = (
+            BezierCorner(sigma2=SIGMA2)
+            if self.corner == "bezier"
+            else corner_shape(self.corner, self.machine, toolpath)
+        )
+        path = round_corners(toolpath, self.machine, shape, blend_tangents=True)
+        samples = refine_for_jerk(sample_path(path, self.machine, third_order=True), self.machine)
+        problem = feedrate_problem(samples, self.machine)
+        for name, value in (
+            ("samples", samples),
+            ("problem", problem),
+            ("solution", JerkLimited().solve(problem).require()),
+        ):
+            object.__setattr__(self, name, value)
+
+    @property
+    def time(self) -> float:
+        return self.solution.cycle_time
+
+    def prices(self):
+        return price_list(self.samples, self.problem, self.solution, self.machine)
+
+    def slope(self, changed) -> float:
+        """dT/d(ln of something) from two more plans; `changed(factor)` gives what differs."""
+        up, down = (dataclasses.replace(self, **changed(1.0 + step)).time for step in (STEP, -STEP))
+        return (up - down) / (2.0 * STEP)
+
+
+def text(program: str, machine=MACHINE):
+    return parse_program(program, machine)
+
+
+def with_limit(machine, name: str, factor: float):
+    quantity, _, axis = name.partition(".")
+    limits = machine.axes[axis]
+    more = limits.model_copy(update={quantity: getattr(limits, quantity) * factor})
+    return machine.model_copy(update={"axes": machine.axes | {axis: more}})
+
+
+def with_feed(program, factor: float):
+    return dataclasses.replace(program, feed=program.feed * factor)
+
+
+def with_tolerance(machine, factor: float):
+    return machine.model_copy(update={"tolerance": machine.tolerance * factor})
+
+
+def limit(machine, name: str) -> float:
+    quantity, _, axis = name.partition(".")
+    return getattr(machine.axes[axis], quantity)
+
+
+def names(job):
+    return [f"{quantity}.{axis}" for quantity in QUANTITIES for axis in job.problem.axes]
+
+
+@pytest.fixture(scope="module", params=["lines", "arcs", "slow axes"])
+def job(request) -> Job:
+    if request.param == "slow axes":  # which the programmed feed does not reach
+        return Job(text(LINES), problems.machine(velocity=55.0))
+    return Job(text({"lines": LINES, "arcs": ARCS}[request.param]))
+
+
+def test_axis_limits_cost_what_plans_made_again_say(job):
+    priced = job.prices()
+    some = 0
+    for name in names(job):
+        slope = job.slope(lambda factor, name=name: {"machine": with_limit(job.machine, name, factor)})
+        share = priced.limits[name] * limit(job.machine, name)
+        assert share == pytest.approx(slope, rel=0.05, abs=NOTHING * job.time), name
+        assert priced.saved[name] <= -share * MORE_LIMIT + NOTHING * job.time  # convex
+        some += slope < -0.02 * job.time
+    assert some >= 4
+
+
+def test_the_feed_costs_what_plans_made_again_say(job):
+    slope = job.slope(lambda factor: {"program": with_feed(job.program, factor)})
+    assert job.prices().feed == pytest.approx(slope, rel=0.05, abs=NOTHING * job.time)
+
+
+def test_the_tolerance_costs_what_plans_made_again_say(job):
+    priced, tolerance = job.prices(), job.machine.tolerance
+    slope = job.slope(lambda factor: {"machine": with_tolerance(job.machine, factor)})
+    assert slope < -0.02 * job.time
+    assert priced.tolerance * tolerance == pytest.approx(slope, rel=0.05)
+    larger = job.machine.model_copy(update={"tolerance": tolerance + MORE_TOLERANCE})
+    saved = job.time - dataclasses.replace(job, machine=larger).time
+    assert priced.saved["tolerance"] == pytest.approx(saved, rel=0.1)
+
+
+def assert_corners(job: Job, dear, *, rel: float) -> None:
+    """`saved` of every listed corner, against a plan with `MORE_TOLERANCE` there alone."""
+    toolpath = job.samples.path.toolpath
+    assert (np.diff(dear.saved) <= 0).all()
+    assert len(dear) <= prices.DEAREST
+    for k in range(len(dear)):
+        segment = int(np.flatnonzero(toolpath.line == dear.line[k])[-1])
+        np.testing.assert_array_equal(dear.position[k], toolpath.end[segment])
+        assert dear.theta[k] == pytest.approx(toolpath.theta[segment + 1], abs=1e-12)
+        again = dataclasses.replace(job, more=(segment + 1, MORE_TOLERANCE))
+        assert dear.saved[k] == pytest.approx(job.time - again.time, rel=rel, abs=1e-4 * job.time)
+
+
+def test_single_corners_save_what_plans_made_again_save(job):
+    dear = job.prices().corners
+    assert len(dear) >= 3
+    assert_corners(job, dear, rel=0.12)
+
+
+def test_corners_that_share_a_leg_count_what_they_take_from_each_other():
+    """The tolerance of all lets both corners at the short leg grow, that of one only the second, at the cost of the first."""
+    job = Job(problems.polyline(SHARED))
+    dear = job.prices().corners
+    assert dear.line.tolist() == [2]
+    assert_corners(job, dear, rel=0.2)
+
+
+def test_without_the_corners_growth_accelerations_would_be_priced_wrong():
+    """With long periods the chord error counts: more acceleration takes from the rounding what corners need for their speed."""
+    machine = problems.machine(dt=0.004)
+    job = Job(text(LINES), machine)
+    name = "acceleration.y"
+    slope = job.slope(lambda factor: {"machine": with_limit(machine, name, factor)})
+    assert job.prices().limits[name] * limit(machine, name) == pytest.approx(slope, rel=0.02)
+    with_corners_as_they_are = job.solution.prices.acceleration[1] * limit(machine, name)
+    assert with_corners_as_they_are != pytest.approx(slope, rel=0.05)
+
+
+def test_prices_sum_up_to_the_cycle_time(job):
+    """On the same path, time k times as fast is velocities times k, accelerations k^2, jerks k^3, feeds k, periods 1/k: derived by
+    k, and with a period so short that its error budget is nothing,  sum v T_v + 2 a T_a + 3 j T_j + T_feed = -T."""
+    short = job.machine.model_copy(update={"dt": 1e-6})
+    job = dataclasses.replace(job, machine=short)
+    priced = job.prices()
+    order = dict(zip(QUANTITIES, (1, 2, 3), strict=True))
+    total = sum(
+        order[name.partition(".")[0]] * price * limit(short, name) for name, price in priced.limits.items()
+    )
+    assert total + priced.feed == pytest.approx(-job.time, rel=5e-3)
+
+
+def test_a_limit_that_holds_nothing_costs_nothing():
+    """At a crawl the feed is all there is: half of it takes twice the time."""
+    job = Job(text(LINES.replace("F4800", "F6")))
+    priced = job.prices()
+    assert priced.feed == pytest.approx(-job.time, rel=0.02)
+    for name in names(job):
+        assert abs(priced.saved[name]) < 1e-3 * job.time, name
+    assert priced.ranked()[0][0] == "feed"
+
+
+def test_the_feed_is_worth_nothing_where_an_axis_is_as_slow():
+    """Along x both are at their limit, and more feed alone saves nothing."""
+    job = Job(problems.polyline([[0, 0], [80, 0]], feed=100.0), problems.machine(velocity=100.0))
+    priced = job.prices()
+    assert priced.feed == pytest.approx(0.0, abs=1e-9)
+    faster = dataclasses.replace(job, program=with_feed(job.program, 1.0 + STEP))
+    assert faster.time == pytest.approx(job.time, rel=1e-6)
+
+
+def test_ranked_tells_what_saves_time_and_nothing_else(job):
+    priced = job.prices()
+    ranked = priced.ranked()
+    saved = [seconds for _, seconds in ranked]
+    assert saved == sorted(saved, reverse=True)
+    assert min(saved) >= SAVED_MIN
+    assert dict(ranked) == {name: value for name, value in priced.saved.items() if value >= SAVED_MIN}
+
+
+# How far off the tolerance is priced for corners that bend while they grow: see the text of the module.
+@pytest.mark.parametrize(("corner", "rel"), [("kinematic", 0.15), ("fir", 0.4)])
+def test_other_corner_shapes(corner, rel):
+    machine = problems.machine(fir=Fir(time_constants=[0.01, 0.004])) if corner == "fir" else MACHINE
+    job = Job(text(LINES), machine, corner=corner)
+    priced = job.prices()
+    slope = job.slope(lambda factor: {"machine": with_tolerance(machine, factor)})
+    assert priced.tolerance * machine.tolerance == pytest.approx(slope, rel=rel)
+    assert len(priced.corners) == 5
+    assert_corners(job, priced.corners, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "G1 X10 F3000\n",
+        "G61.1\nG1 X10 F3000\nY5\nX0\n",
+        "G1 X0 F3000\nG2 X0 Y0 I5 J0\n",
+        "G0 X10\nG4 P0.2\nG0 Y5\n",
+    ],
+    ids=["one line", "exact stops", "circle", "rapids and a dwell"],
+)
+def test_paths_without_corners(program):
+    plan = OptimalMethod().plan(text(program), MACHINE)
+    assert plan.prices.tolerance == 0.0
+    assert len(plan.prices.corners) == 0
+    assert "tolerance" not in dict(plan.prices.ranked())
+    assert sum(plan.prices.saved.values()) > 0.0
+
+
+def test_a_plotter_file_has_prices(tmp_path):
+    file = tmp_path / "square.plt"
+    file.write_text("IN;SP1;PU0,0;PD1000,0;PD1000,1000;PD0,1000;PU;SP0;")
+    plan = planner.plan(file, "plotter", method="optimal", corner="bezier")
+    assert plan.prices.saved["tolerance"] > 0.0
+    assert len(plan.prices.corners) == 2
+
+
+@dataclass(frozen=True)
+class OtherPath:
+    """A path that is not rounded corner by corner: what the limits need of it, and nothing else."""
+
+    toolpath: object
+    tol: object
+    tol_ap: object
+
+
+def test_paths_of_another_kind_do_not_know_what_the_tolerance_costs():
+    job = Job(text(LINES))
+    path = job.samples.path
+    samples = dataclasses.replace(job.samples, path=OtherPath(path.toolpath, path.tol, path.tol_ap))
+    priced = price_list(samples, job.problem, job.solution, job.machine)
+    known = job.prices()
+    assert priced.tolerance is None
+    assert priced.corners is None
+    assert "tolerance" not in priced.saved
+    assert priced.feed == known.feed
+    for name in names(job):
+        if not name.startswith("acceleration"):
+            assert priced.limits[name] == known.limits[name]
+    shape_as_it_is = job.solution.prices.acceleration
+    assert [priced.limits[f"acceleration.{axis}"] for axis in "xyz"[: len(shape_as_it_is)]] == pytest.approx(
+        shape_as_it_is
+    )
+
+
+def test_a_solver_without_multipliers_has_no_prices():
+    job = Job(text(LINES))
+    with pytest.raises(ValueError, match="no multipliers"):
+        price_list(job.samples, job.problem, dataclasses.replace(job.solution, multipliers=None), MACHINE)
+
+    class Silent:
+        def solve(self, problem, progress=None):
+            return dataclasses.replace(JerkLimited().solve(problem), multipliers=None)
+
+    plan = OptimalMethod(solver=Silent()).plan(job.program, MACHINE)
+    assert plan.solved
+    assert plan.prices is None
+
+
+@pytest.mark.parametrize("name", ["pentagon", "zigzag"])
+def test_splines_price_their_tolerance(name):
+    """Within a third of plans made again with 1 to 10 um more: the plan is not quite the optimum that the multipliers belong to."""
+    program = problems.all_jobs()[name]
+    method = OptimalMethod(corner="spline", rounds=8)
+    plan = method.plan(program, MACHINE)
+    more = 0.005
+    wider = method.plan(program, MACHINE, MACHINE.tolerance + more)
+    slope = (wider.trajectory.cycle_time - plan.trajectory.cycle_time) / more
+    assert plan.prices.tolerance == pytest.approx(slope, rel=0.34)
+    dear = plan.prices.corners
+    assert 0 < len(dear) <= 10
+    assert (np.diff(dear.saved) <= 0.0).all()
+    assert dear.price.sum() >= plan.prices.tolerance * (1 + 1e-9)  # part of the whole, all negative

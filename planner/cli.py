@@ -18,14 +18,17 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """Entry point of the command `planner`."""
-    from planner.commands.interrupt import end_at_interrupts
+    from planner.commands.interrupt import end_at_interrupts, no_more_interrupts
 
     end_at_interrupts()
     from planner.commands.app import app
     from planner.commands.terminal import prepare_streams
 
     prepare_streams()
-    app(prog_name="planner")
+    try:
+        app(prog_name="planner")
+    finally:
+        no_more_interrupts()
 
 
 def __getattr__(name: str) -> Any:

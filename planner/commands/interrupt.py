@@ -28,6 +28,12 @@ def end_at_interrupts() -> None:
         signal.signal(signal.SIGINT, _end)
 
 
+def no_more_interrupts() -> None:
+    """Let the command, whose work is done, end with its own exit code: Python takes handlers away before it leaves."""
+    if signal.getsignal(signal.SIGINT) is _end:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _end(_: int, __: FrameType | None) -> None:
     try:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # a second Ctrl-C does not wait

@@ -47,8 +47,8 @@ class Fir(_Record):
     settings of that method.
 
     time_constants : their lengths [s], any number, in any order
-    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; methods `optimal` and `toppra`,
-                     and `bezier` at its corners, keep it, the others do not use it
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept by methods `optimal` and
+                     `second-order` everywhere and by `bezier` at its corners; the other methods do not use it
     """
 
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]

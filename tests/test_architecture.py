@@ -19,6 +19,7 @@ LAYERS = (
     "planner.base.arrays",
     "planner.base.files",
     "planner.base.kernels",
+    "planner.base.names",
     "planner.base.search",
     "planner.base",
     "planner.fir.filters",

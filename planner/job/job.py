@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from planner.base.names import OPTIMAL, SECOND_ORDER
 from planner.delivery import periods
 from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
@@ -191,7 +192,11 @@ class Job:
         """Say so where vibration modes are excited; method fir makes its filters as long as leaves them at rest."""
         shaped = trajectory is None or isinstance(self.motion_of.get(trajectory), ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
-            can = "--shaped does" if method in ("optimal", "toppra") else "optimal and toppra can: --shaped"
+            can = (
+                "--shaped does"
+                if method in (OPTIMAL, SECOND_ORDER)
+                else f"{OPTIMAL} and {SECOND_ORDER} can: --shaped"
+            )
             self.note(
                 f"method {method} does not shape its set points for the machine's vibration modes; {can}"
             )

@@ -1,7 +1,7 @@
 """Several methods on one job, side by side: a row per method, as a table, as JSON or as CSV.
 
-The best is the fastest motion that passed with all of its quantities limited; a motion without a jerk limit (method toppra) is compared
-with it but is not it, unless no other passed.
+The best is the fastest motion that passed with every quantity limited. A motion without a jerk limit (method second-order) is listed
+beside it, and is the best only if no other passed.
 """
 
 from __future__ import annotations
@@ -234,7 +234,7 @@ def comparison_csv(rows: list[Row]) -> str:
     return out.getvalue()
 
 
-def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+def check_comparison_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
     """Raise InputError for another suffix than .json and .csv, or a place that is no file in a directory; for one of the inputs; for a
     file that no comparison wrote, unless `force` is set."""
     if path.suffix not in SUFFIXES:

@@ -23,7 +23,7 @@ SUFFIXES = (".parquet", ".csv")
 COLUMNS = ("t", "axis", "direction", "count", "line")
 
 
-def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+def check_pulse_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
     """Raise InputError for another suffix than those of pulse files, one of the inputs, or a file that holds no pulses of ours, unless
     `force` is set."""
     if path.suffix not in SUFFIXES:

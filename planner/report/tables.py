@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.optimum import held_by_text, price_rows
@@ -29,8 +30,7 @@ NOTES_SHOWN = 8
 def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage, how it was solved;
     then the notes (None: the plan's)."""
-    corner = f" on {plan.corner} corners" if plan.corner else ""
-    title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
+    title = f"{plan.program.source}: {plan.method}{_smoothing(plan)}, machine {plan.machine.name}"
     table = _pairs()
     if plan.trajectory is not None:
         time = plan.trajectory.cycle_time
@@ -55,6 +55,13 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
+def _smoothing(plan: Plan) -> str:
+    """How the path was smoothed, where the method's name does not say it."""
+    if plan.corner in (None, plan.method):
+        return ""
+    return f" on {plan.corner} corners" if plan.geometry == SINGLE_CORNERS else f", geometry {plan.geometry}"
+
+
 def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
     """A verdict by itself; before it what was asked, name and text."""
     table = _pairs()
@@ -64,7 +71,7 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
     return _titled(title, table)
 
 
-def corner_table(corners: CornerCheck) -> Table | None:
+def corners_table(corners: CornerCheck) -> Table | None:
     """Eq. 18-20 at every programmed corner, of many those that come closest to them; None without corners."""
     if not len(corners):
         return None

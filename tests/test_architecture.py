@@ -18,6 +18,7 @@ LAYERS = (
     "planner.base.errors",
     "planner.base.arrays",
     "planner.base.files",
+    "planner.base.glossary",
     "planner.base.kernels",
     "planner.base.names",
     "planner.base.search",

@@ -1,5 +1,4 @@
-"""What the interior-point method of interior_point.py is set to: one record, the same for every problem.
-"""
+"""What the interior-point method of interior_point.py is set to: one record, the same for every problem."""
 
 from __future__ import annotations
 

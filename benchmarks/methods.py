@@ -32,7 +32,7 @@ from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.registry import METHODS
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.optimal.on_path import CORNERS
+from planner.optimal.geometry import CORNERS
 from planner.report.comparison import Row, best_of, refused, row_of_plan
 
 ROUNDING = ("optimal", "toppra")

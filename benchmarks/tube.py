@@ -23,7 +23,7 @@ from benchmarks import problems
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.errors import PlannerError
 from planner.nc.program import Program
-from planner.optimal.on_path import CORNERS
+from planner.optimal.geometry import CORNERS
 
 ANGLES = (15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 160, 170)  # [deg]
 LEG = 20.0  # [mm]

@@ -47,6 +47,8 @@ LAYERS = (
     "planner.job.stages",
     "planner.delivery",
     "planner.job",
+    "planner.methods.kinematic",  # two motions that the loop compares its own with
+    "planner.methods.stop",
     "planner.optimal",
     "planner.methods",
     "planner.report",

@@ -5,6 +5,7 @@
     Machine, load_machine
     Program, read_program
     Toolpath, Trajectory, Verdict
+    Trace                what planning tried, step by step
     InputError, NotSolvedError
     __version__
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
+    from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
     from planner.methods.registry import plan
     from planner.motion.trajectory import Trajectory
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
+    "Trace": "planner.job.trace",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
@@ -48,6 +51,7 @@ __all__ = [
     "Plan",
     "Program",
     "Toolpath",
+    "Trace",
     "Trajectory",
     "Verdict",
     "load_machine",

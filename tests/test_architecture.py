@@ -44,6 +44,7 @@ LAYERS = (
     "planner.verify",
     "planner.job.records",
     "planner.sensitivity",
+    "planner.job.trace",
     "planner.job.stages",
     "planner.delivery",
     "planner.job",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -72,6 +73,14 @@ def plan(
     corners: Annotated[
         bool, typer.Option("--corners", help="list every programmed corner beside eq. 18-20")
     ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option("-v", "--verbose", help="say on standard error what planning tries, step by step"),
+    ] = False,
+    trace: Annotated[
+        Path | None,
+        typer.Option("--trace", metavar="FILE", help="write what planning tried into FILE (JSON)"),
+    ] = None,
     force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
@@ -82,13 +91,18 @@ def plan(
     if file_format is not None and output is None:
         raise InputError("--format is that of the trajectory in the output directory: give one with -o DIR")
     from planner import plan as plan_program
+    from planner.job.trace import Trace
+    from planner.report import trace_file
     from planner.report.export import SUMMARY, check_places, summary, write_plan
 
     form = file_format or Format.parquet
     if output is not None:
         inputs = [job, Path(machine or DEFAULT_MACHINE)]
         check_places(output, inputs, file_format=form.value, plots=plot, force=force)
-    with ProgressBar(quiet=quiet) as progress:
+    if trace is not None:
+        trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+    steps = Trace(line=partial(say, err=True) if verbose else None)
+    with ProgressBar(quiet=quiet or verbose) as progress:
         result = plan_program(
             job,
             machine or DEFAULT_MACHINE,
@@ -99,12 +113,15 @@ def plan(
             shaped=shaped,
             tolerance=tolerance,
             progress=progress,
+            log=steps if verbose or trace is not None else None,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)
             written = write_plan(result, output, file_format=form.value, plots=plot, force=force)
 
+    if trace is not None:
+        trace_file.write_trace(trace, steps, result)
     said = summary(result)
     if written and output is not None:  # with what was not written, and why
         said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]

@@ -9,6 +9,7 @@ from planner.base.errors import InputError
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
+from planner.job.trace import Log
 from planner.machine import Machine, load_machine
 from planner.methods.bezier import BezierMethod
 from planner.methods.fir import FirMethod
@@ -56,6 +57,7 @@ def plan(
     shaped: bool = False,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    log: Log | None = None,
 ) -> Plan:
     """Plan, sample and verify the motion of an NC program.
 
@@ -69,6 +71,7 @@ def plan(
     shaped    : deliver set points that leave the machine's vibration modes at rest, for "toppra" and "optimal" only
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
+    log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
     Raises InputError naming file, line and column, and for a setting that the method does not use. A problem that could not be
     solved is the plan's status; `Plan.require` turns it into an exception.
@@ -85,11 +88,11 @@ def plan(
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if isinstance(program, Program):
-        return method.plan(program, machine, tolerance, progress)
+        return method.plan(program, machine, tolerance, progress, log)
     reading = Stages(progress)
     with reading.stage("read"):
         program = read_program(program, machine)
-    made = method.plan(program, machine, tolerance, progress)
+    made = method.plan(program, machine, tolerance, progress, log)
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 

@@ -53,6 +53,12 @@ def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> t
         places = behind.places(waiting, path)
         if not len(places.time) and (best is None or waiting.end < best[1].end):
             best = planned, waiting
+        job.tell(
+            "filters",
+            found=waiting.end,
+            places=len(places.time),
+            kept=best is not None and best[1] is waiting,
+        )
         zone = _zones(plain, waiting, behind, places.near_time)
         now = np.array([waiting.law.feed[a:b].min() ** 2 for a, b in zone])
         change = np.where(now > 0.0, _change(places, path[1]), 1.0)  # a full stop is not made slower

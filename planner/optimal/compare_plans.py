@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from planner.corners.smooth import round_corners
 from planner.job.job import Job
 from planner.job.plan import Plan
+from planner.job.trace import Tell
 from planner.optimal.compare_corners import corner_bounds
 from planner.optimal.geometry import corner_shape
 from planner.optimal.order import Order
@@ -45,6 +46,9 @@ def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
             path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
         with job.stage("solve"):
             bounds = corner_bounds(path, job.machine)
+        job.tell(
+            "bound on corners", found=bounds.time.sum() + dwell, corner=name, points=int(bounds.points.sum())
+        )
         if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= counted_time(best):
             continue
         coarse = order.solve(path, job, COARSER).solution
@@ -61,8 +65,17 @@ def counted_time(plan: Plan) -> float:
     return plan.trajectory.cycle_time if chords else float("inf")
 
 
-def better(best: Plan, rival: Plan, why: str) -> Plan:
+def better(best: Plan, rival: Plan, why: str, tell: Tell) -> Plan:
     """The rival if it takes less time, with the sentence `why`, else the best."""
-    if counted_time(rival) < (1.0 - FASTER) * counted_time(best):
+    kept = counted_time(rival) < (1.0 - FASTER) * counted_time(best)
+    tell(
+        "compare",
+        found=counted_time(rival),
+        before=counted_time(best),
+        kept=kept,
+        method=rival.method,
+        corner=rival.corner or "none",
+    )
+    if kept:
         return dataclasses.replace(rival, sentence=f"{why} than splines; {rival.sentence}")
     return best

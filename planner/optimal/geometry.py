@@ -14,6 +14,7 @@ from planner.corners.fir import FirCorner
 from planner.corners.kinematic import KinematicCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
 from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape
 
@@ -40,10 +41,11 @@ def corner_shape(
 
 
 def splined_with_stops(
-    rounded: SmoothPath, machine: Machine, blend_tangents: bool
+    rounded: SmoothPath, machine: Machine, blend_tangents: bool, tell: Tell = tell_nobody
 ) -> tuple[SmoothPath, SplineShape]:
     """The splines of a path, and the path with full stops where runs get none (module text)."""
     shape = spline_shape(rounded, machine)
+    _tell_of(shape, tell, 0)
     for again in range(STOP_ROUNDS):
         at = lost_joints(rounded, shape, fence=again == STOP_ROUNDS - 1)
         if not len(at):
@@ -51,4 +53,16 @@ def splined_with_stops(
         stopping = rounded.toolpath.with_joints(at, Joint.STOP)
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
         shape = spline_shape(rounded, machine)
+        _tell_of(shape, tell, len(at))
     return rounded, shape
+
+
+def _tell_of(shape: SplineShape, tell: Tell, stops: int) -> None:
+    fits = shape.laid.fits
+    tell(
+        "splines",
+        runs=len(fits),
+        with_a_spline=int(fits.sum()),
+        spans=int(shape.laid.span_first[-1]),
+        stops_added=stops,
+    )

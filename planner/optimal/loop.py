@@ -103,17 +103,17 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
         return smooth
     if job.stop_time < counted_time(best):
         stopped = StopMethod().plan_job(job.afresh())
-        best = better(best, stopped, "full stops at all blocks take less time")
+        best = better(best, stopped, "full stops at all blocks take less time", job.tell)
     if smooth.grid_points <= RIVAL_POINTS:
         for name in chances(best, job, settings.order):
             cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
-            best = better(best, cornered, f"{name} corners take less time")
+            best = better(best, cornered, f"{name} corners take less time", job.tell)
             if name == "kinematic":
                 kinematic = KinematicMethod().plan_job(job.afresh())
-                best = better(best, kinematic, "method kinematic takes less time")
+                best = better(best, kinematic, "method kinematic takes less time", job.tell)
     if counted_time(best) == np.inf:
         kinematic = KinematicMethod().plan_job(job.afresh())
-        best = better(best, kinematic, "method kinematic keeps all limits in less time")
+        best = better(best, kinematic, "method kinematic keeps all limits in less time", job.tell)
     if best is smooth:
         return smooth
     best = dataclasses.replace(best, method=smooth.method, corner=smooth.corner, timings=job.stages.timings)
@@ -127,7 +127,7 @@ def plan_on_path(job: Job, settings: Settings) -> Plan:
     best, made, prices = time_optimal(job, settings), None, None
     if best.solution.solved:
         with job.stage("solve"):
-            best, motion = within_limits(best, settings.order, job.toolpath, job.machine)
+            best, motion = within_limits(best, settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
         made = _delivered(job, motion, () if settings.order.jerk_limited else ("jerk",))
@@ -148,7 +148,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     if settings.corner not in (AUTO, SPLINE):
         return order.solve(given, job)
     with job.stage("geometry"):
-        rounded, splines = splined_with_stops(given, machine, blend_tangents=order.jerk_limited)
+        rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
     if not splines.laid.fits.any():
         return dataclasses.replace(order.solve(given, job), notes=no_spline_note(rounded, splines))
 
@@ -166,12 +166,14 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         small = of_given.points.sum() <= COMPARED_POINTS
         if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
             without = order.solve(given, job)
+            _tell_of(job, "no added stops", without, best)
             if without.faster_than(best):
                 return without
 
     # Once more on a finer grid.
     if best.solution.solved and len(best.samples) <= FINE_POINTS:
         fine = order.solve(best.path, job, FINER)
+        _tell_of(job, "finer grid", fine, best)
         if fine.faster_than(best):
             best = dataclasses.replace(fine, shape=best.shape)
     return dataclasses.replace(best, notes=notes)
@@ -197,7 +199,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
     force = np.full(len(shape.laid.fits), FIRST_FORCE)
     paid: FloatArray | None = None  # what limits cost, mean over the rounds
     reached = [best.solution.cycle_time]
-    for _ in range(rounds):
+    for n in range(1, rounds + 1):
         if len(reached) > seen and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - seen]:
             break
         with job.stage("geometry"):
@@ -205,6 +207,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
             paid = newest if paid is None else paid + SHARE * (newest - paid)
             shape, _ = reshape(best, force, paid, pull)
         before, tried = best, solve(shape)
+        _tell_of(job, f"reshape {n}", tried, best)
         if not tried.solution.solved:
             break
         faster = run_times(tried) < run_times(before)
@@ -212,6 +215,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
             best = tried
         if not (faster | ~shape.laid.fits).all():
             mixed = solve(chosen(before, shape, faster))
+            _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
             if mixed.faster_than(best):
                 best = mixed
         if not jerk_limited and not faster.all():
@@ -219,6 +223,12 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
         force = np.where(faster, LESS * force, more * force)
         reached.append(best.solution.cycle_time)
     return best
+
+
+def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> None:
+    """Tell of a motion that was tried, and competes with the best."""
+    before = best.solution.cycle_time
+    job.tell(name, found=tried.solution.cycle_time, before=before, kept=tried.faster_than(best), **facts)
 
 
 def _delivered(job: Job, motion: Motion, not_limited: tuple[str, ...]) -> Delivered:
@@ -229,6 +239,7 @@ def _delivered(job: Job, motion: Motion, not_limited: tuple[str, ...]) -> Delive
         gentler = without_seen_excess(motion, made[1], again)
         if gentler is None:
             break
+        job.tell("slower for verdict", found=gentler.end, before=motion.end, round=again + 1)
         motion = gentler
         made = job.deliver(motion, not_limited, seed=again + 1)
     return made

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
@@ -62,7 +62,9 @@ class ThirdOrder:
             samples = refine_for_jerk(samples, job.machine)
             problem = feedrate_problem(samples, job.machine, measured=True)
             solution = self.solver.solve(problem, progress)
-        return OnPath(path=path, samples=samples, problem=problem, solution=solution)
+        planned = OnPath(path=path, samples=samples, problem=problem, solution=solution)
+        _tell(job, planned, finer)
+        return planned
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,7 @@ class SecondOrder:
             if self.to_tighten:
                 samples = refine_for_jerk(samples, job.machine)
             planned = second_order(path, samples, job.machine, self.solver)
+            _tell(job, planned, finer)
             if not planned.solution.solved:
                 return planned
             multipliers = second_order_multipliers(planned.problem, planned.solution)
@@ -105,6 +108,16 @@ def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solve
         problem = feedrate_problem(samples, machine, measured=True)
         solution = solver.solve(problem)
     return OnPath(path=path, samples=samples, problem=problem, solution=solution)
+
+
+def _tell(job: Job, planned: OnPath, finer: float) -> None:
+    facts: dict[str, Any] = {"points": len(planned.samples), "stretches": len(planned.samples.piece) - 1}
+    if finer != 1.0:
+        facts["resolution"] = finer
+    if planned.solution.iterations:
+        facts["iterations"] = planned.solution.iterations
+    facts |= {name: count for name, count in planned.solution.effort.items() if count}
+    job.tell("solve", found=planned.solution.cycle_time, **facts)
 
 
 def _resolution(finer: float) -> float | None:

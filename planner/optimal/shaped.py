@@ -83,6 +83,14 @@ def shaped(job: Job, settings: Settings) -> Shaped | None:
         if not planned.solution.solved:
             continue
         made = _Settling(job, shaper, settings).settled(planned, best.delivered.end if best else np.inf)
+        job.tell(
+            "shaped",
+            found=made[2].end if made else np.nan,
+            before=best.delivered.end if best else np.inf,
+            kept=made is not None,
+            stops=stops,
+            limits=more,
+        )
         if made is None:
             continue
         said = (

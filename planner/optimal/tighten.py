@@ -17,6 +17,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import paced, runs_of
 from planner.geometry.toolpath import Toolpath
+from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
 from planner.motion.time_law import TimeLaw
 from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
@@ -106,7 +107,7 @@ def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
 
 
 def within_limits(
-    planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine
+    planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine, tell: Tell = tell_nobody
 ) -> tuple[OnPath, Motion]:
     """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
     `planned` has a solution. Without jerk limits the motion is taken as it is: accelerations step at grid points, between which they
@@ -116,6 +117,7 @@ def within_limits(
         return planned, motion
     factor = excess(motion, toolpath, machine)
     best = planned, slowed(motion, toolpath, machine, factor)
+    tell("between points", found=best[1].end, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
     for _ in range(1 if large else TIGHTENING_ROUNDS):
@@ -129,6 +131,13 @@ def within_limits(
         motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
         kept = slowed(motion, toolpath, machine, factor)
+        tell(
+            "tighten",
+            found=kept.end,
+            before=best[1].end,
+            kept=kept.end < best[1].end,
+            excess=float(factor.max() - 1.0),
+        )
         if kept.end < best[1].end:
             best = tighter, kept
     return best

@@ -94,19 +94,19 @@ class ScaledWindow:
             time=t,
         )
 
-    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int]:
+    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
-        Also the iterations of the longest try."""
-        most = 0
-        for x, u, p in self._starts(behind):
+        Also the iterations of the longest try, and from how many starts it was tried."""
+        most = starts = 0
+        for starts, (x, u, p) in enumerate(self._starts(behind), start=1):
             done, gap, residual, defect, lam, pi = kernel.minimise(
                 self.grid, x, u, p, self.jumps, tol, iterations
             )
             most = max(most, done)
             if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
                 kernel.track(self.grid, self._jerk, x, u, p, 0.0, POLISHING_ROUNDS, POLISHED)
-                return self._window(x, u, p, lam, pi), most
-        return None, most
+                return self._window(x, u, p, lam, pi), most, starts
+        return None, most, starts
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""

@@ -213,7 +213,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
         faster = run_times(tried) < run_times(before)
         if tried.faster_than(best):
             best = tried
-        if not (faster | ~shape.laid.fits).all():
+        if faster.any() and not (faster | ~shape.laid.fits).all():
             mixed = solve(chosen(before, shape, faster))
             _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
             if mixed.faster_than(best):

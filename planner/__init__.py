@@ -3,6 +3,7 @@
     plan                 read, round, solve, sample and verify a job: one call
     Plan                 what it returns
     Machine, load_machine
+    PathLimit, JointLimit limits of your own: docs/extending.md
     Program, read_program
     Toolpath, Trajectory, Verdict
     InputError, NotSolvedError
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
+    from planner.constraints.own import JointLimit, PathLimit
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
     from planner.machine import Machine, load_machine
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
+    "JointLimit": "planner.constraints.own",
+    "PathLimit": "planner.constraints.own",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
@@ -43,8 +47,10 @@ _HOME = {
 
 __all__ = [
     "InputError",
+    "JointLimit",
     "Machine",
     "NotSolvedError",
+    "PathLimit",
     "Plan",
     "Program",
     "Toolpath",

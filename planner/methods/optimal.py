@@ -107,8 +107,8 @@ class OptimalMethod(Method):
                     break
                 motion = gentler
                 made = job.deliver(motion, seed=again + 1)  # times from which nothing was fed back
-            # behind filters what a limit costs is not the problem's to say
-            if best.solution.multipliers and machine.fir is None:
+            # behind filters, and with limits of one's own, what a limit costs is not the problem's to say
+            if best.solution.multipliers and machine.fir is None and not machine.own:
                 with job.stage("report"):
                     by_site = _site_prices(best)
                     prices = price_list(best.samples, best.problem, best.solution, machine, by_site)

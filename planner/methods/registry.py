@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
+from planner.constraints.own import OwnLimit
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
@@ -54,6 +56,7 @@ def plan(
     solver: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
+    limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
@@ -67,6 +70,8 @@ def plan(
     rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
                 the size of the job lets pay
     shaped    : deliver set points that leave the machine's vibration modes at rest, for "toppra" and "optimal" only
+    limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "toppra" and "optimal" keep them, the
+                verdict judges every method by them
     tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
     progress  : called with the stage's name and the fraction done
 
@@ -84,6 +89,8 @@ def plan(
         )
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    if limits:
+        machine = machine.with_own((*machine.own, *limits))
     if isinstance(program, Program):
         return method.plan(program, machine, tolerance, progress)
     reading = Stages(progress)

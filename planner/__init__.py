@@ -3,7 +3,8 @@
     plan                 read, round, solve, sample and verify a job: one call
     Plan                 what it returns
     Machine, load_machine
-    PathLimit, JointLimit limits of your own: docs/extending.md
+    PathLimit, JointLimit, PolynomialCorner, Method, compare
+                         limits, corner shapes and methods of your own, and their comparison: docs/extending.md
     Program, read_program
     Toolpath, Trajectory, Verdict
     InputError, NotSolvedError
@@ -18,13 +19,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
     from planner.constraints.own import JointLimit, PathLimit
+    from planner.corners.own import PolynomialCorner
     from planner.geometry.toolpath import Toolpath
+    from planner.job.job import Method
     from planner.job.plan import Plan
     from planner.machine import Machine, load_machine
     from planner.methods.registry import plan
     from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
     from planner.nc.reader import read_program
+    from planner.report.comparison import compare
     from planner.verify import Verdict
 
     __version__: str
@@ -34,6 +38,9 @@ _HOME = {
     "Plan": "planner.job.plan",
     "JointLimit": "planner.constraints.own",
     "PathLimit": "planner.constraints.own",
+    "PolynomialCorner": "planner.corners.own",
+    "Method": "planner.job.job",
+    "compare": "planner.report.comparison",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
@@ -49,13 +56,16 @@ __all__ = [
     "InputError",
     "JointLimit",
     "Machine",
+    "Method",
     "NotSolvedError",
     "PathLimit",
     "Plan",
+    "PolynomialCorner",
     "Program",
     "Toolpath",
     "Trajectory",
     "Verdict",
+    "compare",
     "load_machine",
     "plan",
     "read_program",

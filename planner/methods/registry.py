@@ -8,6 +8,7 @@ from pathlib import Path
 
 from planner.base.errors import InputError
 from planner.constraints.own import OwnLimit
+from planner.corners.smooth import CornerShape
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
@@ -52,7 +53,7 @@ def plan(
     machine: Machine | str | Path | None = None,
     *,
     method: str | Method = "optimal",
-    corner: str | None = None,
+    corner: str | CornerShape | None = None,
     solver: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
@@ -65,7 +66,8 @@ def plan(
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `METHODS`, or a method with settings of your own
-    corner    : "auto", "spline", "bezier", "fir" or "kinematic", for "toppra" and "optimal" only; None for "auto"
+    corner    : "auto", "spline", "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py), for "toppra" and "optimal"
+                only; None for "auto"
     solver    : "reachability" or "toppra", for "toppra" only; None for "reachability"
     rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
                 the size of the job lets pay
@@ -100,7 +102,7 @@ def plan(
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 
-def _check_used(method: str | Method, **given: str | int | None) -> None:
+def _check_used(method: str | Method, **given: str | CornerShape | int | None) -> None:
     """Raise InputError for a setting that the method would ignore."""
     for setting, users in USED_BY.items():
         if given[setting] is None or method in users:
@@ -119,7 +121,7 @@ def _check_used(method: str | Method, **given: str | int | None) -> None:
         )
 
 
-def _method(name: str, corner: str, solver: str, rounds: int | None, shaped: bool) -> Method:
+def _method(name: str, corner: str | CornerShape, solver: str, rounds: int | None, shaped: bool) -> Method:
     if solver not in SOLVERS:
         raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
     if rounds is not None and rounds < 0:

@@ -74,7 +74,7 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     return CornerSpeeds(speed, names[limited_by])
 
 
-class Chain(NamedTuple):
+class CornerChain(NamedTuple):
     """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only the limits change.
 
     legs    : what is free between two joints, each with what the corners beside it took of their legs
@@ -91,7 +91,7 @@ class Chain(NamedTuple):
     begin: FloatArray
 
 
-def chain_of(samples: PathSamples, machine: Machine, corner_speed: FloatArray) -> Chain:
+def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArray) -> CornerChain:
     """The chain of legs and corners of a sampled path.
 
     corner_speed : (R+1,) largest speed of each joint's corner [mm/s]
@@ -113,7 +113,7 @@ def chain_of(samples: PathSamples, machine: Machine, corner_speed: FloatArray) -
     corner = joint >= 0
     bare = (corner[:-1] & corner[1:]) | ((np.diff(run) != 0) & (corner[:-1] | corner[1:]))
     if bare.any() or corner[0] or corner[-1]:
-        raise ValueError("chain_of: corners must leave a part of every leg free")
+        raise ValueError("corner_chain: corners must leave a part of every leg free")
 
     leg = np.flatnonzero(~corner)
     v, a, j = limits[:, leg]
@@ -130,7 +130,7 @@ def chain_of(samples: PathSamples, machine: Machine, corner_speed: FloatArray) -
         q=d_out,
         r=np.where(turns, np.append(length[before], 0.0), 0.0),
     )
-    return Chain(
+    return CornerChain(
         legs=LegLimits(length=length[leg] + d_out[:-1] + d_in[1:], v=v, a=a, j=j),
         passage=passage,
         joint=where,

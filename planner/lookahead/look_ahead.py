@@ -44,13 +44,11 @@ from planner.lookahead.ramps import (
     leg_time,
 )
 
-LENGTH_ROUNDING = (
-    1e-14  # the choice may lack this fraction of a leg's length [-]: rounding of sums of lengths
-)
+# The choice may lack this fraction of a leg's length [-]: rounding of sums of lengths.
+LENGTH_ROUNDING = 1e-14
 BISECTIONS = 60  # of a speed's bracket: to its last digit
-SPEED_ROUNDING = (
-    4e-16  # by which a speed in closed form is lowered until it is feasible with its rounding [-]
-)
+# A speed in closed form is lowered by this until it is feasible with its rounding [-]: two units of its last digit.
+SPEED_ROUNDING = 4e-16
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

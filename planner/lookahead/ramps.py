@@ -38,7 +38,7 @@ class JointKind(IntEnum):
     ZERO = 2  # corner with zero entry acceleration: p = alpha, q = eta (corners/kinematic.py)
     ENTRY = 3  # corner with entry deceleration: p = a, q = J (corners/kinematic.py)
     CONSTANT = (
-        4  # corner at constant speed: it takes p and q [mm] of the legs before and behind, and is r [mm] long
+        4  # corner at constant speed, r [mm] long, that takes p and q [mm] of the legs before and behind
     )
 
 

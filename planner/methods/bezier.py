@@ -24,7 +24,7 @@ from planner.geometry.toolpath import Joint
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable
-from planner.lookahead.constant_speed_corners import CornerSpeeds, chain_of, constant_speeds
+from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, corner_chain
 from planner.lookahead.look_ahead import look_ahead, moves, swept
 from planner.lookahead.ramps import JointKind
 from planner.machine import Machine
@@ -67,7 +67,7 @@ class BezierMethod(Method):
             samples = sample_path(path, shares)
         with job.stage("solve"):
             limits = constant_speeds(samples, shares)
-            chain = chain_of(samples, machine, limits.speed)
+            chain = corner_chain(samples, machine, limits.speed)
             chosen, _ = look_ahead(chain.legs, [chain.passage])
             stops = chain.joint[(chain.joint >= 0) & (chosen.kind == JointKind.STOP)]
         with job.stage("geometry"):
@@ -103,7 +103,7 @@ def _stopped(path: SmoothPath, joint: Array) -> SmoothPath:
 
 def _motion(samples: PathSamples, machine: Machine, speed: FloatArray) -> Motion:
     """The motion with the corners at most at the speeds (R+1,)."""
-    chain = chain_of(samples, machine, speed)
+    chain = corner_chain(samples, machine, speed)
     passage = swept(chain.legs, chain.passage)
     duration, jerk = moves(passage, chain.legs)
     law = law_of_moves(samples, chain.run, chain.begin, passage.V[:-1], duration, jerk)

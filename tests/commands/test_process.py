@@ -11,8 +11,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+import rich.progress
 from hand_made import SQUARE
 
 from planner.commands import terminal
@@ -180,13 +182,21 @@ def test_progress_without_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_the_clock_of_the_bar_runs_on_after_a_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(terminal, "PROGRESS_AFTER", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    bars: list[rich.progress.Progress] = []
+
+    class Recorded(rich.progress.Progress):
+        def __init__(self, *columns: Any, **how: Any) -> None:
+            super().__init__(*columns, **how)
+            bars.append(self)
+
+    monkeypatch.setattr(rich.progress, "Progress", Recorded)
     with ProgressBar() as progress:
         progress("read", 0.0)
-        bar = progress._bar
+        (bar,) = bars
         progress("read", 1.0)
         before = bar.tasks[0].elapsed
         progress("solve", 0.0)
-        assert progress._bar is bar
+        assert bars == [bar]
         assert [task.description for task in bar.tasks] == ["solve"]
         assert not bar.finished
         assert bar.tasks[0].elapsed > before

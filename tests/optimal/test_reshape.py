@@ -86,7 +86,7 @@ def test_auto_is_never_slower_than_single_corners(name):
     assert auto.corner == "auto"
     for corner in ("bezier", "spline"):
         single = OptimalMethod(corner=corner).plan(JOBS[name], MACHINE)
-        assert auto.trajectory.cycle_time <= single.trajectory.cycle_time * (1 + 5e-3)
+        assert auto.trajectory.cycle_time <= single.trajectory.cycle_time * (1 + 1e-6)
 
 
 @pytest.mark.parametrize(

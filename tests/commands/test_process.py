@@ -44,6 +44,7 @@ def run(*arguments: object, **how: object) -> subprocess.CompletedProcess[str]:
 # ------------------------------------------------------------------------------------------ Ctrl-C
 
 
+@pytest.mark.slow
 @unix
 def test_ctrl_c_at_random_times(job: Path, tmp_path: Path) -> None:
     """During imports, work and writing: exit code 130, one word, and the outputs whole or not there."""
@@ -147,6 +148,7 @@ def test_output_that_cannot_be_written_or_is_closed() -> None:
     assert (closed.returncode, closed.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @unix
 def test_any_encoding_and_any_file_name(tmp_path: Path) -> None:
     """The units have plain names where an encoding lacks theirs; bytes of a name that are no UTF-8 are escaped."""
@@ -226,6 +228,7 @@ def kernel(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @unix
 def test_kernels_without_a_place_for_their_cache(kernel: Path) -> None:
     """A file stands where each of the directories would be made: nothing can be written, not by root either."""
@@ -236,6 +239,7 @@ def test_kernels_without_a_place_for_their_cache(kernel: Path) -> None:
     assert done.stderr.count("compiled kernels cannot be kept (cannot cache function 'twice'") == 1
 
 
+@pytest.mark.slow
 @unix
 def test_kernels_on_a_full_disk(kernel: Path) -> None:
     import resource
@@ -249,6 +253,7 @@ def test_kernels_on_a_full_disk(kernel: Path) -> None:
     assert done.stderr.count("compiled kernels cannot be kept (File too large)") == 1
 
 
+@pytest.mark.slow
 def test_kernels_are_kept_where_they_can(kernel: Path) -> None:
     done = use_kernel(kernel, env={"NUMBA_CACHE_DIR": str(kernel / "cache")})
     assert (done.stdout, done.stderr) == ("42 3.0\n", "")

@@ -119,6 +119,7 @@ def assert_sweeps_reach_ends(program: Program) -> None:
     assert np.abs(off).max(initial=0.0) < 1.1e-6
 
 
+@pytest.mark.slow
 @needs_oracle
 def test_real_programs_agree(tmp_path: Path) -> None:
     assert len(PROGRAMS) > 40, "the collection of real programs is not complete"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hand_made import make_plan
 from matplotlib.figure import Figure
+from quick import slow_but
 
 from planner.report import plots, profiles_figure, toolpath_figure
 
@@ -20,7 +21,7 @@ PROGRAMS = {
 }
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", slow_but("flat", PROGRAMS))
 def test_figures(tmp_path: Path, name: str) -> None:
     plots.write_figures(make_plan(PROGRAMS[name]), tmp_path)
     for file in ("toolpath.png", "profiles.png"):

@@ -60,6 +60,7 @@ def test_scaled_jobs_take_the_same_time(seed):
     assert time_of(program, larger) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_more_tolerance_does_not_cost_time(seed):
     program = problems.polyline(random_polyline(np.random.default_rng(seed), 10))
@@ -68,6 +69,7 @@ def test_more_tolerance_does_not_cost_time(seed):
     assert (np.diff(times) <= 1e-3 * times[0]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tolerance", "shortest"), [(1e-3, 0.5), (1.0, -1.0), (0.05, -3.0)])
 def test_extreme_tolerances_are_kept(tolerance, shortest):
     """1 um; 1 mm on segments of 0.1 mm; segments of 1 um."""
@@ -76,6 +78,7 @@ def test_extreme_tolerances_are_kept(tolerance, shortest):
     time_of(problems.polyline(points), tolerance=tolerance)
 
 
+@pytest.mark.slow
 @given(seeds)
 @settings(max_examples=12)
 def test_random_polylines_are_verified(seed):

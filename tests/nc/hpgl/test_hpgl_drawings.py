@@ -87,6 +87,7 @@ def naive(text: str) -> tuple[np.ndarray, np.ndarray]:
     return np.array(ends), np.array(downs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["aiten__CNCLib__hedgehog.hpgl", "straight-coding__gcode-hpgl-viewer__B_Fabric_Nesting.plt"]
 )

@@ -223,12 +223,12 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
         time=motion.t[rows],
         feed=feed,
         normal=normal,
-        allowed=_support(across, motion.axes, machine),
+        allowed=allowed_across(across, motion.axes, machine),
         distance=distance,
     )
 
 
-def _support(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
+def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
     """A(n) (C,) [mm/s2] for vectors (C, L) along n, of any length; where that is 0, the least over all directions."""
     limits = machine.limits("acceleration", axes)[_linear(axes)]
     size = np.linalg.norm(direction, axis=1)
@@ -243,7 +243,7 @@ def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatAr
     across = (toolpath.tangent_start[corner] - toolpath.tangent_end[corner - 1])[:, linear]
     eps, filters = toolpath.tolerance[corner], machine.fir.time_constants if machine.fir else ()
     rate = machine.dt**2 / 8.0 + sum(T * T for T in filters) / 24.0
-    X = np.minimum(_support(across, toolpath.axes, machine), eps / (2.0 * rate))
+    X = np.minimum(allowed_across(across, toolpath.axes, machine), eps / (2.0 * rate))
     speed: FloatArray = np.sqrt(1.5 * X * (eps - rate * X)) / np.tan(toolpath.theta[corner] / 2.0)
     return speed
 

@@ -1,8 +1,8 @@
 """One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point kernel, to its result.
 
 A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the envelope tracked by a motion,
-where that is found, then from the envelope itself, whose kinematics are not exact, and from rest then from the plain start
-(start.py): as fast as the envelope, and so slow that it keeps all limits.
+where that is found, then from the envelope itself, whose kinematics are not exact, and then from the plain start as fast as the
+envelope (start.py).
 """
 
 from __future__ import annotations
@@ -148,7 +148,6 @@ class ScaledWindow:
             yield self._slowed(tracked, SLOWER_MAX)
         yield self._slowed(near, SLOWER_MAX)
         yield self._slowed(self._plain(asked.max()), SLOWER_MAX)
-        yield self._slowed(self._plain(1.0))
 
     def _joined(self, behind: Window, start: Profile) -> Profile:
         """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.motion.trajectory import Trajectory
 from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, Columns, Worst, scan
 from planner.verify.matching import AtStop, Match, Place, match_samples, new_match
+from planner.verify.own import Block, OwnSeen
 from planner.verify.pieces import ProgramPieces
 
 BLOCK_SAMPLES = 65_536  # read at a time: 8 MB for three axes
@@ -39,6 +41,8 @@ class Limits:
     normal_acceleration: float
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
     jerk_limited: bool
+    axes: tuple[str, ...] = ()
+    own: tuple[Any, ...] = ()  # limits of one's own (own.py)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -53,6 +57,7 @@ class Observed:
     at: FloatArray
     piece: Array
     match: Match
+    own: OwnSeen = field(default_factory=lambda: OwnSeen((), ()))
     samples: int = 0
     first: FloatArray = field(default_factory=lambda: np.empty(0))  # (A,) first and last position
     last: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -82,6 +87,7 @@ def watch(
         at=np.zeros((rows, axes)),
         piece=np.zeros(rows, dtype=np.int64),
         match=new_match(pieces),
+        own=OwnSeen(limits.own, limits.axes),
     )
     carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
     feed_max = np.empty(0)
@@ -119,6 +125,17 @@ def _block(
     piece = np.zeros(len(t), dtype=np.int64)
     at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
     match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Place(piece, feed_max))
+    block = Block(
+        t=t,
+        position=position,
+        velocity=data.velocity,
+        acceleration=data.acceleration,
+        jerk=data.jerk,
+        piece=piece,
+        skip=skip,
+        travelled=travelled,
+    )
+    seen.own.take(block, limits)
     worst = np.zeros_like(seen.worst)
     worst[:, 0] = seen.worst[:, 0]
     sample = np.full(len(worst), -1, dtype=np.int64)

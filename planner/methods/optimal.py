@@ -159,4 +159,4 @@ def _site_prices(planned: OnPath) -> SitePrices | None:
     if shape is None or not len(planned.path.spline):
         return None
     now, wider = (tube_prices(planned, shape, more) for more in (0.0, MORE_TOLERANCE))
-    return SitePrices(place=shape.laid.place, now=now, wider=wider)
+    return SitePrices(place=shape.laid.sites.place, now=now, wider=wider)

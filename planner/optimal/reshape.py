@@ -32,9 +32,9 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.solution import FeedrateSolution
 from planner.job.stages import Stages
 from planner.path.samples import PathSamples
-from planner.smoothing.basis import DEGREE, ORDER
-from planner.smoothing.forms import motion_forms
-from planner.smoothing.relax import relax
+from planner.smoothing.basis import DEGREE
+from planner.smoothing.forms import SplineMotion, motion_bands
+from planner.smoothing.relax import Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps, with_spline
 
 # Rounds of reshaping, so that all of them together take about as long as so many grid points once, ...
@@ -137,26 +137,21 @@ def _chosen(old: SplineShape, new: SplineShape, better: Array) -> SplineShape:
 def _reshape(
     planned: OnPath, shape: SplineShape, force: FloatArray, H: FloatArray, Q: FloatArray
 ) -> tuple[SplineShape, FloatArray]:
-    """The shape after one round with the bands H of what is paid and Q of the pull; also what the sites' tubes cost (J,)
-    [s per mm of radius]."""
-    laid, runs, chain = shape.laid, shape.runs, shape.guide
-    control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
-    multiplier, good = np.zeros(len(used)), np.zeros(len(force), np.bool_)
-    relax(
-        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
-        laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
-        runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned, shape), 0.0,
-        good, multiplier,
-    )  # fmt: skip
-    new = dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
-    return _chosen(shape, new, good & ~cusps(new.laid)), -multiplier / used
+    """The shape after one round with the bands H of what is paid and Q of the pull; also what the sites' radii cost (J,)
+    [s per mm]."""
+    goal = Goal(H, Q, force, GAP * run_times(planned, shape), 0.0, np.ones(len(H)))
+    relaxed = relax(shape.corridor, shape.laid, shape.runs, shape.used, shape.left, goal)
+    laid = shape.laid._replace(control=relaxed.control)
+    new = dataclasses.replace(shape, laid=laid, used=relaxed.used, left=relaxed.left)
+    return _chosen(shape, new, relaxed.certified & ~cusps(laid)), -relaxed.multiplier / relaxed.used
 
 
 def tube_prices(planned: OnPath, shape: SplineShape, more: float = 0.0) -> FloatArray:
     """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the tube, so much wider [mm], in a round from the present shape."""
     H, Q = price_bands(planned, shape)
-    guide = shape.guide._replace(tol=shape.guide.tol + more, tol_chord=shape.guide.tol_chord + more)
-    wider = dataclasses.replace(shape, guide=guide, used=shape.used + more, left=shape.left + more)
+    corridor = shape.corridor
+    corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
+    wider = dataclasses.replace(shape, corridor=corridor, used=shape.used + more, left=shape.left + more)
     _, prices = _reshape(planned, wider, np.full(len(shape.laid.fits), FIRST_FORCE), H, Q)
     return prices
 
@@ -175,12 +170,17 @@ def price_bands(planned: OnPath, shape: SplineShape) -> tuple[FloatArray, FloatA
     v = np.sqrt(solution.feed_sq)
     duration, jerk = solution.duration[on], solution.jerk_s[on]
     acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
-    H, Q = np.zeros((2, len(problem.axes), len(laid.control), ORDER))
-    motion_forms(
-        laid.span_first, laid.breaks, laid.control, laid.fits, interval, within,
-        np.stack([samples.w0[on], samples.w1[on]], axis=1), np.stack([v[on], v[on + 1]], axis=1), acc, jerk, duration,
-        _prices(problem, solution, on), np.stack([problem.acceleration, _jerk_scale(planned)]), H, Q,
-    )  # fmt: skip
+    motion = SplineMotion(
+        interval=interval,
+        span=within,
+        tau=np.stack([samples.w0[on], samples.w1[on]], axis=1),
+        feed=np.stack([v[on], v[on + 1]], axis=1),
+        acc=acc,
+        jerk=jerk,
+        duration=duration,
+        price=_prices(problem, solution, on),
+    )
+    H, Q = motion_bands(laid, motion, np.stack([problem.acceleration, _jerk_scale(planned)]))
     return H, Q
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 
+from planner.base.names import AUTO, OPTIMAL
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.jerk.solver import JerkLimited
@@ -15,7 +16,6 @@ from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
-from planner.optimal.geometry import AUTO
 from planner.optimal.loop import Settings, fastest_plan
 from planner.optimal.order import ThirdOrder
 from planner.optimal.shaped import shaped_plan
@@ -52,7 +52,7 @@ class OptimalMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(
-            method="optimal",
+            method=OPTIMAL,
             corner=self.corner,
             order=ThirdOrder(self.solver),
             bezier=BezierCorner(sigma2=SIGMA2),

@@ -1,4 +1,4 @@
-"""Method `toppra`: smoothed path, all second-order constraints, time-optimal by reachability analysis.
+"""Method `second-order`: all limits but jerk, time-optimal on a smoothed path, by reachability analysis.
 
 The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited. The
 algorithm is that of method `optimal`, optimal/loop.py, with another solver; splines are reshaped by the multipliers of this motion
@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from planner.base.names import AUTO, SECOND_ORDER
 from planner.corners.smooth import CornerShape
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
-from planner.optimal.geometry import AUTO
 from planner.optimal.loop import Settings, fastest_plan
 from planner.optimal.order import SecondOrder
 from planner.optimal.shaped import shaped_plan
@@ -24,7 +24,7 @@ SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": 
 
 
 @dataclass(frozen=True, kw_only=True)
-class ToppraMethod(Method):
+class SecondOrderMethod(Method):
     """Second-order time-optimal planning on rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
@@ -43,5 +43,5 @@ class ToppraMethod(Method):
     def plan_job(self, job: Job) -> Plan:
         solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
         order = SecondOrder(solver, to_tighten=self.shaped)
-        settings = Settings(method="toppra", corner=self.corner, order=order, rounds=self.rounds)
+        settings = Settings(method=SECOND_ORDER, corner=self.corner, order=order, rounds=self.rounds)
         return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)

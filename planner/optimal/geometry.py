@@ -9,6 +9,7 @@ the last time such a place is fenced off by two full stops, and keeps its single
 from __future__ import annotations
 
 from planner.base.errors import InputError
+from planner.base.names import AUTO, SMOOTHINGS, SPLINE
 from planner.corners.bezier import BezierCorner
 from planner.corners.fir import FirCorner
 from planner.corners.kinematic import KinematicCorner
@@ -17,9 +18,6 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
 from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape
-
-SPLINE, AUTO = "spline", "auto"
-CORNERS = (AUTO, SPLINE, "bezier", "fir", "kinematic")
 
 STOP_ROUNDS = 4
 
@@ -36,7 +34,7 @@ def corner_shape(
     if corner == "kinematic":
         return KinematicCorner.from_machine(machine, toolpath.axes)
     if isinstance(corner, str):
-        raise InputError(f"no corner shape '{corner}'; there are {', '.join(CORNERS)}")
+        raise InputError(f"no corner shape '{corner}'; there are {', '.join(SMOOTHINGS)}")
     return corner
 
 

@@ -10,7 +10,7 @@
   deliver   setpoints at the interpolation period, judged by the verifier                         job/job.py, verify/
   compare   full stops, other corner shapes, method kinematic, where they may be faster           compare_plans.py
 
-Methods `optimal` (third order: with jerk limits) and `toppra` (second order: without) run the same loop with another `Order`.
+Methods `optimal` (third order: with jerk limits) and `second-order` (without) run the same loop with another `Order`.
 
 What is tried more than once:
 
@@ -42,6 +42,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.names import AUTO, SPLINE
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.job.job import Delivered, Job
@@ -52,7 +53,7 @@ from planner.motion.timing import Motion
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
-from planner.optimal.geometry import AUTO, SPLINE, corner_shape, splined_with_stops
+from planner.optimal.geometry import corner_shape, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order

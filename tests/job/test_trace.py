@@ -14,7 +14,7 @@ from benchmarks.never_slower import job
 from planner.cli import app
 from planner.job.trace import Step, Trace
 from planner.methods.optimal import OptimalMethod
-from planner.methods.second_order import ToppraMethod
+from planner.methods.second_order import SecondOrderMethod
 from planner.methods.stop import StopMethod
 
 
@@ -56,7 +56,7 @@ def test_the_solver_s_windows_and_points_are_told(told):
 def test_second_order_is_told_likewise_and_other_methods_in_a_line():
     program, machine = job(3)
     second, stop = Trace(), Trace()
-    ToppraMethod(rounds=1).plan(program, machine, log=second)
+    SecondOrderMethod(rounds=1).plan(program, machine, log=second)
     assert {"splines", "solve", "reshape 1", "plan"} <= {step.name for step in second.steps}
     StopMethod().plan(program, machine, log=stop)
     assert [(step.name, step.facts["method"]) for step in stop.steps] == [("plan", "stop")]

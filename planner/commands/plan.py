@@ -70,7 +70,6 @@ def plan_command(
     corners: Annotated[
         bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18-20")
     ] = False,
-    as_json: JsonOption = False,
     verbose: Annotated[
         bool,
         typer.Option("-v", "--verbose", help="say on standard error what planning tries, step by step"),
@@ -79,6 +78,7 @@ def plan_command(
         Path | None,
         typer.Option("--trace", metavar="FILE", help="write what planning tried into FILE (JSON)"),
     ] = None,
+    as_json: JsonOption = False,
     quiet: QuietOption = False,
     force: ForceOption = False,
 ) -> None:

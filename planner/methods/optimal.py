@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 
-from planner.base.names import AUTO, OPTIMAL
+from planner.base.names import AUTO
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.jerk.solver import JerkLimited

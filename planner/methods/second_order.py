@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.base.names import AUTO, SECOND_ORDER
+from planner.base.names import AUTO
 from planner.corners.smooth import CornerShape
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
@@ -43,5 +43,5 @@ class SecondOrderMethod(Method):
     def plan_job(self, job: Job) -> Plan:
         solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
         order = SecondOrder(solver, to_tighten=self.shaped)
-        settings = Settings(method=SECOND_ORDER, corner=self.corner, order=order, rounds=self.rounds)
+        settings = Settings(method="second-order", corner=self.corner, order=order, rounds=self.rounds)
         return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)

@@ -10,7 +10,7 @@
   deliver   setpoints at the interpolation period, judged by the verifier                         job/job.py, verify/
   compare   full stops, other corner shapes, method kinematic, where they may be faster           compare_plans.py
 
-Methods `optimal` (third order: with jerk limits) and `second-order` (without) run the same loop with another `Order`.
+Methods `optimal` (third order: with jerk limits) and `second-order` (second order: without) run the same loop with another `Order`.
 
 What is tried more than once:
 

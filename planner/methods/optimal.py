@@ -52,7 +52,7 @@ class OptimalMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(
-            method=OPTIMAL,
+            method="optimal",
             corner=self.corner,
             order=ThirdOrder(self.solver),
             bezier=BezierCorner(sigma2=SIGMA2),

@@ -1,16 +1,22 @@
 """Optimisation-based feedrate planning for CNC machines.
 
-    plan                 read, round, solve, sample and verify a job: one call
-    Plan                 what it returns
-    Machine, load_machine
-    PathLimit, JointLimit, PolynomialCorner, Method, compare
-                         limits, corner shapes and methods of your own, and their comparison: docs/extending.md
-    Program, read_program
-    Toolpath, Trajectory, Verdict
-    InputError, NotSolvedError
+    plan                     plan, sample and verify a program: one call
+    Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost
+    Machine, load_machine    limits, interpolation period and tolerance of a machine, from a TOML file
+    PathLimit, JointLimit    classes to derive limits of your own from,
+    PolynomialCorner         corner shapes,
+    Method                   and methods: docs/extending.md
+    compare                  several methods on one program, side by side
+    Program, read_program    the blocks of an NC program
+    Toolpath                 the programmed path with its joints and tolerances
+    Trajectory               the setpoints, one row per interpolation period
+    Verdict                  the verifier's findings
+    InputError               bad input; the message names file, line and column
+    NotSolvedError           no motion was found; raised by `Plan.require`
     __version__
 
-Names and units: `planner.base.units`. Everything is imported on first use, so that `import planner` costs nothing.
+Units and symbols are in `planner.base.units`, words in `planner.base.glossary`, names of methods in `planner.base.names`. Everything
+is imported on first use, so that `import planner` costs nothing.
 """
 
 from importlib import import_module

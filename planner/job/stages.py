@@ -10,7 +10,10 @@ Progress = Callable[[str, float], None]
 
 
 class Stages:
-    """Times the stages of a job and tells the caller which one is running."""
+    """Measures the time of the stages of a job, and tells the caller which stage is running.
+
+    timings : seconds by stage; a stage that runs several times is summed up
+    """
 
     def __init__(self, progress: Progress | None = None):
         self.timings: dict[str, float] = {}
@@ -18,7 +21,7 @@ class Stages:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[[float], None]]:
-        """Run a stage; yields a function that takes the fraction done."""
+        """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
         self._tell(name, 0.0)
         began = time.perf_counter()
         try:

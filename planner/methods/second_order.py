@@ -1,4 +1,4 @@
-"""Method `toppra`: smoothed path, all second-order constraints, time-optimal by reachability analysis.
+"""Method `second-order`: all limits but jerk, time-optimal on a smoothed path, by reachability analysis.
 
 The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited. Splines
 are reshaped as in method `optimal`, by the multipliers of this motion (feedrate/costates.py).
@@ -36,7 +36,7 @@ SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": 
 
 
 @dataclass(frozen=True, kw_only=True)
-class ToppraMethod(Method):
+class SecondOrderMethod(Method):
     """Second-order time-optimal planning on rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
@@ -87,7 +87,7 @@ class ToppraMethod(Method):
                 job,
                 plain._best,
                 self._solver.solve,
-                method="toppra",
+                method="second-order",
                 corner=self.corner,
                 not_limited=("jerk",),
             )
@@ -113,4 +113,4 @@ class ToppraMethod(Method):
                     break
                 motion = gentler
                 made = job.deliver(motion, not_limited=("jerk",), seed=once_more + 1)
-        return plan_of_solution(job, best, made, method="toppra", corner=self.corner)
+        return plan_of_solution(job, best, made, method="second-order", corner=self.corner)

@@ -1,10 +1,11 @@
-"""What methods `toppra` and `optimal` share: which path the feedrate problem is solved on, and the plan of its solution."""
+"""What methods `second-order` and `optimal` share: which path the feedrate problem is solved on, and the plan of its solution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from planner.base.errors import InputError
+from planner.base.names import SMOOTHINGS
 from planner.corners.bezier import BezierCorner
 from planner.corners.fir import FirCorner
 from planner.corners.kinematic import KinematicCorner
@@ -22,8 +23,6 @@ from planner.optimal.reshape import OnPath
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
 
-CORNERS = (AUTO, SPLINE, "bezier", "fir", "kinematic")
-
 
 def corner_shape(
     corner: str | CornerShape, machine: Machine, toolpath: Toolpath, bezier: CornerShape | None = None
@@ -37,7 +36,7 @@ def corner_shape(
     if corner == "kinematic":
         return KinematicCorner.from_machine(machine, toolpath.axes)
     if isinstance(corner, str):
-        raise InputError(f"no corner shape '{corner}'; there are {', '.join(CORNERS)}")
+        raise InputError(f"no corner shape '{corner}'; there are {', '.join(SMOOTHINGS)}")
     return corner
 
 

@@ -1,4 +1,4 @@
-"""The time-optimal motion without jerk limits on a path: method `toppra`, and what any motion on a path takes at least."""
+"""The time-optimal motion without jerk limits on a path: method `second-order`, and what any motion on a path takes at least."""
 
 from __future__ import annotations
 

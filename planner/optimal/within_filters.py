@@ -1,4 +1,4 @@
-"""Corners taken slowly enough for the filters behind: what methods `optimal` and `toppra` do before `behind.kept` has the last word.
+"""Corners taken slowly enough for the filters behind: what `optimal` and `second-order` do before `behind.kept` has the last word.
 
 A filtered motion passes a vertex by the mean of where the motion was within Td: the longer the motion takes for the corner itself, the
 less its way in and out counts. So it is the feed close to a place where the filtered motion leaves the tolerance that is limited, and

@@ -66,8 +66,12 @@ CHORDS = 0.2  # what chords between samples may use of the tolerance before what
 
 
 class SitePrices(NamedTuple):
-    """What the tube of splines costs at J sites: `place` along the legs (J,) [mm], dT/d(tolerance) there now (J,) and with
-    `MORE_TOLERANCE` more (J,) [s/mm] (`reshape.tube_prices`)."""
+    """What the corridor of splines costs at J sites.
+
+    place : (J,) along the legs [mm]
+    now   : (J,) dT/d(tolerance) there [s/mm]
+    wider : (J,) the same with `MORE_TOLERANCE` more [s/mm]
+    """
 
     place: FloatArray
     now: FloatArray
@@ -81,9 +85,11 @@ def price_list(
     machine: Machine,
     by_site: SitePrices | None = None,
 ) -> PriceList:
-    """The prices of a solution. Raises ValueError if its solver gives no multipliers.
+    """The prices of a solution.
 
-    by_site : for splines
+    by_site : what the corridor of splines costs; None for single corners
+
+    Raises ValueError if the solver of the solution gives no multipliers.
     """
     now = lagrangian(problem, solution)
     prices = solution.prices
@@ -138,23 +144,26 @@ def price_list(
 
 
 class Saving(NamedTuple):
-    """What is saved, between a least and a most [s]."""
+    """Time saved, between a least and a most [s]."""
 
     least: float
     most: float
 
     @property
     def middle(self) -> float:
+        """The middle of the range [s]."""
         return 0.5 * (self.least + self.most)
 
     def widened(self, by: float) -> Saving:
+        """The range with `by` [s] more on both sides."""
         return Saving(self.least - by, self.most + by)
 
     def below(self, bound: float) -> Saving:
+        """The range cut off at a bound [s]."""
         return Saving(min(self.least, bound), min(self.most, bound))
 
     def vague(self, cycle_time: float) -> bool:
-        """True if its middle may be off by more than a number that is told."""
+        """True if the middle may be off by too much to be told as a number."""
         return 0.5 * (self.most - self.least) > max(HINT * abs(self.middle), HINT_LEAST * cycle_time)
 
 

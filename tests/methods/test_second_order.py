@@ -1,4 +1,4 @@
-"""Method `toppra`: multipliers of its motion, and what reshaping by them gains."""
+"""Method `second-order`: multipliers of its motion, and what reshaping by them gains."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_all_multipliers_together_are_half_of_the_time(name):
 @pytest.mark.parametrize("name", sorted(set(JOBS) - {"pentagon"}))
 def test_fewer_limits_take_less_time(name):
     """Reshaped by its own multipliers, it is faster than as laid, and than with jerk limits as well."""
-    made = plan(JOBS[name], MACHINE, method="toppra").require()
+    made = plan(JOBS[name], MACHINE, method="second-order").require()
     assert made.verdict.passed, made.verdict.faults
     laid = ToppraMethod(rounds=0).plan(JOBS[name], MACHINE)
     assert made.trajectory.cycle_time < laid.trajectory.cycle_time

@@ -3,14 +3,13 @@
     plan                     plan, sample and verify a program: one call
     Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost
     Machine, load_machine    limits, interpolation period and tolerance of a machine, from a TOML file
-    PathLimit, JointLimit    classes to derive limits of your own from,
-    PolynomialCorner         corner shapes,
-    Method                   and methods: docs/extending.md
-    compare                  several methods on one program, side by side
+    PathLimit, JointLimit    limits of your own; with corner shapes (PolynomialCorner) and methods (Method): docs/extending.md
+    compare                  several methods on one program, judged by the same verifier
     Program, read_program    the blocks of an NC program
     Toolpath                 the programmed path with its joints and tolerances
     Trajectory               the setpoints, one row per interpolation period
     Verdict                  the verifier's findings
+    Trace                    what planning tried, step by step
     InputError               bad input; the message names file, line and column
     NotSolvedError           no motion was found; raised by `Plan.require`
     __version__
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
     from planner.job.job import Method
     from planner.job.plan import Plan
+    from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
     from planner.methods.registry import plan
     from planner.motion.trajectory import Trajectory
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
+    "Trace": "planner.job.trace",
     "JointLimit": "planner.constraints.own",
     "PathLimit": "planner.constraints.own",
     "PolynomialCorner": "planner.corners.own",
@@ -69,6 +70,7 @@ __all__ = [
     "PolynomialCorner",
     "Program",
     "Toolpath",
+    "Trace",
     "Trajectory",
     "Verdict",
     "compare",

@@ -23,6 +23,7 @@ from planner.corners.smooth import CornerShape
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
+from planner.job.trace import Log
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
@@ -43,6 +44,7 @@ def plan(
     limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
     progress: Progress | None = None,
+    log: Log | None = None,
 ) -> Plan:
     """Plan, sample and verify the motion of an NC program.
 
@@ -52,15 +54,16 @@ def plan(
     geometry  : how the path is smoothed, for "optimal" and "second-order": "spline" (one spline from stop to stop), "corners" (each
                 corner by itself) or "auto" (splines, or corners where they take less time); None for "auto", or for "corners" where
                 `corner` is given
-    corner    : the shape of single corners: "bezier", "fir" or "kinematic", or one of your own (docs/extending.md); None for "bezier"
+    corner    : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
     solver    : "reachability" or "toppra", for "second-order" only; None for "reachability"
     rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for as many
                 as the size of the job allows
     shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
-    limits    : limits of your own beside the machine's (docs/extending.md): "optimal" and "second-order" keep them, the verdict judges
-                every method by them
+    limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order" keep them,
+                the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
     progress  : called with the stage's name and the fraction done (0 to 1)
+    log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
     Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status; `Plan.require` turns it into a
     NotSolvedError.
@@ -80,11 +83,11 @@ def plan(
     if limits:
         machine = machine.with_own((*machine.own, *limits))
     if isinstance(program, Program):
-        return method.plan(program, machine, tolerance, progress)
+        return method.plan(program, machine, tolerance, progress, log)
     reading = Stages(progress)
     with reading.stage("read"):
         program = read_program(program, machine)
-    made = method.plan(program, machine, tolerance, progress)
+    made = method.plan(program, machine, tolerance, progress, log)
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 
@@ -121,11 +124,12 @@ def _check_used(
     *,
     geometry: str | None,
     corner: str | CornerShape | None,
+    rounds: int | None,
     **others: str | int | None,
 ) -> None:
     """Raise InputError for a setting that the method would ignore."""
-    shape = corner if corner is None or isinstance(corner, str) else corner.name
-    for setting, value in {"geometry": geometry, "corner": shape, **others}.items():
+    given = {"geometry": geometry, "corner": corner, "rounds": rounds} | others
+    for setting, value in given.items():
         if value is None:
             continue
         if isinstance(method, Method):
@@ -138,18 +142,16 @@ def _check_used(
             )
         if setting == "solver" and value not in METHODS[method].solvers:
             raise InputError(f"solver = {value}: method {method} has {', '.join(METHODS[method].solvers)}")
-    if others["rounds"] is not None:
-        kind, _ = _smoothing(geometry, corner)
+    if rounds is not None:
+        kind, shape = _smoothing(geometry, corner)
         if kind == SINGLE_CORNERS:
-            raise InputError(
-                f"rounds = {others['rounds']}: they reshape splines, and corner {shape} has none"
-            )
+            raise InputError(f"rounds = {rounds}: they reshape splines, and corner {shape} has none")
 
 
 def _smoothing(
     geometry: str | None, corner: str | CornerShape | None
 ) -> tuple[str, str | CornerShape | None]:
-    """Geometry and corner shape, as `smoothing` tells of names; a shape of one's own goes with what any shape's name goes with."""
+    """The geometry and the corner shape that are meant. Raises InputError for names that do not go together."""
     if corner is None or isinstance(corner, str):
         return smoothing(geometry, corner)
-    return smoothing(geometry, BEZIER)[0], corner
+    return smoothing(geometry, BEZIER)[0], corner  # a shape of one's own goes where the usual one goes

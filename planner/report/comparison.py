@@ -22,6 +22,7 @@ from rich.text import Text
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import METHODS
 from planner.base.units import MICROMETRE
+from planner.constraints import normal_limit
 from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".json", ".csv")
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
 AFTER_PLANNING = ("read", "sample", "verify")
-QUANTITIES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
+QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
 
 
 @dataclass(frozen=True, kw_only=True)

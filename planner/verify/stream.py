@@ -38,7 +38,7 @@ class Limits:
     judged: Array
     rounding: FloatArray
     time_rounding: float
-    normal_acceleration: float
+    normal: float  # normal acceleration [mm/s2]
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
     jerk_limited: bool
     axes: tuple[str, ...] = ()
@@ -161,7 +161,7 @@ def _block(
         skip,
         limits.per_axis,
         limits.linear,
-        limits.normal_acceleration,
+        limits.normal,
         limits.judged,
         rounding,
         feed_max,

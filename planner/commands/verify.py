@@ -63,9 +63,7 @@ def verify_command(
     unjudged = tuple(not_limited or ())
     for name in unjudged:
         if name not in NOT_LIMITED_NAMES:
-            raise InputError(
-                f"--not-limited {name}: there is no such limit; {', '.join(NOT_LIMITED_NAMES)} are"
-            )
+            raise InputError(f"--not-limited {name}: no such limit; there are {', '.join(NOT_LIMITED_NAMES)}")
     read = read_trajectory(trajectory)
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)

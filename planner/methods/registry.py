@@ -125,7 +125,7 @@ def _check_used(method: str | Method, **given: str | int | None) -> None:
     if given["rounds"] is not None:
         kind, shape = smoothing(_text(given["geometry"]), _text(given["corner"]))
         if kind == SINGLE_CORNERS:
-            raise InputError(f"rounds = {given['rounds']}: they reshape splines, and corner {shape} has none")
+            raise InputError(f"rounds = {given['rounds']}: they reshape splines; {shape} corners have none")
 
 
 def _text(value: str | int | None) -> str | None:

@@ -263,7 +263,7 @@ def shaped_plan(
     """The plan of a job with shaped set points. Raises InputError for a machine without vibration modes; else as `shaped`."""
     if not job.machine.modes:
         raise InputError(
-            f"machine '{job.machine.name}' has no vibration modes to shape set points for; give it tables [[modes]] with frequency "
+            f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "
             "and damping"
         )
     found = shaped(job, plan_on, solve, jerk="jerk" not in not_limited)

@@ -38,8 +38,8 @@ Delivered = tuple[Trajectory, Verdict]
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
-# Other methods are tried then on jobs with up to so many grid points.
-INSTEAD_POINTS = 20_000
+# Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
+INSTEAD_POINTS = 50_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

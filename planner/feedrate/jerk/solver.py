@@ -29,11 +29,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.settings import SETTINGS, Settings
 from planner.feedrate.jerk.window import ScaledWindow, Window
 from planner.feedrate.lagrangian import acceleration_limits, lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
@@ -59,11 +60,13 @@ class JerkLimited:
     tol        : relative gap at which a window is optimal
     iterations : at most, per window
     window     : intervals solved at a time
+    settings   : of the interior-point method; the same for every problem
     """
 
     tol: float = 1e-4
     iterations: int = 100
     window: int = 1_000
+    settings: Settings = field(default=SETTINGS, repr=False)
 
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
@@ -197,7 +200,7 @@ class _Profile:
         return end
 
     def _scaled(self, begin: int, end: int) -> ScaledWindow:
-        return ScaledWindow.of(self.problem, self.acceleration, begin, end)
+        return ScaledWindow.of(self.problem, self.acceleration, begin, end, self.solver.settings)
 
     def _solve_window(self, begin: int, end: int) -> Window | None:
         """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""

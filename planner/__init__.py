@@ -7,6 +7,7 @@
     Toolpath                 the programmed path with its joints and tolerances
     Trajectory               the setpoints, one row per interpolation period
     Verdict                  the verifier's findings
+    Trace                    what planning tried, step by step
     InputError               bad input; the message names file, line and column
     NotSolvedError           no motion was found; raised by `Plan.require`
     __version__
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
+    from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
     from planner.methods.registry import plan
     from planner.motion.trajectory import Trajectory
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
+    "Trace": "planner.job.trace",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
@@ -52,6 +55,7 @@ __all__ = [
     "Plan",
     "Program",
     "Toolpath",
+    "Trace",
     "Trajectory",
     "Verdict",
     "load_machine",

@@ -46,9 +46,12 @@ LAYERS = (
     "planner.verify",
     "planner.job.records",
     "planner.sensitivity",
+    "planner.job.trace",
     "planner.job.stages",
     "planner.delivery",
     "planner.job",
+    "planner.methods.kinematic",  # two motions that the loop compares its own with
+    "planner.methods.stop",
     "planner.optimal",
     "planner.methods",
     "planner.report",

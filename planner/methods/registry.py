@@ -19,6 +19,7 @@ from planner.base.names import (
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
+from planner.job.trace import Log
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
@@ -38,6 +39,7 @@ def plan(
     shaped: bool = False,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    log: Log | None = None,
 ) -> Plan:
     """Plan, sample and verify the motion of an NC program.
 
@@ -54,6 +56,7 @@ def plan(
     shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
     progress  : called with the stage's name and the fraction done (0 to 1)
+    log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
     Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status; `Plan.require` turns it into a
     NotSolvedError.
@@ -71,11 +74,11 @@ def plan(
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if isinstance(program, Program):
-        return method.plan(program, machine, tolerance, progress)
+        return method.plan(program, machine, tolerance, progress, log)
     reading = Stages(progress)
     with reading.stage("read"):
         program = read_program(program, machine)
-    made = method.plan(program, machine, tolerance, progress)
+    made = method.plan(program, machine, tolerance, progress, log)
     return dataclasses.replace(made, timings=reading.timings | made.timings)
 
 

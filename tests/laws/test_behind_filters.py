@@ -13,13 +13,13 @@ from scipy.spatial import cKDTree
 from benchmarks import problems
 from planner.job import job as job_module
 from planner.machine import Fir
-from planner.methods import optimal as optimal_module
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.registry import plan
 from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
+from planner.optimal import loop as loop_module
 
 FINE = 2e-4  # [s] of the convolution
 STEP = 2e-3  # [mm] between points of the path
@@ -132,9 +132,7 @@ def test_a_shorter_filter_costs_less():
 @pytest.mark.parametrize("method", ["stop", "optimal"])
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
-    monkeypatch.setattr(
-        optimal_module, "within_filters", lambda planned, motion, solve, real: (planned, motion)
-    )
+    monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, order, job: (planned, motion))
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed
     assert all("after the filters" in fault for fault in made.verdict.faults)

@@ -108,17 +108,17 @@ class ScaledWindow:
             settings=settings,
         )
 
-    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int]:
+    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
-        Also the iterations of the longest try."""
-        most = 0
-        for start in self._starts(behind):
+        Also the iterations of the longest try, and from how many starts it was tried."""
+        most = starts = 0
+        for starts, start in enumerate(self._starts(behind), start=1):
             found = kernel.minimise_time(self.grid, start, self.jumps, tol, iterations, self.settings)
             most = max(most, found.iterations)
             if _accepted(found):
                 profile, _ = self._track(found.profile, 0.0, POLISHING_ROUNDS, POLISHED)
-                return self._window(profile, found.lam, found.pi), most
-        return None, most
+                return self._window(profile, found.lam, found.pi), most, starts
+        return None, most, starts
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""

@@ -21,9 +21,8 @@ from planner.nc.program import Program
 def read_program(path: str | Path, machine: Machine | None = None, *, block_delete: bool = True) -> Program:
     """Read an NC program or a plotter file.
 
-    machine      : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need; None
-    for
-                   zeros and blending
+    machine      : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
+                   None for zeros and blending
     block_delete : leave out the lines that start with "/"
 
     Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.

@@ -73,9 +73,8 @@ class Verdict:
     contour          : the largest distance of the motion from the path, as far as it could be followed, against the tolerance there
     vertex           : the largest distance of a programmed vertex from the motion, of those that are known, against the tolerance there
     corners          : eq. 18-20 at the programmed corners
-    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if the motion
-    could
-                       not be followed
+    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if the
+                       motion could not be followed
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
     lost_after       : NC line of the last block along which the motion could be followed; None if it follows the whole program
     end_error_mm     : distance of the first sample from the start of the program, or of the last from its end, the larger one [mm]

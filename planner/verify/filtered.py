@@ -33,7 +33,7 @@ from planner.verify.findings import Look
 from planner.verify.matching import follow, new_match
 from planner.verify.pieces import Pieces, kernel, reach
 from planner.verify.stream import Seen
-from planner.verify.times import Motion
+from planner.verify.times import JudgedMotion
 from planner.verify.verdict import AfterFilters
 
 NOTE = "after the filters"
@@ -95,7 +95,7 @@ def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray,
     return mean + origin, (x[behind:] - value) / T
 
 
-def motion_asked(motion: Motion, dt: float) -> At:
+def motion_asked(motion: JudgedMotion, dt: float) -> At:
     """A motion that can be asked at any time."""
 
     def at(times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -169,7 +169,7 @@ def look_behind(
 
 
 def after_filters(
-    trajectory: Trajectory, motion: Motion | None, toolpath: Toolpath, machine: Machine, pieces: Pieces
+    trajectory: Trajectory, motion: JudgedMotion | None, toolpath: Toolpath, machine: Machine, pieces: Pieces
 ) -> AfterFilters | None:
     """What the machine's filters leave of the tolerance; None for a machine without.
 

@@ -116,7 +116,7 @@ def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces:
     return said
 
 
-def chord_error(looks: list[Look]) -> float:
+def largest_chord_error(looks: list[Look]) -> float:
     """Largest bow over one delivered period [mm]."""
     return float(looks[0].seen.worst[rows.GROUPS * looks[0].seen.at.shape[1] + rows.CHORD, 1])
 

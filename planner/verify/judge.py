@@ -19,7 +19,7 @@ from planner.verify.given import DERIVATIVES, Given
 from planner.verify.pieces import Pieces, pieces_of, widened
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
-from planner.verify.times import Motion, cells_per_period, look
+from planner.verify.times import JudgedMotion, cells_per_period, look
 from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
@@ -31,7 +31,7 @@ def verify(
     toolpath: Toolpath,
     machine: Machine,
     *,
-    motion: Motion | None = None,
+    motion: JudgedMotion | None = None,
     seed: int = 0,
     given: Given = WHOLE,
     not_limited: tuple[str, ...] = (),
@@ -125,7 +125,7 @@ def verify(
         contour_error_mm=contour_error,
         vertex_error_mm=vertex_error,
         end_error_mm=end_error,
-        chord_error_mm=findings.chord_error(looks),
+        chord_error_mm=findings.largest_chord_error(looks),
         order=order,
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),

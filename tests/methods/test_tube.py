@@ -8,23 +8,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import planner
 from benchmarks import problems
 from planner.base.errors import InputError, NotSolvedError
 from planner.feedrate.solution import Status
-from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
 from planner.machine import Fir
 from planner.methods.optimal import OptimalMethod
 from planner.methods.tube import LEGS_MAX, TubeMethod
 from planner.nc.reader import parse_program
-from planner.tube.guess import Guess
-from planner.tube.motion import _closing, _integrated
 from planner.tube.nlp import TubeNLP
-from planner.tube.run import ARC_SHARE, TubeRun, tube_runs_of
 
 MACHINE = problems.machine()
 LEG = 4.0  # [mm]: room for a corner, and few steps
@@ -117,7 +111,7 @@ def test_more_tolerance_takes_less_time():
 
 
 def test_stops_and_dwells_add_up():
-    """Exact stops make runs of their own; a dwell stands between two of them."""
+    """Exact stops make courses of their own; a dwell stands between two of them."""
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nY0\nM2\n")
     made = verified(job)
     half = verified(corner(90)).trajectory.cycle_time
@@ -152,61 +146,6 @@ def test_a_lower_feed_holds_on_its_block():
     made = verified(job)
     assert made.trajectory.feed[made.trajectory.block == 1].max() <= 20.0 * (1 + 1e-6)
     assert made.trajectory.feed.max() > 30.0
-
-
-# --- what the problem is made of ---------------------------------------------------------------------------------------------
-
-
-def only_run(program) -> TubeRun:
-    (run,) = tube_runs_of(toolpath_from_program(program, MACHINE), MACHINE)
-    return run
-
-
-def test_cutting_a_line_changes_no_leg():
-    whole = only_run(problems.polyline([[0, 0], [4, 0], [4, 4]]))
-    cut = only_run(problems.polyline([[0, 0], [1, 0], [2.5, 0], [4, 0], [4, 4]]))
-    for name in ("length", "base", "drift", "budget", "vertex", "vertex_budget", "feed"):
-        np.testing.assert_allclose(getattr(cut, name), getattr(whole, name), atol=1e-12)
-    assert list(whole.axis) == [0, 1]  # z stands still
-
-
-def test_a_run_is_the_programmed_path():
-    toolpath = toolpath_from_program(JOBS["line and arcs"], MACHINE)
-    run = only_run(JOBS["line and arcs"])
-    legs = np.arange(len(run))
-    np.testing.assert_allclose(run.points(legs, np.zeros(3)), toolpath.start, atol=1e-9)
-    np.testing.assert_allclose(run.points(legs, run.length), toolpath.end, atol=1e-9)
-    step = 1e-6
-    slope = (run.points(legs, run.length / 2 + step) - run.points(legs, run.length / 2 - step)) / (2 * step)
-    np.testing.assert_allclose(run.tangents(legs, run.length / 2), slope, atol=1e-8)
-
-
-@given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
-@settings(max_examples=200, deadline=None)
-def test_a_step_on_an_arc_bends_away_by_no_more_than_its_share(places, t):
-    """The mean of points on the arc with Bernstein weights is within ARC_SHARE of the budget of the point at the mean place."""
-    run = only_run(JOBS["line and arcs"])
-    for leg in (1, 2):
-        s = np.sort(places) * run.step_max[leg]
-        weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
-        rows = np.full(4, leg)
-        off = weights @ run.points(rows, s) - run.points(rows[:1], (weights @ s)[None])[0]
-        assert np.linalg.norm(off) <= ARC_SHARE * run.budget[leg] * (1 + 1e-9)
-
-
-def test_the_closing_jerks_are_what_the_motion_runs_too_far():
-    run = only_run(corner(90))
-    rng = np.random.default_rng(1)
-    h, jerk = rng.uniform(1e-3, 5e-3, 30), rng.normal(size=(30, 2))
-    steps = _integrated(run, h, jerk - _closing(run, h, jerk))
-    last, tau = (
-        {name: getattr(steps, name)[-1] for name in ("position", "velocity", "acceleration", "jerk")},
-        h[-1],
-    )
-    p, v, a, j = last.values()
-    np.testing.assert_allclose(p + tau * (v + tau * (a / 2 + tau * j / 6)), run.vertex[-1], atol=1e-9)
-    np.testing.assert_allclose(v + tau * (a + tau * j / 2), 0.0, atol=1e-8)
-    np.testing.assert_allclose(a + tau * j, 0.0, atol=1e-6)
 
 
 # --- refusals and failures ---------------------------------------------------------------------------------------------------
@@ -245,10 +184,10 @@ def test_where_nothing_converges_the_start_stays_and_says_why():
 
 
 class SecondFails(TubeNLP):
-    """Finds nothing on runs of one leg."""
+    """Finds nothing on courses of one leg."""
 
-    def solve(self, run, guess):
-        return TubeNLP(max_iterations=2 if len(run) == 1 else 300).solve(run, guess)
+    def solve(self, course, guess):
+        return TubeNLP(max_iterations=2 if len(course) == 1 else 300).solve(course, guess)
 
 
 def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
@@ -266,9 +205,9 @@ def test_the_next_start_is_tried_where_the_first_leads_to_nothing():
     asked = []
 
     class Counted(TubeNLP):
-        def solve(self, run, guess):
+        def solve(self, course, guess):
             asked.append(guess.h.sum())
-            return TubeNLP(max_iterations=2 if len(asked) == 1 else 300).solve(run, guess)
+            return TubeNLP(max_iterations=2 if len(asked) == 1 else 300).solve(course, guess)
 
     made = TubeMethod(starts=(SHORT[0], OptimalMethod(corner="fir")), solver=Counted()).plan(
         corner(90), MACHINE
@@ -290,13 +229,6 @@ def test_a_start_without_a_motion_is_a_status():
     assert made.status is Status.NUMERICAL_ERROR
     with pytest.raises(NotSolvedError, match="no motion to start from: broke down"):
         made.require()
-
-
-def test_settings_and_guesses_are_checked():
-    with pytest.raises(ValueError, match="tol: 0"):
-        TubeNLP(tol=0)
-    with pytest.raises(ValueError, match=r"Guess\.h"):
-        Guess(leg=np.zeros(1), h=np.zeros(1), state=np.zeros((2, 3, 2)), place=np.zeros((1, 4)))
 
 
 def test_it_has_a_name():

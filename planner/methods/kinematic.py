@@ -27,16 +27,15 @@ from planner.corners.allocation import (
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
-from planner.geometry.legs import Legs as PathLegs
-from planner.geometry.legs import legs_of
+from planner.geometry.legs import Legs, legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable
-from planner.lookahead.corner_pieces import along_axes, pieces_of
+from planner.lookahead.corner_pieces import along_axes, corner_pieces
 from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
-from planner.lookahead.look_ahead import Legs, Passage, look_ahead
-from planner.lookahead.ramps import Kind
+from planner.lookahead.look_ahead import LegLimits, Passage, look_ahead
+from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
@@ -122,8 +121,8 @@ class _Course:
     """
 
     lines: Toolpath
-    path: PathLegs
-    legs: Legs
+    path: Legs
+    legs: LegLimits
     free: list[Passage]
     fitting: list[Passage]
     passage: Passage
@@ -162,11 +161,9 @@ def _slower_than_stops(course: _Course, toolpath: Toolpath, machine: Machine) ->
 
 
 def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
-    pieces = pieces_of(
-        course.passage, course.legs, course.path, course.lines.dwell[course.path.first], _turning(course)
-    )
+    pieces = corner_pieces(course.passage, course.legs, course.path, course.lines.dwell[course.path.first])
     position, velocity, acceleration, jerk = along_axes(pieces, course.path, course.lines)
-    end = np.cumsum(pieces.duration)
+    end = np.cumsum(pieces.rows.duration)
     return AxisMotion(
         axes=axes,
         t=np.insert(end[:-1], 0, 0.0),
@@ -180,17 +177,12 @@ def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
     )
 
 
-def _turning(course: _Course) -> FloatArray:
-    """(n,) turning of the legs [rad/mm], 0 on straight ones."""
-    return np.abs(course.path.table["rate"])
-
-
 def _corner_table(course: _Course, machine: Machine) -> CornerTable:
     """The corners that are run through, at their apexes."""
     kind, V, p, q = (getattr(course.passage, name) for name in ("kind", "V", "p", "q"))
-    k = np.flatnonzero((kind == Kind.ZERO) | (kind == Kind.ENTRY))
+    k = np.flatnonzero((kind == JointKind.ZERO) | (kind == JointKind.ENTRY))
     lines, at, u = course.lines, course.path.first[k], course.path.table["direction"]
-    V, p, q, zero = V[k], p[k], q[k], kind[k] == Kind.ZERO
+    V, p, q, zero = V[k], p[k], q[k], kind[k] == JointKind.ZERO
     theta, tol = lines.theta[at], lines.tolerance[at]
     s, c = np.sin(theta / 2), np.cos(theta / 2)
     T1, _ = corner.phase_times(V, p, q)
@@ -230,7 +222,7 @@ def _sentence(course: _Course) -> str:
     turns, kind = course.turns, course.passage.kind
     if not turns.any():
         return "there is no corner between full stops; every stretch is run in the shortest time"
-    stops, steps = (int((turns & (kind == which)).sum()) for which in (Kind.STOP, Kind.PASS))
+    stops, steps = (int((turns & (kind == which)).sum()) for which in (JointKind.STOP, JointKind.PASS))
     text = f"{int(turns.sum()) - stops} corners are run through"
     text += f", {steps} of them with a step of velocity, which breaks acceleration and jerk" if steps else ""
     return text + (f", {stops} are full stops because that is faster" if stops else "")

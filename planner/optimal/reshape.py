@@ -107,11 +107,12 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     v = np.sqrt(solution.feed_sq)
     duration, jerk = solution.duration[on], solution.jerk_s[on]
     acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
-    H, Q = np.zeros((2, len(problem.axes), len(laid.control), ORDER))
+    axes = problem.machine_axes
+    H, Q = np.zeros((2, axes, len(laid.control), ORDER))
     motion_forms(
         laid.span_first, laid.breaks, laid.control, laid.fits, interval, within,
         np.stack([samples.w0[on], samples.w1[on]], axis=1), np.stack([v[on], v[on + 1]], axis=1), acc, jerk, duration,
-        _prices(problem, solution, on), np.stack([problem.acceleration, _jerk_scale(planned)]), H, Q,
+        _prices(problem, solution, on), np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]]), H, Q,
     )  # fmt: skip
     return H, Q
 
@@ -134,8 +135,8 @@ def _jerk_scale(planned: OnPath) -> FloatArray:
 def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> FloatArray:
     """(I, 2, A, 3) weights of squared velocity, acceleration and jerk at both ends of the intervals `on` (module text) [s]."""
     assert solution.multipliers is not None
-    axes = len(problem.axes)
-    rows = np.abs(solution.multipliers.rows[on])
+    axes = problem.machine_axes
+    rows = np.abs(solution.multipliers.rows[on, :axes])
     slower = [problem.limit_scale[point][:, None] for point in (on, on + 1)]  # squares of shares of limits
     price = np.zeros((len(on), 2, axes, 3))
     price[:, 0, :, 1], price[:, 1, :, 1] = (0.5 * rows[:, :, k] * slower[k // 3] ** 4 for k in (0, 3))
@@ -143,7 +144,7 @@ def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> 
     name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
     feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_limit[on]
     price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
-    for k, axis in enumerate(problem.axes):
+    for k, axis in enumerate(problem.axes[:axes]):
         at = name == f"velocity.{axis}"
         price[at, 0, k, 0] = feed[at] / problem.d1[on[at], k] ** 2
     return price

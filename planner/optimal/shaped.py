@@ -24,6 +24,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
+from planner.constraints.own import ratios
 from planner.delivery.filters import Behind
 from planner.delivery.pacing import paced, runs_of
 from planner.feedrate.solution import Status
@@ -180,6 +181,9 @@ class _Settling:
             worst = np.maximum(1.0, chunk.feed / self.feed[chunk.block])
             for order, (name, limit) in enumerate(self.limits.items(), start=1):
                 worst = np.maximum(worst, (np.abs(getattr(chunk, name)) / limit).max(axis=1) ** (1.0 / order))
+            for order, ratio in ratios(self.job.machine.own, chunk):
+                if order <= len(self.limits):
+                    worst = np.maximum(worst, ratio ** (1.0 / order))
             over = worst > 1.0 + EXCESS
             for delay in self.shaper.delay:
                 np.maximum.at(factor, self._piece(motion, chunk.t[over] - delay), worst[over])

@@ -14,6 +14,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import paced, runs_of
 from planner.geometry.toolpath import Toolpath
@@ -61,11 +62,15 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
             most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
             worst = np.maximum(worst, most ** (1.0 / order))
+        for order, ratio in ratios(machine.own, seen):
+            worst = np.maximum(worst, ratio.reshape(times.shape).max(axis=1) ** (1.0 / order))
         factor[own] = worst
     for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
+        for order, ratio in ratios(machine.own, chunk):
+            worst = np.maximum(worst, ratio ** (1.0 / order))
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor

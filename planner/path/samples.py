@@ -32,6 +32,7 @@ from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.path.calm import Calm, calm, quiet_way
 from planner.path.grid import divide, evaluate, grade
+from planner.path.own_rows import own_rows
 from planner.path.rows import cut_path
 
 # Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is then 0.6e-3 to 3e-3
@@ -47,6 +48,8 @@ ARC_PERIOD = 0.5
 REST_PERIOD = 0.25
 # A spline passes a change of the feed within so many tolerances of where the program has it [-].
 NEAR = 2.0
+# Rounds of halving intervals for limits of one's own, down to a um: from 10^9 km at most.
+HALVINGS_OF_OWN = 60
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -163,7 +166,7 @@ def sample_path(
     piece = np.concatenate([[0], ends + 1])
     stop = np.flatnonzero(path.joint == Joint.STOP)
     limits = (path.toolpath.feed, velocity, acceleration, jerk)
-    return PathSamples(
+    samples = PathSamples(
         path=path,
         table=table,
         piece=piece,
@@ -173,6 +176,42 @@ def sample_path(
         w1=w1,
         segment=segment,
         **_evaluated(table, element, w0, w1, segment, last, limits),
+    )
+    if machine.own:
+        for _ in range(HALVINGS_OF_OWN):
+            coarse = own_rows(samples, machine, resolution).coarse
+            if not coarse.any():
+                break
+            samples = _halved(samples, np.flatnonzero(coarse), limits)
+    return samples
+
+
+def _halved(samples: PathSamples, interval: Array, limits: tuple[FloatArray, ...]) -> PathSamples:
+    """The grid with the intervals (n,) halved in their parameter; `limits` (feed, then axis limits) matter to the margin."""
+    after = interval + 1
+    middle = 0.5 * (samples.w0[interval] + samples.w1[interval])
+
+    def put(values: Array, new: Array) -> Array:
+        return np.insert(values, after, new, axis=0)
+
+    w1 = samples.w1.copy()
+    w1[interval] = middle
+    w0, w1 = put(samples.w0, middle), put(w1, samples.w1[interval])
+    element, segment = (put(column, column[interval]) for column in (samples.element, samples.segment))
+    piece = samples.piece + np.searchsorted(interval, samples.piece, side="left")
+    last = np.zeros(len(w0), dtype=bool)
+    last[piece[1:] - 1] = True
+    columns = _evaluated(samples.table, element, w0, w1, segment, last, limits)
+    return replace(
+        samples,
+        path=samples.path,
+        table=samples.table,
+        piece=piece,
+        element=element,
+        w0=w0,
+        w1=w1,
+        segment=segment,
+        **columns,
     )
 
 

@@ -61,10 +61,39 @@ def limit_checks(
     if machine.normal_acceleration is not None:
         row = rows.GROUPS * len(axes) + rows.NORMAL
         table.append(("normal_acceleration", "mm/s2", row, machine.normal_acceleration))
-    return {
+    checks = {
         name: _limit_check(name, unit, row, limit, looks, toolpath, pieces, not_limited)
         for name, unit, row, limit in table
     }
+    return checks | _own_checks(looks, toolpath, pieces, not_limited)
+
+
+def _own_checks(
+    looks: list[Look], toolpath: Toolpath, pieces: Pieces, not_limited: tuple[str, ...]
+) -> dict[str, LimitCheck]:
+    """The worst of every limit of one's own that bounds anything (own.py)."""
+    checks = {}
+    for row in range(len(looks[0].seen.own.worst)):
+        if not any(look.seen.own.bounded[row] for look in looks):
+            continue
+        look = looks[int(np.argmax([each.seen.own.worst[row, 0] for each in looks]))]
+        own = look.seen.own
+        (ratio, value, limit_there, how), (name, unit) = own.worst[row], own.name(row)
+        checks[name] = LimitCheck(
+            name=name,
+            unit=unit,
+            ratio=float(ratio),
+            value=float(value),
+            limit=float(limit_there if ratio > 0 else own.least[row]),
+            time=float(own.time[row]),
+            position=own.at[row],
+            line=line_of(toolpath, pieces, own.piece[row]),
+            limited=name.split(".")[0] not in not_limited,
+            note=look.noted("differences of position" if how == rows.DIFFERENCE else "column")
+            if ratio > 0
+            else "",
+        )
+    return checks
 
 
 def _limit_check(

@@ -163,6 +163,8 @@ def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited:
         normal_acceleration=machine.normal_acceleration or np.inf,
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
+        axes=trajectory.axes,
+        own=machine.own,
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.motion.trajectory import Trajectory
 from planner.verify.limits import GROUPS, ROWS_ALONE, scan
 from planner.verify.matching import Match, follow, new_match
+from planner.verify.own import Block, OwnSeen
 from planner.verify.pieces import Pieces
 
 BLOCK_SAMPLES = 65_536  # read at a time: 8 MB for three axes
@@ -39,6 +41,8 @@ class Limits:
     normal_acceleration: float
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
     jerk_limited: bool
+    axes: tuple[str, ...] = ()
+    own: tuple[Any, ...] = ()  # limits of one's own (own.py)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -53,6 +57,7 @@ class Seen:
     at: FloatArray
     piece: Array
     match: Match
+    own: OwnSeen = field(default_factory=lambda: OwnSeen((), ()))
     samples: int = 0
     first: FloatArray = field(default_factory=lambda: np.empty(0))  # (A,) first and last position
     last: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -82,6 +87,7 @@ def watch(
         at=np.zeros((rows, axes)),
         piece=np.zeros(rows, dtype=np.int64),
         match=new_match(pieces),
+        own=OwnSeen(limits.own, limits.axes),
     )
     carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
     feed_max = np.empty(0)
@@ -129,6 +135,19 @@ def _block(
         limits.rounding,
         piece,
         feed_max,
+    )
+    seen.own.take(
+        Block(
+            t=t,
+            position=position,
+            velocity=velocity,
+            acceleration=acceleration,
+            jerk=jerk,
+            piece=piece,
+            skip=skip,
+            travelled=travelled,
+        ),
+        limits,
     )
     worst = np.zeros_like(seen.worst)
     worst[:, 0] = seen.worst[:, 0]

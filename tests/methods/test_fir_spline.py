@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.fir.guide import Guide, guide_of_curve
+from planner.fir.guide import ChordGuide, guide_of_curve
 from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
@@ -32,7 +32,7 @@ def mean_on_circle(rho: float, v: float, T1: float, T2: float) -> complex:
     return complex((rho * np.exp(-1j * v / rho * (one[:, None] + other)) * weights).sum())
 
 
-def guide_on(curve: Nurbs, machine: Machine, feed: float = 100.0) -> Guide:
+def guide_on(curve: Nurbs, machine: Machine, feed: float = 100.0) -> ChordGuide:
     return guide_of_curve(curve, machine, feed, machine.tolerance, curve.breaks, np.zeros(0))
 
 
@@ -152,7 +152,7 @@ def test_the_filters_are_the_shortest_that_an_isolated_step_allows(V, a, j, dire
     machine = problems.machine(velocity=1e4, acceleration=a, jerk=j)
     guide = guide_on(curve, machine, V)
     speed = np.where(guide.length > 0, V, 0.0)
-    one, two = filter_lengths(guide, speed, np.full(2, a), np.full(2, j), np.ones((2, 1)))
+    one, two = filter_lengths(guide, speed, machine, np.ones((1, 2)))
     along = V * np.max(direction) / np.linalg.norm(direction)
     assert one[0] >= two[0] * (1 - 1e-12)
     assert along / (one[0] * two[0]) == pytest.approx(j)

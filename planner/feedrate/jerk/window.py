@@ -86,7 +86,7 @@ class ScaledWindow:
         """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
         own = slice(begin, end + 1)
         feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
-        t = float(feed / problem.acceleration.max())
+        t = float(feed / problem.acceleration[: problem.machine_axes].max())
         length = feed * t
         grid = Grid(
             ds=np.diff(problem.s[own]) / length,

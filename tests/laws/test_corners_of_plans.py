@@ -66,6 +66,7 @@ def test_every_method_keeps_the_laws_at_every_programmed_corner(method, job):
     assert (ratio <= found.speed_ratio * (1 + 1e-12)).all()
 
 
+@pytest.mark.slow
 def test_the_optimum_inside_the_tube_keeps_them_too():
     plan = planner.plan(problems.zigzag(count=4), MACHINE, method="tube")
     assert plan.verdict.passed, plan.verdict.faults

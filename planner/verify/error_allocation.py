@@ -49,9 +49,9 @@ from planner.verify.corners import CornerCheck
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
 from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS
 from planner.verify.matching import NEAR_MISS
-from planner.verify.pieces import Pieces
+from planner.verify.pieces import ProgramPieces
 from planner.verify.stream import Limits
-from planner.verify.times import Motion
+from planner.verify.times import AnyMotion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
@@ -75,11 +75,11 @@ class _Reading:
 def check_corners(
     trajectory: Trajectory,
     looks: list[Look],
-    pieces: Pieces,
+    pieces: ProgramPieces,
     toolpath: Toolpath,
     machine: Machine,
     *,
-    motion: Motion | None,
+    motion: AnyMotion | None,
     limits: Limits,
     judged: bool,
 ) -> CornerCheck:
@@ -190,7 +190,7 @@ def _nearest_sample(
 
 
 def _nearest_point(
-    motion: Motion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
+    motion: AnyMotion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
 ) -> _Reading:
     """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method on (p - P).p' = 0."""
     time, readings = start, []

@@ -14,7 +14,6 @@ NO_CODE = {"examples", "machines", "templates"}
 # Tested in the folder above: all solvers are held against each other there.
 WITH_PARENT = {"feedrate/jerk", "feedrate/reference"}
 FILES = sorted(TESTS.rglob("*.py"))
-REACHES_INSIDE = {"smoothing/test_spline_path.py"}  # kernels with other constants, run as Python
 
 
 def test_every_folder_of_the_package_has_its_tests() -> None:
@@ -30,7 +29,7 @@ def test_files_are_short_and_use_public_names(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     lines, private = text.count("\n"), private_names(ast.parse(text))
     assert lines <= LONGEST
-    assert not private or str(file.relative_to(TESTS)) in REACHES_INSIDE
+    assert not private
 
 
 def test_file_names_are_used_once() -> None:

@@ -37,8 +37,12 @@ class Corner(StrEnum):
 
 
 class Solver(StrEnum):
-    """Names of the solvers of the second-order problem."""
+    """Names of the solvers, of the problem with jerk limits and of that without (feedrate/solvers.py)."""
 
+    own = "own"
+    ipopt = "ipopt"
+    fatrop = "fatrop"
+    sequential_convex = "sequential-convex"
     reachability = "reachability"
     toppra = "toppra"
 

@@ -42,7 +42,8 @@ def plan(
     solver: Annotated[
         Solver | None,
         typer.Option(
-            help=f"of method toppra: our kernel, or the package toppra for comparison [default: {Solver.reachability}]"
+            help=f"of method optimal: {Solver.own} (default), or casadi's ipopt, fatrop and sequential-convex for comparison; "
+            f"of method toppra: {Solver.reachability} (default), or the package toppra"
         ),
     ] = None,
     rounds: Annotated[

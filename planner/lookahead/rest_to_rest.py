@@ -16,6 +16,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
+from planner.base.packages import needed
 from planner.corners.allocation import error_rate
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -44,8 +45,7 @@ def rest_to_rest_phases(
 
     Raises NotSolvedError if ruckig does not return a finished move.
     """
-    import ruckig
-
+    ruckig = needed("ruckig", "method stop")
     solver = ruckig.Ruckig(1)
     move = ruckig.InputParameter(1)
     found = ruckig.Trajectory(1)

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import refine_for_jerk
-from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.solvers import OWN, JerkLimitedSolver, third_order_solver
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.job.stages import Stages
@@ -49,17 +49,21 @@ class OptimalMethod(Method):
     """Time-optimal planning with jerk limits on rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
-    solver : a solver of third order
+    solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver
     rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job lets pay
     shaped : deliver set points that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
-    solver: JerkLimited = field(default_factory=JerkLimited)
+    solver: str | JerkLimitedSolver = OWN
     rounds: int | None = None
     shaped: bool = False
 
     ways = ((0.5, 1.0), (0.1, 1.0))
+
+    @property
+    def _solver(self) -> JerkLimitedSolver:
+        return third_order_solver(self.solver)
 
     @property
     def instead(self) -> tuple[Method, ...]:  # type: ignore[override]
@@ -76,7 +80,7 @@ class OptimalMethod(Method):
             return shaped_plan(
                 job,
                 lambda job: plain._best(job, self.corner),
-                self.solver.solve,
+                self._solver.solve,
                 method="optimal",
                 corner=self.corner,
             )
@@ -97,7 +101,7 @@ class OptimalMethod(Method):
         motion = made = prices = None
         if best.solution.solved:
             with job.stage("solve"):
-                best, motion = within_limits(best, self.solver.solve, job.toolpath, machine)
+                best, motion = within_limits(best, self._solver.solve, job.toolpath, machine)
             with job.stage("filters"):
                 best, motion = within_filters(best, motion, self._again(job), job.real)
             made = job.deliver(motion)
@@ -132,10 +136,10 @@ class OptimalMethod(Method):
         """The motion of another problem on the same grid, None if there is none."""
 
         def again(planned: OnPath, problem: FeedrateProblem) -> tuple[OnPath, Motion] | None:
-            other = dataclasses.replace(planned, problem=problem, solution=self.solver.solve(problem))
+            other = dataclasses.replace(planned, problem=problem, solution=self._solver.solve(problem))
             if not other.solution.solved:
                 return None
-            return within_limits(other, self.solver.solve, job.toolpath, job.machine)
+            return within_limits(other, self._solver.solve, job.toolpath, job.machine)
 
         return again
 
@@ -149,7 +153,7 @@ class OptimalMethod(Method):
             samples = refine_for_jerk(samples, machine)
             problem = feedrate_problem(samples, machine, measured=True)
             return OnPath(
-                path=path, samples=samples, problem=problem, solution=self.solver.solve(problem, report)
+                path=path, samples=samples, problem=problem, solution=self._solver.solve(problem, report)
             )
 
 

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from planner.base.errors import InputError
+from planner.feedrate.solvers import OWN, REACHABILITY, second_order_solver, third_order_solver
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
@@ -15,7 +16,7 @@ from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
-from planner.methods.second_order import SOLVERS, ToppraMethod
+from planner.methods.second_order import ToppraMethod
 from planner.methods.stop import StopMethod
 from planner.methods.tube import TubeMethod
 from planner.nc.program import Program
@@ -23,11 +24,10 @@ from planner.nc.reader import read_program
 from planner.optimal.geometry import AUTO, SPLINE
 
 DEFAULT_MACHINE = "mill"
-REACHABILITY = "reachability"
 # Which methods use which setting of `plan`.
 USED_BY = {
     "corner": ("optimal", "toppra"),
-    "solver": ("toppra",),
+    "solver": ("optimal", "toppra"),
     "rounds": ("optimal", "toppra"),
     "shaped": ("optimal", "toppra"),
 }
@@ -63,7 +63,8 @@ def plan(
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `METHODS`, or a method with settings of your own
     corner    : "auto", "spline", "bezier", "fir" or "kinematic", for "toppra" and "optimal" only; None for "auto"
-    solver    : "reachability" or "toppra", for "toppra" only; None for "reachability"
+    solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", None for "own"; "reachability" or "toppra" for "toppra",
+                None for "reachability" (feedrate/solvers.py)
     rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
                 the size of the job lets pay
     shaped    : deliver set points that leave the machine's vibration modes at rest, for "toppra" and "optimal" only
@@ -78,7 +79,7 @@ def plan(
         method = _method(
             method,
             AUTO if corner is None else corner,
-            REACHABILITY if solver is None else solver,
+            solver,
             rounds,
             shaped,
         )
@@ -112,15 +113,15 @@ def _check_used(method: str | Method, **given: str | int | None) -> None:
         )
 
 
-def _method(name: str, corner: str, solver: str, rounds: int | None, shaped: bool) -> Method:
-    if solver not in SOLVERS:
-        raise InputError(f"no solver '{solver}'; there are {', '.join(SOLVERS)}")
+def _method(name: str, corner: str, solver: str | None, rounds: int | None, shaped: bool) -> Method:
     if rounds is not None and rounds < 0:
         raise InputError(f"{rounds} rounds; it must be 0 or more")
     if name == "optimal":
-        return OptimalMethod(corner=corner, rounds=rounds, shaped=shaped)
+        third_order = third_order_solver(OWN if solver is None else solver)
+        return OptimalMethod(corner=corner, solver=third_order, rounds=rounds, shaped=shaped)
     if name == "toppra":
-        return ToppraMethod(corner=corner, solver=solver, rounds=rounds, shaped=shaped)
+        second_order = second_order_solver(REACHABILITY if solver is None else solver)
+        return ToppraMethod(corner=corner, solver=second_order, rounds=rounds, shaped=shaped)
     if name == "bezier":
         return BezierMethod()
     if name == "kinematic":

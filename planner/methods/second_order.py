@@ -13,9 +13,8 @@ from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.grid import refine_for_jerk
-from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
-from planner.feedrate.toppra_adapter import ToppraSolver
+from planner.feedrate.solvers import REACHABILITY, second_order_solver
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.motion.time_law import law_of_solution
@@ -32,8 +31,6 @@ from planner.path.samples import RESOLUTION, sample_path
 # Of 40 random polylines one exceeded an acceleration by 4e-4 between grid points; at most so often the whole is slowed down by that.
 SEEN_ROUNDS = 3
 
-SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
-
 
 @dataclass(frozen=True, kw_only=True)
 class ToppraMethod(Method):
@@ -46,7 +43,7 @@ class ToppraMethod(Method):
     """
 
     corner: str | CornerShape = AUTO
-    solver: str | FeedrateSolver = "reachability"
+    solver: str | FeedrateSolver = REACHABILITY
     rounds: int | None = None
     shaped: bool = False
 
@@ -54,7 +51,7 @@ class ToppraMethod(Method):
 
     @property
     def _solver(self) -> FeedrateSolver:
-        return SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
+        return second_order_solver(self.solver)
 
     def _best(self, job: Job) -> OnPath:
         """The time-optimal motion of a job, and the path that it is on."""

@@ -39,6 +39,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.packages import needed
 from planner.feedrate.solution import Status
 from planner.tube.course import Course
 from planner.tube.guess import Guess
@@ -136,7 +137,7 @@ class TubeNLP:
 
     def _solve(self, course: Course, guess: Guess) -> TubeSolution:
         """Transcribe and solve; the whole formulation, from top to bottom."""
-        import casadi as ca
+        ca = needed("casadi", "method tube")
 
         began = time.perf_counter()
         steps, axes, leg = len(guess), len(course.axis), guess.leg

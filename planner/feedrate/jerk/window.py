@@ -114,6 +114,15 @@ class ScaledWindow:
         n = len(p)
         return self._window(x, u, p, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
 
+    def near(self, x: FloatArray, u: FloatArray) -> Window | None:
+        """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
+        none. It may exceed its limits a little, and has no multipliers."""
+        x, u = x / self.feed**2, u * self.time / self.feed
+        p = np.diff(u)
+        if kernel.track(self.grid, self._jerk, x, u, p, 0.0, TRACKING_ROUNDS, POLISHED) > kernel.DEFECT:
+            return None
+        return self._window(x, u, p, np.zeros((len(p), 2 * self._rows - 2)), np.zeros(len(p)))
+
     def _starts(self, behind: Window | None) -> Iterator[_Profile]:
         """Profiles to start from, the best first."""
         for start in self._from_rest():

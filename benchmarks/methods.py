@@ -4,8 +4,8 @@
 
 The jobs: pentagon, zig-zag, circle and spiral of chords and paper 002's 5-point path of problems.py; the NURBS butterfly of curves.json
 as chords within a tenth of the tolerance (for fir-spline also as the curve itself); with FILEs, NC or HPGL programs come after them.
-The machine is v 100 mm/s, a 2000 mm/s2, j 2e5 mm/s3, tolerance 0.05 mm, 1 ms. `optimal` and `toppra` round corners, and have a row for
-each shape: optimal/bezier, optimal/fir and so on.
+The machine is v 100 mm/s, a 2000 mm/s2, j 2e5 mm/s3, tolerance 0.05 mm, 1 ms. `optimal` and `second-order` smooth the path in several
+ways, and have a row for each: optimal/spline, optimal/bezier and so on.
 
 Results: benchmarks/results/RESULT.json and .md. Below the table stand the jobs on which the optimum with the best of its corners is
 slower than another method that holds the same limits.
@@ -25,21 +25,20 @@ import planner
 from benchmarks import problems
 from benchmarks.record import markdown, write_results
 from planner.base.errors import PlannerError
+from planner.base.names import METHODS, OPTIMAL, SECOND_ORDER, SMOOTHINGS
 from planner.geometry.nurbs import Nurbs
 from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.methods.fir_spline import FirSplineMethod
-from planner.methods.registry import METHODS
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.optimal.on_path import CORNERS
 from planner.report.comparison import Row, best_of, refused, row_of_plan
 
-ROUNDING = ("optimal", "toppra")
+ROUNDING = (OPTIMAL, SECOND_ORDER)
 LABELS = tuple(
     label
     for name in METHODS
-    for label in ([f"{name}/{corner}" for corner in CORNERS] if name in ROUNDING else [name])
+    for label in ([f"{name}/{corner}" for corner in SMOOTHINGS] if name in ROUNDING else [name])
 )
 CURVE_CHORDS = 0.1  # of the tolerance: what the chords of a curve may leave it by [-]
 ERROR_TRUE = 2.0  # ratios to the tolerance from here on may be a lost place, no distance [-]
@@ -123,7 +122,7 @@ def _markdown(table: dict[str, list[Row]]) -> str:
         ["", *table],
         [[label, *(_time(found.get((name, label)), best[name]) for name in table)] for label in labels],
     )
-    text += "\n`toppra` does not limit the jerk; the others are judged with it.\n"
+    text += "\n`second-order` does not limit the jerk; the others are judged with it.\n"
     text += "\nLargest ratio to a limit that is exceeded, or of the error to the tolerance; no number where the distance is\n"
     text += "not known.\n\n"
     broken = [

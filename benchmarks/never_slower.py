@@ -1,6 +1,7 @@
 """Is `optimal` ever slower than what it should beat: stopping at every block, `kinematic`, or any single corner shape?
 
     python -m benchmarks.never_slower [--jobs 300] [--first 0]     into results/never-slower.json and .md
+    python -m benchmarks.never_slower --again 141                  these jobs of the results once more
 
 Seeded random jobs of 2 to 12 blocks, lines and arcs, in two or three axes, on machines whose limits differ by axis, with jerks from
 tight to loose, four tolerances and four interpolation periods. Only motions that pass their verdict are compared with.
@@ -9,12 +10,13 @@ tight to loose, four tolerances and four interpolation periods. Only motions tha
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.record import markdown, write_results
+from benchmarks.record import RESULTS, markdown, write_results
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.machine import Axis, Machine
@@ -108,13 +110,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="optimal against what it should beat")
     parser.add_argument("--jobs", type=int, default=JOBS)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--again", type=int, nargs="+", help="make these jobs of the results again")
     chosen = parser.parse_args()
-    rows = []
+    made: dict[int, dict] = {}
+    if chosen.again:
+        kept = json.loads((RESULTS / "never-slower.json").read_text(encoding="utf-8"))["jobs"]
+        made = {row["seed"]: row for row in kept}
     began = time.process_time()
-    for seed in range(chosen.first, chosen.first + chosen.jobs):
-        rows.append(compared(seed))
-        for name, by in slower(rows[-1]):
-            print(f"job {seed}: {name} is faster by {by:.2e}; {rows[-1]['sentence']}", flush=True)
+    for seed in chosen.again or range(chosen.first, chosen.first + chosen.jobs):
+        made[seed] = compared(seed)
+        for name, by in slower(made[seed]):
+            print(f"job {seed}: {name} is faster by {by:.2e}; {made[seed]['sentence']}", flush=True)
+    rows = [made[seed] for seed in sorted(made)]
     table = []
     for name in rivals():
         gain = np.array([row[name] / row["optimal"] - 1.0 for row in rows if row[name] and row["optimal"]])
@@ -139,6 +146,8 @@ def main() -> None:
     ]
     unsolved = sum(row["optimal"] is None for row in rows)
     text = f"{len(rows)} random jobs; `optimal` does not pass on {unsolved}.\n\n" + markdown(columns, table)
+    if chosen.again:
+        text += f"\nMade with this commit: {', '.join(f'job {seed}' for seed in chosen.again)}; the others before.\n"
     print(text, f"{time.process_time() - began:.0f} CPU s")
     write_results("never-slower", {"jobs": rows}, text)
 

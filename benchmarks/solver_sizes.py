@@ -17,7 +17,7 @@ from typing import Any
 from benchmarks.random_paths import long_path
 from benchmarks.record import markdown, write_results
 from planner.feedrate.reference.exact_motion import ExactMotion
-from planner.feedrate.solvers import OWN, THIRD_ORDER, JerkLimitedSolver
+from planner.feedrate.solvers import OWN, THIRD_ORDER, ThirdOrderSolver
 
 SIZES = (300, 1_000, 3_000, 10_000)
 WARM_UP = 200  # points
@@ -64,7 +64,7 @@ def main() -> None:
         write_results("solver-sizes", {"rows": rows}, _table(rows))
 
 
-def _unlimited(solver: JerkLimitedSolver) -> JerkLimitedSolver:
+def _unlimited(solver: ThirdOrderSolver) -> ThirdOrderSolver:
     """The solver without its largest size."""
     if isinstance(solver, ExactMotion):
         return dataclasses.replace(solver, solver=dataclasses.replace(solver.solver, points_max=NO_LIMIT))

@@ -22,8 +22,8 @@ import planner
 from benchmarks import problems
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.errors import PlannerError
+from planner.base.names import SMOOTHINGS
 from planner.nc.program import Program
-from planner.optimal.on_path import CORNERS
 
 ANGLES = (15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 160, 170)  # [deg]
 LEG = 20.0  # [mm]
@@ -76,7 +76,7 @@ def main() -> None:
         if name in rows:
             continue
         rows[name] = {"tube": measured(job, method="tube")}
-        rows[name] |= {shape: measured(job, method="optimal", corner=shape) for shape in CORNERS}
+        rows[name] |= {shape: measured(job, method="optimal", corner=shape) for shape in SMOOTHINGS}
         print(name, {label: row["cycle_time_s"] for label, row in rows[name].items()}, flush=True)
         write_results("tube", {"jobs": rows}, _table(rows))
 
@@ -86,10 +86,16 @@ def _table(rows: dict[str, dict[str, Any]]) -> str:
     for name, row in rows.items():
         limit = row["tube"]["cycle_time_s"]
         cells = [name, _cell(row["tube"], None)]
-        cells += [_cell(row[shape], limit) for shape in CORNERS]
+        cells += [_cell(row[shape], limit) for shape in SMOOTHINGS]
         took = row["tube"].get("planning_time_s")
         lines.append([*cells, str(row["tube"].get("points", "")), f"{took:.1f}" if took else ""])
-    columns = ["job", "tube [s]", *(f"optimal, {shape} [s]" for shape in CORNERS), "points", "planning [s]"]
+    columns = [
+        "job",
+        "tube [s]",
+        *(f"optimal, {shape} [s]" for shape in SMOOTHINGS),
+        "points",
+        "planning [s]",
+    ]
     text = "Cycle times, and in brackets their ratio to `tube`; * the verdict failed. Points and planning time are those of `tube`.\n\n"
     return text + markdown(columns, lines)
 

@@ -1,14 +1,19 @@
 """Optimisation-based feedrate planning for CNC machines.
 
-    plan                 read, round, solve, sample and verify a job: one call
-    Plan                 what it returns
-    Machine, load_machine
-    Program, read_program
-    Toolpath, Trajectory, Verdict
-    InputError, NotSolvedError
+    plan                     plan, sample and verify a program: one call
+    Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost
+    Machine, load_machine    limits, interpolation period and tolerance of a machine, from a TOML file
+    Program, read_program    the blocks of an NC program
+    Toolpath                 the programmed path with its joints and tolerances
+    Trajectory               the setpoints, one row per interpolation period
+    Verdict                  the verifier's findings
+    Trace                    what planning tried, step by step
+    InputError               bad input; the message names file, line and column
+    NotSolvedError           no motion was found; raised by `Plan.require`
     __version__
 
-Names and units: `planner.base.units`. Everything is imported on first use, so that `import planner` costs nothing.
+Units and symbols are in `planner.base.units`, words in `planner.base.glossary`, names of methods in `planner.base.names`. Everything
+is imported on first use, so that `import planner` costs nothing.
 """
 
 from importlib import import_module
@@ -18,6 +23,7 @@ if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
+    from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
     from planner.methods.registry import plan
     from planner.motion.trajectory import Trajectory
@@ -30,6 +36,7 @@ if TYPE_CHECKING:
 _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
+    "Trace": "planner.job.trace",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
@@ -48,6 +55,7 @@ __all__ = [
     "Plan",
     "Program",
     "Toolpath",
+    "Trace",
     "Trajectory",
     "Verdict",
     "load_machine",

@@ -1,6 +1,6 @@
-"""The machine: limits per axis, interpolation period, tolerance, filters. TOML in, validated, frozen.
+"""The machine: limits of the axes, interpolation period, tolerance, filters. Read from TOML, checked, frozen.
 
-The file speaks mm, s and degrees (rotary axes); the record speaks mm, s and rad. `planner machine init FILE` writes a
+Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns rad. `planner machine init FILE` writes a
 template with every key and its unit.
 """
 
@@ -33,7 +33,7 @@ class _Record(BaseModel):
 
 
 class Axis(_Record):
-    """Limits of one axis: [mm/s], [mm/s2], [mm/s3]; in a machine file rotary axes are in degrees."""
+    """Limits of one axis: velocity [mm/s], acceleration [mm/s2], jerk [mm/s3]; in degrees for rotary axes."""
 
     velocity: Positive
     acceleration: Positive
@@ -41,14 +41,14 @@ class Axis(_Record):
 
 
 class Fir(_Record):
-    """Moving averages in series in the drive or the control, behind the delivered setpoints.
+    """Moving averages in series in the drives or in the control, behind the delivered setpoints.
 
-    The same for every method: the motion behind them stays within the tolerance. Filters that a method makes its setpoints with are
-    settings of that method.
+    The motion behind them stays within the tolerance, whatever the method. Filters by which a method makes its setpoints are a setting
+    of that method instead.
 
     time_constants : their lengths [s], any number, in any order
-    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; methods `optimal` and `toppra`,
-                     and `bezier` at its corners, keep it, the others do not use it
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept by methods `optimal` and
+                     `second-order` everywhere and by `bezier` at its corners; the other methods do not use it
     """
 
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
@@ -63,7 +63,7 @@ class Mode(_Record):
 
 
 class Plotter(_Record):
-    """How plotter files (HPGL) are read: plotter unit [mm]; standstill while the pen or knife goes down and up [s]."""
+    """How plotter files (HPGL) are read: length of a plotter unit [mm], standstills while the pen or knife goes down and up [s]."""
 
     unit: Positive = 0.025
     pen_down: NotNegative = 0.0
@@ -71,15 +71,16 @@ class Plotter(_Record):
 
 
 class Machine(_Record):
-    """A machine. Lengths [mm], times [s]; see the template for every key.
+    """A machine. The template explains every key.
 
+    name                : of the machine
     axes                : limits by axis letter, at least x and y
     dt                  : interpolation period [s]
-    tolerance           : contour error budget eps [mm]
-    path_control        : what holds before the program's first G61, G61.1 or G64
-    feed_max            : largest path feed [mm/s], or None
-    normal_acceleration : A_max of paper 002 eq. (19) [mm/s2], or None
-    blend_rapids        : round the joints between G0 and feed moves too
+    tolerance           : contour tolerance eps [mm]
+    path_control        : what holds before the first G61, G61.1 or G64 of a program
+    feed_max            : largest feed along the path [mm/s], or None
+    normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
+    blend_rapids        : whether joints between G0 and feed moves are rounded
     """
 
     name: str
@@ -126,7 +127,7 @@ class Machine(_Record):
     def limits(
         self, quantity: Literal["velocity", "acceleration", "jerk"], axes: tuple[str, ...]
     ) -> FloatArray:
-        """Limits of `axes` for one quantity, (A,), in mm or rad.
+        """Limits (A,) of the axes for one quantity, in mm or rad and s.
 
         Raises InputError if the machine lacks one of the axes.
         """
@@ -144,9 +145,9 @@ WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59
 
 
 def load_machine(path: str | Path) -> Machine:
-    """Read and validate a machine file; a name without a suffix means a built-in machine.
+    """Read a machine file, or a built-in machine if the path is a name without a suffix.
 
-    Raises InputError naming file, key, value and what is allowed; all faults at once.
+    Raises InputError naming file, key, value and what is allowed, for all faults at once.
     """
     if str(path) in builtin_machines():
         text, source = builtin_text(str(path)), str(path)
@@ -162,7 +163,7 @@ def load_machine(path: str | Path) -> Machine:
 
 
 def machine_from_dict(data: dict, *, source: str | None = None) -> Machine:
-    """Validate a machine given as nested dictionaries (the TOML file's keys). Raises InputError with all faults."""
+    """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at once."""
     try:
         return Machine(**data)
     except (ValidationError, TypeError) as fault:

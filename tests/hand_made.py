@@ -118,7 +118,8 @@ def make_plan(
     trajectory = trajectory_along(toolpath) if solved else None
     t = np.linspace(0.0, trajectory.cycle_time, 40) if trajectory is not None else np.zeros(2)
     return SimpleNamespace(
-        method="toppra",
+        method="second-order",
+        geometry="corners",
         corner="bezier",
         solver="Reachability()",
         program=program,

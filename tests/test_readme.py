@@ -1,4 +1,4 @@
-"""What README.md shows works: its Python, its options, its commands' exit codes, the files and pages it names."""
+"""What README.md and the pages of docs/ show is so: Python, options, output, links, and the files they name."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from planner.base.names import CORNER_SHAPES, GEOMETRIES, METHODS
 from planner.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {"README.md": README} | {
+    f"docs/{page.name}": page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))
+}
+COMMANDS = PAGES["docs/command-line.md"]
 
 
-def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_example_runs_and_the_output_is_that_of_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     monkeypatch.chdir(ROOT)
     seen: dict[str, object] = {}
@@ -24,30 +29,68 @@ def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert plan.verdict.passed  # type: ignore[attr-defined]
     ratio = plan.corners.feed_planned / plan.corners.feed_closed_form  # type: ignore[attr-defined]
     assert ratio.max() <= 1.0 + 1e-6
+    time, stops = plan.trajectory.cycle_time, plan.stop_time  # type: ignore[attr-defined]
+    assert f"cycle time               {time:.4f} s" in README
+    assert f"stopping at every block  {stops:.4f} s, {stops / time:.2f} times as long" in README
+    assert f"{time:.1f} s, against {stops:.1f} s with a stop at every block" in README
+    assert f"{len(plan.program)} blocks" in README  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("command", ["plan", "compare", "verify", "info", "pulses"])
-def test_every_option_that_is_shown_exists(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_options_that_are_shown_exist_and_the_others_are_shown(
+    command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(os.environ, "COLUMNS", "200")
     monkeypatch.setitem(os.environ, "TERMINAL_WIDTH", "200")
-    usage = re.search(rf"^    planner {command} (.*?)(?=^    planner|\n\n)", README, re.DOTALL | re.MULTILINE)
+    usage = re.search(
+        rf"^    planner {command} (.*?)(?=^    planner|\n\n)", COMMANDS, re.DOTALL | re.MULTILINE
+    )
     assert usage is not None
     shown = set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", usage[1]))
     help_text = CliRunner().invoke(app, [command, "--help"]).stdout
     missing = {option for option in shown if not re.search(rf"(?<![\w-]){option}(?![\w-])", help_text)}
     assert shown
     assert not missing
+    long = set(re.findall(r"^. (?:\*\s+)?(--[a-z][a-z-]*)", help_text, re.MULTILINE))
+    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--help": "-h"}
+    assert long
+    assert not {short.get(option, option) for option in long} - shown - {"-h"}
 
 
-@pytest.mark.parametrize(
-    "name", sorted(set(re.findall(r"`((?:benchmarks/results|docs|planner|tests)/[\w./-]+)`", README)))
-)
-def test_every_file_that_is_named_exists(name: str) -> None:
-    place = ROOT / name
-    assert place.exists() or list(place.parent.glob(f"{place.name}.*"))
+def test_every_method_geometry_and_corner_shape_is_described() -> None:
+    described = set(re.findall(r"^\| ([^|]*)\|", PAGES["docs/methods.md"], re.MULTILINE))
+    names = {name for cell in described for name in re.findall(r"`([\w-]+)`", cell)}
+    assert set(METHODS) | set(GEOMETRIES) <= names
+    assert f"--geometry {'|'.join(GEOMETRIES)}" in COMMANDS
+    assert f"--corner {'|'.join(CORNER_SHAPES)}" in COMMANDS
 
 
-def test_notes_and_lines_of_the_output_are_those_of_plan() -> None:
+@pytest.mark.parametrize("page", PAGES)
+def test_every_file_that_is_named_exists(page: str) -> None:
+    text = PAGES[page]
+    for name in re.findall(r"`((?:benchmarks/results|docs|planner|tests|notebooks)/[\w./-]+)`", text):
+        place = ROOT / name
+        assert place.exists() or list(place.parent.glob(f"{place.name}.*")), f"{page}: {name}"
+    for name in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert ((ROOT / page).parent / name).exists(), f"{page}: {name}"
+
+
+def test_modules_in_the_pictures_exist() -> None:
+    """`optimal/reshape.py` and the like, and folders, in README's picture and on the algorithm's page."""
+    for page in ("README.md", "docs/algorithm.md"):
+        blocks = re.findall(r"^```(\w*)\n(.*?)^```", PAGES[page], re.MULTILINE | re.DOTALL)
+        drawn = "".join(text for language, text in blocks if not language)
+        assert "/" in drawn
+        for name in re.findall(r"(?<![\w/])([a-z]+/(?:\w+/)*(?:\w+\.py)?)", drawn):
+            assert (ROOT / "planner" / name).exists(), f"{page}: {name}"
+
+
+def test_every_folder_of_the_package_is_in_the_readme() -> None:
+    folders = {place.parent.name for place in (ROOT / "planner").glob("*/__init__.py")}
+    assert not {name for name in folders if f"{name}/" not in README}
+
+
+def test_lines_of_the_output_are_those_of_plan() -> None:
     """The labels of the example's output, as the code prints them."""
     tables = (ROOT / "planner" / "report" / "tables.py").read_text(encoding="utf-8")
     optimum = (ROOT / "planner" / "report" / "optimum.py").read_text(encoding="utf-8")

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from planner.commands.compare import compare
-from planner.commands.info import info
+from planner.commands.compare import compare_command
+from planner.commands.info import info_command
 from planner.commands.machine import init_file, list_machines, show_machine
-from planner.commands.plan import plan
-from planner.commands.pulses import pulses
-from planner.commands.verify import verify
+from planner.commands.plan import plan_command
+from planner.commands.pulses import pulses_command
+from planner.commands.verify import verify_command
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 
@@ -42,8 +42,14 @@ def common(
     """The fastest motion of an NC program within the limits of a machine, planned and verified."""
 
 
-for command in (plan, compare, verify, info, pulses):
-    app.command()(command)
+for name, command in {
+    "plan": plan_command,
+    "compare": compare_command,
+    "verify": verify_command,
+    "info": info_command,
+    "pulses": pulses_command,
+}.items():
+    app.command(name)(command)
 
 machine_app = typer.Typer(help="Machine files.", no_args_is_help=True, rich_markup_mode=None)
 machine_app.command("list")(list_machines)

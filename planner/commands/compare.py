@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from planner.base.errors import InputError, NotSolvedError
+from planner.base.names import METHODS, method_name
 from planner.commands.options import (
     DEFAULT_MACHINE,
     ForceOption,
     Job,
     JsonOption,
     MachineOption,
-    Method,
     QuietOption,
     ToleranceOption,
 )
@@ -39,12 +39,12 @@ ALL = "all"
 
 
 @guarded
-def compare(
+def compare_command(
     job: Job,
     machine: MachineOption = None,
     method: Annotated[
         str,
-        typer.Option("--method", "--methods", metavar="A,B,...", help="methods to compare, or all of them"),
+        typer.Option("--method", "--methods", metavar="A,B,...", help="methods to compare (default: all)"),
     ] = ALL,
     tolerance: ToleranceOption = None,
     output: Annotated[
@@ -55,7 +55,7 @@ def compare(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a program with several methods, and put cycle times, worst ratios, errors and verdicts side by side.
+    """Plan a program with several methods and compare cycle times, limits, errors and verdicts.
 
     The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused the job.
     """
@@ -64,14 +64,14 @@ def compare(
     from planner.nc.reader import read_program
     from planner.report.comparison import (
         about_job,
-        check_place,
+        check_comparison_place,
         comparison_dict,
         comparison_table,
         write_comparison,
     )
 
     if output is not None:
-        check_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+        check_comparison_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     limits = load_machine(machine or DEFAULT_MACHINE)
     program = read_program(job, limits)
     rows = [_run(name, program, limits, tolerance, quiet) for name in methods]
@@ -92,14 +92,17 @@ def compare(
 
 
 def parse_methods(text: str) -> list[str]:
-    """The methods of `a,b,...`, or all of them. Raises InputError for a name that is unknown or there twice."""
-    known = [method.value for method in Method]
+    """The methods of `a,b,...`, or all of them, by their present names.
+
+    Raises InputError for a name that is unknown or given twice.
+    """
     if text == ALL:
-        return known
-    names = [name.strip() for name in text.split(",")]
+        return list(METHODS)
+    try:
+        names = [method_name(name.strip()) for name in text.split(",")]
+    except InputError as fault:
+        raise InputError(f"--method: {fault}") from None
     for name in names:
-        if name not in known:
-            raise InputError(f"--method: no method '{name}'; there are {', '.join(known)}")
         if names.count(name) > 1:
             raise InputError(f"--method: '{name}' is named twice")
     return names

@@ -11,8 +11,8 @@ from planner.commands.terminal import BAD_INPUT, guarded, say, show
 
 
 @guarded
-def info(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -> None:
-    """What a program holds; every construct that is not supported, with its line."""
+def info_command(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -> None:
+    """Show what a program contains, and the line of every construct that is not supported."""
     from planner.machine import load_machine
     from planner.nc.info import inspect_program
     from planner.report.export import info_summary

@@ -1,50 +1,18 @@
-"""Arguments and options that several commands share, and the names they may take."""
+"""Arguments and options that several commands share; the names they may take come from `planner.base.names`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from planner.base import names
+from planner.base.errors import InputError
+
 DEFAULT_MACHINE = "mill"
-
-
-class Method(StrEnum):
-    """Names of the methods."""
-
-    toppra = "toppra"
-    optimal = "optimal"
-    bezier = "bezier"
-    kinematic = "kinematic"
-    fir = "fir"
-    fir_plain = "fir-plain"
-    fir_spline = "fir-spline"
-    fir_spline_plain = "fir-spline-plain"
-    tube = "tube"
-    stop = "stop"
-
-
-class Corner(StrEnum):
-    """How the path is smoothed."""
-
-    auto = "auto"
-    spline = "spline"
-    bezier = "bezier"
-    fir = "fir"
-    kinematic = "kinematic"
-
-
-class Solver(StrEnum):
-    """Names of the solvers, of the problem with jerk limits and of that without (feedrate/solvers.py)."""
-
-    own = "own"
-    ipopt = "ipopt"
-    fatrop = "fatrop"
-    sequential_convex = "sequential-convex"
-    reachability = "reachability"
-    toppra = "toppra"
 
 
 class Format(StrEnum):
@@ -55,6 +23,51 @@ class Format(StrEnum):
     npz = "npz"
 
 
+def _choice(name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME") -> Any:
+    """An option that takes a name that `check` knows; it may be an alias."""
+
+    def parsed(text: str) -> str:
+        try:
+            return check(text)
+        except InputError as fault:
+            raise typer.BadParameter(str(fault)) from None
+
+    return typer.Option(name, metavar=metavar, parser=parsed, help=help_text)
+
+
+SHAPING = " and ".join(names.users_of("geometry"))
+MethodOption = Annotated[
+    str,
+    _choice("--method", names.method_name, f"how to plan: {', '.join(names.METHODS)}"),
+]
+GeometryOption = Annotated[
+    str | None,
+    _choice(
+        "--geometry",
+        names.geometry_name,
+        f"how {SHAPING} smooth the path: spline (one spline from stop to stop), corners (each corner by itself), or auto (splines, or "
+        f"corners where they take less time; the default)",
+        "|".join(names.GEOMETRIES),
+    ),
+]
+CornerOption = Annotated[
+    str | None,
+    _choice(
+        "--corner",
+        names.corner_name,
+        f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
+        "|".join(names.CORNER_SHAPES),
+    ),
+]
+SolverOption = Annotated[
+    str | None,
+    _choice(
+        "--solver",
+        names.solver_name,
+        "solver; the first is the method's default: "
+        + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
+    ),
+]
 Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
 MachineOption = Annotated[
     str | None,
@@ -62,15 +75,16 @@ MachineOption = Annotated[
         "-m",
         "--machine",
         metavar="FILE",
-        help=f"machine file or built-in machine [default: {DEFAULT_MACHINE}]",
+        help=f"machine file, or name of a built-in machine (default: {DEFAULT_MACHINE})",
     ),
 ]
 ToleranceOption = Annotated[
     float | None,
     typer.Option(
-        metavar="MM", help="contour error budget; beats G64 P in the program and the machine's tolerance"
+        metavar="MM",
+        help="contour tolerance; takes precedence over G64 P in the program and over the machine file",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
-QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="say nothing about progress")]
-ForceOption = Annotated[bool, typer.Option("--force", help="overwrite files that planner did not write, too")]
+QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="print no progress")]
+ForceOption = Annotated[bool, typer.Option("--force", help="also overwrite files that planner did not write")]

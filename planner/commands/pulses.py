@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @guarded
-def pulses(
+def pulses_command(
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
     ],
@@ -25,10 +25,11 @@ def pulses(
         str, typer.Option(metavar="x=400,y=400", help="pulses per mm of each axis (rotary axes: per degree)")
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="write the pulses (.parquet, .csv)")
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="file for the pulses (.parquet, .csv)"),
     ] = None,
     max_frequency: Annotated[
-        float | None, typer.Option(metavar="HZ", help="pulses per second that the drives take")
+        float | None, typer.Option(metavar="HZ", help="highest pulse rate that the drives can take [1/s]")
     ] = None,
     pulse_width: Annotated[
         float | None, typer.Option(metavar="US", help="shortest high and low time of the step signal [us]")
@@ -36,17 +37,17 @@ def pulses(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Step and direction pulses of a trajectory, less than one pulse off at every instant.
+    """Make step and direction pulses of a trajectory, at every instant within one pulse of it.
 
-    Where they follow faster than the drives take them nothing is written, and the exit code is 1.
+    If the pulses follow each other faster than the drives can take, nothing is written and the exit code is 1.
     """
     from planner.motion.pulses import Drive, overrun, pulses_of
-    from planner.report.pulse_file import check_place, write_pulses
+    from planner.report.pulse_file import check_pulse_place, write_pulses
     from planner.report.trajectory_file import read_trajectory
 
     wanted = parse_steps(steps)
     if output is not None:
-        check_place(output, [trajectory], force=force)
+        check_pulse_place(output, [trajectory], force=force)
     drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
     read = read_trajectory(trajectory)
     trains = pulses_of(read.trajectory, wanted)

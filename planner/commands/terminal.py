@@ -95,7 +95,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 def memory_used_up(fault: MemoryError) -> str:
     """What to say, and what to do."""
     said = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
-    return f"{said}; split the program, or use --corner spline or a faster --method (kinematic, stop)"
+    return f"{said}; split the program, or use --geometry spline or a faster --method (kinematic, stop)"
 
 
 def say(text: str, *, err: bool = False) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @guarded
-def verify(
+def verify_command(
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
     ],
@@ -36,26 +36,27 @@ def verify(
             "-m",
             "--machine",
             metavar="FILE",
-            help=f"machine file or built-in machine [default: TRAJECTORY's own, or {DEFAULT_MACHINE}]",
+            help=f"machine file, or name of a built-in machine (default: the one in TRAJECTORY, else {DEFAULT_MACHINE})",
         ),
     ] = None,
     tolerance: ToleranceOption = None,
     not_limited: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="QUANTITY", help="report without judging: jerk for a plan that does not limit it"
+            metavar="QUANTITY",
+            help="report this limit without judging it, for example jerk for a plan that does not limit it",
         ),
     ] = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge a trajectory against its program and a machine; it may come from anywhere."""
+    """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.geometry.build import toolpath_from_program
     from planner.nc.reader import read_program
     from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
     from planner.report.trajectory_file import read_trajectory
-    from planner.verify import verify as judge
+    from planner.verify import verify
     from planner.verify.axes import fit_axes
     from planner.verify.judge import NOT_LIMITED_NAMES
 
@@ -74,7 +75,7 @@ def verify(
         raise InputError("the program moves nothing: there is nothing to judge", source=str(job))
     motion, given, fitted = fit_axes(read.trajectory, read.given, toolpath)
     with ProgressBar(quiet=quiet) as progress:
-        verdict = judge(
+        verdict = verify(
             motion,
             toolpath,
             limits,

@@ -23,7 +23,7 @@ JUMP_ROUNDING = 1e-6
 def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
     """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
 
-    measured : the error of the machine's filters is measured afterwards (optimal/within_filters.py), and bounded here on programmed
+    measured : the error of the machine's filters is measured afterwards (optimal/behind_filters.py), and bounded here on programmed
         arcs only
 
     Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for the path.

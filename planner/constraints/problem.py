@@ -13,7 +13,7 @@ In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), with constant u
 carried along for solvers of third order; a second-order solver says that it does not use them.
 
 `limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask for
-(optimal/between_points.py). Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk over lam^3,
+(optimal/tighten.py). Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk over lam^3,
 so that every row of the point has the limit
 
     feed_sq_max / lam^2,     a_k / lam^2  (times 1 - margin),     j_k / lam^3

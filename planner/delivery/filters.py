@@ -50,11 +50,12 @@ ROOM_LEAST = 0.1
 class Places:
     """Where the filtered motion leaves the tolerance.
 
-    time  : (n,) behind the filters [s]
-    ratio : (n,) error over budget [-]
-    path  : (n,) what of the ratio is there without filters [-]
-    vertex : (n,) index of the vertex that is missed, -1 for places off the contour
-    near, near_time : (N+1,) of every vertex: error over budget [-], and when the filtered motion is nearest [s]
+    time      : (n,) time behind the filters [s]
+    ratio     : (n,) error over tolerance [-]
+    path      : (n,) the part of the ratio that the path has without filters [-]
+    vertex    : (n,) index of the vertex that is missed, -1 for places off the contour
+    near      : (N+1,) error over tolerance at every vertex [-]
+    near_time : (N+1,) when the filtered motion is nearest to the vertex [s]
     """
 
     time: FloatArray
@@ -66,13 +67,13 @@ class Places:
 
     @property
     def less(self) -> FloatArray:
-        """(n,) by what factor accelerations have to be smaller there [-], < 1."""
+        """(n,) factor by which accelerations have to become smaller there [-], < 1."""
         room = 1.0 - SPARE - np.minimum(self.path, 1.0 - SPARE - ROOM_LEAST)
         return room / (self.ratio - (1.0 - SPARE) + room)
 
 
 class Behind:
-    """The measuring of motions along one path behind one machine's filters."""
+    """Measures motions along one path behind the filters of one machine."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine):
         self.toolpath, self.machine = toolpath, machine
@@ -88,7 +89,11 @@ class Behind:
     def errors(
         self, motion: MotionInTime, filters: tuple[float, ...]
     ) -> tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]:
-        """Of the contour: times, ratios and pieces where large (n,); of the vertices: ratio and time (N+1,)."""
+        """Errors of the filtered motion.
+
+        Returns times [s], ratios [-] and pieces where the ratio of the contour is large, (n,) each, and the ratio and time of every
+        vertex, (N+1,) each.
+        """
         kept: list[tuple[FloatArray, FloatArray, Array]] = []
         worst = np.zeros(len(self.pieces.piece))
 
@@ -107,12 +112,15 @@ class Behind:
         return t, ratio, piece, near, look.seen.match.passed["near_time"]
 
     def path_shares(self, motion: Timed) -> tuple[FloatArray, FloatArray]:
-        """What the path itself, without filters, uses of the budgets: at worst on each piece (N,), and at the vertices (N+1,)."""
+        """Ratios of the path itself, without filters: the largest on each piece (N,), and at the vertices (N+1,) [-]."""
         near = self.errors(motion, ())[3]
         return self._worst, near
 
     def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Places:
-        """Where a motion leaves the tolerance behind the filters; path: `path_shares` of any motion along the same path."""
+        """Where a motion leaves the tolerance behind the filters.
+
+        path : `path_shares` of any motion along the same path
+        """
         t, ratio, piece, near, near_time = self.errors(motion, self.filters.times)
         missed = np.flatnonzero(near > 1.0 - SPARE)
         return Places(
@@ -125,18 +133,18 @@ class Behind:
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
-        """(n,) True for times at which the filters hold what two runs did: there longer rests help, and nothing else has to."""
+        """(n,) True for times at which the filters hold parts of two runs: there a longer rest is enough."""
         early, late = self.runs_within(runs_of(motion), time)
         return early < late
 
     def runs_within(self, runs: Runs, time: FloatArray) -> tuple[Array, Array]:
-        """First and last of the runs (n,) that the filters hold something of at the times (n,) [s]."""
+        """First and last of the runs of which the filters hold some part at the times (n,) [s]."""
         early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
         late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
         return np.minimum(early, late), late
 
     def rests(self, motion: Timed, runs: Runs) -> FloatArray:
-        """(G,) the shortest rest [s] behind each run with which the filtered motion comes near enough; 0 behind the last."""
+        """(G,) the shortest rest behind each run with which the filtered motion keeps the tolerance [s]; 0 behind the last run."""
         found = np.zeros(len(runs))
         for low in range(0, len(runs) - 1, STOPS_AT_ONCE):
             stop = np.arange(low, min(low + STOPS_AT_ONCE, len(runs) - 1))
@@ -195,8 +203,10 @@ def rested(behind: Behind, motion: TimedT) -> TimedT:
 
 
 def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
-    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance; the motion itself for a
-    machine without filters."""
+    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance.
+
+    Returns the motion itself for a machine without filters.
+    """
     if machine.fir is None:
         return motion
     behind, runs = Behind(toolpath, machine), runs_of(motion)

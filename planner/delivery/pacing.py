@@ -1,8 +1,7 @@
-"""Runs of a motion between full stops: slowed down as a whole, and made to rest for longer between them.
+"""Runs of a motion between full stops: slowed down as a whole, or followed by a longer rest.
 
-Slowing down by f divides speeds by f, accelerations by f^2 and jerks by f^3, so that every limit still holds and the path stays what it
-was; a longer rest changes nothing else. A place of rest is one where velocity and, if jerk is limited, acceleration are zero: there and
-nowhere else a motion can wait.
+Slowing down by f divides speeds by f, accelerations by f^2 and jerks by f^3: every limit still holds, and the path is the same. A
+longer rest changes nothing else. A motion can wait only where its velocity is zero, and its acceleration too if jerk is limited.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ TimedT = TypeVar("TimedT", Motion, AxisMotion)
 class Runs:
     """G runs of a motion.
 
-    first : (G,) the piece of the motion that each begins with
-    last  : (G,) the first piece after it: a standstill, the next run's first piece, or the number of pieces
+    first : (G,) index of the first piece of the run
+    last  : (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the number of pieces
     begin : (G,) [s]
     end   : (G,) [s]
     """
@@ -45,7 +44,7 @@ class Runs:
 
 
 def runs_of(motion: Timed) -> Runs:
-    """The runs of a motion; a motion that rests all the time has none."""
+    """The runs of a motion; none if the motion rests all the time."""
     edges = np.append(motion.t, motion.end)
     if isinstance(motion, Motion):
         run = motion.law.run
@@ -75,7 +74,11 @@ def _rests(motion: AxisMotion) -> Array:
 
 
 def paced(motion: TimedT, runs: Runs, factor: FloatArray, pause: FloatArray) -> TimedT:
-    """The motion with every run slowed down by its factor (G,) and so much more rest behind it (G,) [s]; behind the last run none."""
+    """The motion with every run slowed down and followed by more rest.
+
+    factor : (G,) by which each run takes longer [-], >= 1
+    pause  : (G,) rest added behind each run [s]; not used behind the last
+    """
     pause = np.append(pause[:-1], 0.0)
     by = np.ones(len(motion.t))
     for g in np.flatnonzero(factor != 1.0):

@@ -1,20 +1,20 @@
-"""What the interpolation period adds to the contour, and what is done about it.
+"""What the interpolation period adds to the contour error, and what is done about it.
 
 The machine gets samples dt apart and runs the chords between them. Within a period the chord is off the motion by
 
     |e(t)| <= dt^2/8 max |q''|,     whatever the direction of the acceleration q'',
 
-so that a vertex P that the motion q misses by m is missed by the chords by m + dt^2/8 max |q''| at most. Error allocation (eq. 18-20)
-has the normal acceleration in the place of |q''|; along a smooth path that is right, because what the acceleration along the path
-does shifts the chord along itself. At a corner that is run through within some periods, and at a full stop, it is not: braking before
-and speeding up behind point along different legs.
+so if the motion q misses a vertex by m, the chords miss it by m + dt^2/8 max |q''| at most. Error allocation (eq. 18-20) uses the
+normal acceleration in place of |q''|. Along a smooth path that is right, because the acceleration along the path shifts the chord
+along itself. It is not right at full stops, and at corners that are passed within a few periods: there the motion brakes along one leg
+and speeds up along another.
 
-1. Full stops: with the arrival t_a between two samples the chord cuts the vertex off, by |q''| (dt/2)^2/2 at most. Where that is more
-   than the tolerance, `settled` lets the motion stand until the next sample, or for the shorter time that is enough: less than
-   dt per stop.
-2. Corners: `missed` measures what the chords miss every vertex by, with samples at whatever phase. Where that is more than the
-   tolerance, `with_less_tolerance` takes the excess off what the corner is planned with, and stops at corners of which the chords
-   alone would use nearly all.
+1. Full stops: if the motion arrives between two samples, the chord cuts the vertex off, by |q''| (dt/2)^2/2 at most. If that is more
+   than the tolerance, `settled` lets the motion stand until the next sample, or for a shorter time that is enough: less than dt per
+   stop.
+2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is more than the tolerance,
+   `with_less_tolerance` subtracts the excess from the tolerance of the corner. Where the chords alone would use nearly all of the
+   tolerance, the corner becomes a full stop.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ LEFT_MIN = 0.1
 
 
 def settled(motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool) -> MotionInTime:
-    """The motion with longer standstills where chords between samples would cut off the place by more than the tolerance."""
+    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance."""
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
@@ -136,8 +136,13 @@ def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatArray, FloatArray]:
-    """(M+1,) what the motion itself misses each vertex by, and what chords between samples dt apart miss it by at their worst
-    phase [mm]; 0 where the motion rests."""
+    """By how much a motion and its chords miss the vertices.
+
+    dt : sample period [s]
+
+    Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the chords miss it in the worst
+    phase of the samples; 0 where the motion rests.
+    """
     fine = np.arange(0.0, motion.end, dt / PER_PERIOD)
     seen = joined(list(in_chunks(motion, dt, np.concatenate([fine, motion.t, [motion.end]]))))
     when = passing_times(seen, toolpath)
@@ -159,10 +164,10 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
 def with_less_tolerance(
     planned: Toolpath, programmed: Toolpath, near: FloatArray, far: FloatArray
 ) -> Toolpath | None:
-    """The path to be planned so that chords stay within the tolerance of the programmed one; None if they do.
+    """The path to be planned so that the chords stay within the tolerance of the programmed path; None if they do already.
 
-    planned   : the path that led to the motion
-    near, far : what it and its chords miss the vertices by, as `missed` tells (M+1,) [mm]
+    planned   : the path that the motion was planned on
+    near, far : by how much motion and chords miss the vertices (M+1,) [mm], from `missed`
     """
     allowed = USED * programmed.tolerance
     over = far > allowed

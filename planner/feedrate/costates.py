@@ -21,10 +21,14 @@ some percent, not to rounding (tested against the change of the time with the li
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.reachability import rows_of
 from planner.feedrate.solution import FeedrateSolution, Multipliers
 
 # A row, or x, within this share of its limit holds it [-]: the passes of the solver end there to rounding.
@@ -35,21 +39,53 @@ TURNING = 0.5
 ALONE = 0.5
 
 
+class _Profile(NamedTuple):
+    """A profile on P points, with its bounds, and what its time changes by."""
+
+    piece: Array  # (G+1,)
+    s: FloatArray  # (P,), like the next six
+    margin: FloatArray
+    x_max: FloatArray
+    x: FloatArray
+    u: FloatArray
+    before: FloatArray  # T' of the interval before a point ...
+    behind: FloatArray  # ... and of the one behind it
+
+
+class _Held(NamedTuple):
+    """The row that holds u on each of P intervals; axis -1 where none does."""
+
+    axis: Array
+    side: Array  # 0: at the left end, 1: at the right end
+    a: FloatArray  # r'
+    b: FloatArray  # r''
+    size: FloatArray  # its limit, with the sign of the side that holds
+    way: FloatArray  # 1 where it makes the motion speed up, -1 brake, 0 where no row holds, or one that turns to holding x alone
+
+
 def second_order_multipliers(problem: FeedrateProblem, solution: FeedrateSolution) -> Multipliers:
     """Multipliers of a second-order profile. Raises NotSolvedError without one."""
     solution.require()
-    points, axes = problem.d1.shape
-    rows, feed, dynamics = np.zeros((points, axes, 4)), np.zeros((points, 2)), np.zeros(points)
-    _costates(
-        problem.piece, problem.s, problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit,
-        problem.margin, problem.feed_sq_limit, solution.feed_sq, solution.acc_s, rows, feed, dynamics,
-    )  # fmt: skip
+    points = len(problem)
+    profile = _Profile(
+        piece=problem.piece,
+        s=problem.s,
+        margin=problem.margin,
+        x_max=problem.feed_sq_limit,
+        x=solution.feed_sq,
+        u=solution.acc_s,
+        before=np.zeros(points),
+        behind=np.zeros(points),
+    )
+    rows, feed, dynamics = _costates(rows_of(problem), profile)
     return Multipliers(rows=rows, feed=feed, dynamics=dynamics)
 
 
 @njit(cache=True, error_model="numpy")
-def _holding(i, d1, d2_left, d2_right, limit, scale, x, u):
+def _holding(i, limits, profile):
     """The row that holds u on interval i: axis, 0 left or 1 right, r', r'' and c with its sign; axis -1 if none does."""
+    d1, d2_left, d2_right, limit = limits
+    x, u, scale = profile.x, profile.u, 1.0 - profile.margin[i]
     best, axis, side, a, b, size = 1.0 - HOLDS, -1, 0, 0.0, 0.0, 0.0
     for k in range(d1.shape[1]):
         c = limit[i, k] * scale
@@ -64,15 +100,21 @@ def _holding(i, d1, d2_left, d2_right, limit, scale, x, u):
 
 
 @njit(cache=True, error_model="numpy")
-def _costates(piece, s, d1, d2_left, d2_right, limit, margin, x_max, x, u, rows, feed, pi):
-    """Fill rows (P, A, 4), feed (P, 2) and pi (P,)."""
-    points = len(s)
-    axis, side, way = np.full(points, -1), np.zeros(points, np.int64), np.zeros(points)
-    a, b, size = np.zeros(points), np.zeros(points), np.zeros(points)
-    before, behind = (
+def _costates(limits, profile):
+    """The multipliers: rows (P, A, 4), feed (P, 2) and pi (P,)."""
+    piece, s, _, x_max, x, _, before, behind = profile
+    d1, _, d2_right, limit = limits
+    points, axes = d1.shape
+    rows, feed, pi = np.zeros((points, axes, 4)), np.zeros((points, 2)), np.zeros(points)
+    held = _Held(
+        np.full(points, -1),
+        np.zeros(points, np.int64),
         np.zeros(points),
         np.zeros(points),
-    )  # T' of the interval before a point, and of the one behind it
+        np.zeros(points),
+        np.zeros(points),
+    )
+    axis, side, a, b, size, way = held
     for g in range(len(piece) - 1):
         first, last = piece[g], piece[g + 1] - 1
         for i in range(first, last):
@@ -81,39 +123,39 @@ def _costates(piece, s, d1, d2_left, d2_right, limit, margin, x_max, x, u, rows,
                 behind[i] = -h / (np.sqrt(x[i]) * both * both)
             if x[i + 1] > 0.0:
                 before[i + 1] = -h / (np.sqrt(x[i + 1]) * both * both)
-            axis[i], side[i], a[i], b[i], size[i] = _holding(
-                i, d1, d2_left, d2_right, limit, 1.0 - margin[i], x, u
-            )
+            axis[i], side[i], a[i], b[i], size[i] = _holding(i, limits, profile)
             if axis[i] >= 0 and 2.0 * h * abs(b[i]) <= TURNING * abs(a[i]):
                 way[i] = np.sign(a[i] * size[i])
         for i in range(last - 1, first - 1, -1):  # speeding up: from the end of the stretch
             if way[i] > 0.0:
-                pi[i] = _speeding(i, s, side, a, b, way, before, behind, x, x_max, pi)
+                pi[i] = _speeding(i, profile, held, pi)
         for i in range(first, last):  # braking: from its beginning
             if way[i] < 0.0:
-                pi[i] = _braking(i, s, side, a, b, way, before, behind, x, x_max, pi)
+                pi[i] = _braking(i, profile, held, pi)
         for i in range(first, last):
             if way[i] != 0.0:
                 rows[i, axis[i], 3 * side[i]] -= 2.0 * (s[i + 1] - s[i]) * pi[i] * abs(size[i]) / a[i]
         for i in range(first + 1, last):
-            over = before[i] + behind[i] + pi[i] - pi[i - 1] + _of_row(i, s, side, a, b, pi)
+            over = before[i] + behind[i] + pi[i] - pi[i - 1] + _of_row(i, s, held, pi)
             if over >= 0.0:
                 continue
             if x[i] >= x_max[i] * (1.0 - HOLDS):
                 feed[i, 0] = -over * x_max[i]
                 continue
             best, k_best = ALONE, -1
-            for k in range(d1.shape[1]):
+            for k in range(axes):
                 part = abs(d2_right[i, k]) * x[i] / limit[i, k]
                 if part > best:
                     best, k_best = part, k
             if k_best >= 0:
                 rows[i, k_best, 0] -= over * limit[i, k_best] / d2_right[i, k_best]
+    return rows, feed, pi
 
 
 @njit(cache=True, error_model="numpy")
-def _of_row(i, s, side, a, b, pi):
+def _of_row(i, s, held, pi):
     """lam r''/c of the intervals on both sides of point i."""
+    side, a, b = held.side, held.a, held.b
     total = 0.0
     if a[i] != 0.0 and side[i] == 0:
         total -= 2.0 * (s[i + 1] - s[i]) * pi[i] * b[i] / a[i]
@@ -123,20 +165,22 @@ def _of_row(i, s, side, a, b, pi):
 
 
 @njit(cache=True, error_model="numpy")
-def _speeding(i, s, side, a, b, way, before, behind, x, x_max, pi):
+def _speeding(i, profile, held, pi):
     """pi of interval i, which speeds up, from that of the next one."""
-    n, rest = i + 1, before[i + 1]
-    if way[n] > 0.0 and x[n] < x_max[n] * (1.0 - HOLDS):
+    s, x, side, a, b = profile.s, profile.x, held.side, held.a, held.b
+    n, rest = i + 1, profile.before[i + 1]
+    if held.way[n] > 0.0 and x[n] < profile.x_max[n] * (1.0 - HOLDS):
         by = 1.0 - (2.0 * (s[n + 1] - s[n]) * b[n] / a[n] if side[n] == 0 else 0.0)
-        rest += behind[n] + pi[n] * by
+        rest += profile.behind[n] + pi[n] * by
     return min(rest / (1.0 + (2.0 * (s[n] - s[i]) * b[i] / a[i] if side[i] == 1 else 0.0)), 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _braking(i, s, side, a, b, way, before, behind, x, x_max, pi):
+def _braking(i, profile, held, pi):
     """pi of interval i, which brakes, from that of the one before."""
-    n, rest = i - 1, -behind[i]
-    if way[n] < 0.0 and x[i] < x_max[i] * (1.0 - HOLDS):
+    s, x, side, a, b = profile.s, profile.x, held.side, held.a, held.b
+    n, rest = i - 1, -profile.behind[i]
+    if held.way[n] < 0.0 and x[i] < profile.x_max[i] * (1.0 - HOLDS):
         by = 1.0 + (2.0 * (s[i] - s[n]) * b[n] / a[n] if side[n] == 1 else 0.0)
-        rest += pi[n] * by - before[i]
+        rest += pi[n] * by - profile.before[i]
     return max(rest / (1.0 - (2.0 * (s[i + 1] - s[i]) * b[i] / a[i] if side[i] == 0 else 0.0)), 0.0)

@@ -15,10 +15,11 @@ time has a kink; the multipliers then are one of its slopes between left and rig
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.rows import duration
@@ -36,23 +37,59 @@ class Lagrangian:
     feed_sq_max: FloatArray
 
 
+class _Rows(NamedTuple):
+    """The problem at P points and A axes."""
+
+    ds: FloatArray  # (P,) of the interval behind each point
+    interval: Array  # (P,) False where there is none
+    x_max: FloatArray  # (P,)
+    d1: FloatArray  # (P, A), like the rest
+    d2_left: FloatArray
+    d2_right: FloatArray
+    d3_left: FloatArray
+    d3_right: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+
+class _Profile(NamedTuple):
+    """A profile, x, u, p (P,), and the fields of `Multipliers`."""
+
+    x: FloatArray
+    u: FloatArray
+    p: FloatArray
+    rows: FloatArray
+    feed: FloatArray
+    pi: FloatArray
+
+
 def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangian:
     """The Lagrangian of a problem at the profile and the multipliers of a solution, of this problem or of a neighbouring one on a
     corresponding grid. Raises ValueError if the solution has no multipliers."""
     found = solution.multipliers
     if found is None:
         raise ValueError(f"lagrangian: {solution.solver} gives no multipliers")
-    points, axes = problem.d1.shape
-    value, of_feed = np.zeros(points), np.zeros(points)
-    of_acceleration, of_jerk = np.zeros(axes), np.zeros(axes)
-    _lagrangian(
-        np.diff(problem.s, append=problem.s[-1]), problem.interval, problem.d1,
-        problem.d2_left, problem.d2_right, problem.d3_left, problem.d3_right,
-        acceleration_limits(problem), problem.jerk_limit, problem.feed_sq_limit,
-        solution.feed_sq, solution.acc_s, solution.jerk_s * solution.duration,
-        found.rows, found.feed, found.dynamics,
-        value, of_acceleration, of_jerk, of_feed,
-    )  # fmt: skip
+    rows = _Rows(
+        ds=np.diff(problem.s, append=problem.s[-1]),
+        interval=problem.interval,
+        x_max=problem.feed_sq_limit,
+        d1=problem.d1,
+        d2_left=problem.d2_left,
+        d2_right=problem.d2_right,
+        d3_left=problem.d3_left,
+        d3_right=problem.d3_right,
+        acceleration=acceleration_limits(problem),
+        jerk=problem.jerk_limit,
+    )
+    profile = _Profile(
+        x=solution.feed_sq,
+        u=solution.acc_s,
+        p=solution.jerk_s * solution.duration,
+        rows=found.rows,
+        feed=found.feed,
+        pi=found.dynamics,
+    )
+    value, of_acceleration, of_jerk, of_feed = _lagrangian(rows, profile)
     return Lagrangian(value=value, acceleration=of_acceleration, jerk=of_jerk, feed_sq_max=of_feed)
 
 
@@ -65,10 +102,13 @@ def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _lagrangian(
-    ds, interval, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk, x_max,
-    x, u, p, rows, feed, pi, value, of_acceleration, of_jerk, of_feed,
-):  # fmt: skip
+def _lagrangian(problem, profile):
+    """Fields of `Lagrangian`, in their order."""
+    ds, interval, x_max, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk = problem
+    x, u, p, rows, feed, pi = profile
+    points, axes = d1.shape
+    value, of_feed = np.zeros(points), np.zeros(points)
+    of_acceleration, of_jerk = np.zeros(axes), np.zeros(axes)
     for i in range(len(ds)):
         if not interval[i]:
             continue
@@ -95,3 +135,4 @@ def _lagrangian(
         of_feed[i] -= held * x_max[i] / both
         of_feed[i + 1] -= held * x_max[i + 1] / both
         value[i] = total + held
+    return value, of_acceleration, of_jerk, of_feed

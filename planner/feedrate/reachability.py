@@ -23,9 +23,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
@@ -40,6 +42,60 @@ NEGLIGIBLE = 1e-10
 ROUNDING = 1e-9
 
 
+class Rows(NamedTuple):
+    """The limits of the axes at P points and A axes: | r'_k u + r''_k x | <= limit."""
+
+    d1: FloatArray  # (P, A), like the next three
+    d2_left: FloatArray
+    d2_right: FloatArray
+    limit: FloatArray
+
+
+class Bounds(NamedTuple):
+    """The rest of a second-order problem: G pieces over P points, the fields of `FeedrateProblem`."""
+
+    piece: Array  # (G+1,)
+    s: FloatArray  # (P,), like the next two
+    margin: FloatArray
+    x_max: FloatArray
+    x_start: FloatArray  # (G,), like the next
+    x_end: FloatArray
+
+
+class Interval(NamedTuple):
+    """Interval i, of length h, with its limits times `scale`, on the way to x_{i+1} in [0, target]."""
+
+    i: int
+    h: float
+    scale: float
+    target: float
+
+
+def rows_of(problem: FeedrateProblem) -> Rows:
+    """The limits of a problem's axes, as the kernels take them."""
+    return Rows(problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit)
+
+
+def _bounds_of(problem: FeedrateProblem) -> Bounds:
+    return Bounds(
+        piece=problem.piece,
+        s=problem.s,
+        margin=problem.margin,
+        x_max=problem.feed_sq_limit,
+        x_start=problem.feed_sq_start,
+        x_end=problem.feed_sq_end,
+    )
+
+
+def controllable_sets(problem: FeedrateProblem) -> FloatArray:
+    """(P,) K, the largest feed^2 at each point from which the end of its piece can still be reached [mm2/s2].
+
+    Where a piece ends at rest exactly the feeds with feed^2 in [0, K] are controllable. Where it ends in motion there is a lower end as
+    well, which is not looked for. NaN on pieces whose end asks for more than its own bound allows.
+    """
+    return np.asarray(_controllable(rows_of(problem), _bounds_of(problem)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Reachability:
     """The numba reachability solver; it has no settings."""
@@ -47,18 +103,7 @@ class Reachability:
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
         """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is reachable."""
         began = time.perf_counter()
-        x, u, bad_piece = _solve(
-            problem.piece,
-            problem.s,
-            problem.d1,
-            problem.d2_left,
-            problem.d2_right,
-            problem.acceleration_limit,
-            problem.margin,
-            problem.feed_sq_limit,
-            problem.feed_sq_start,
-            problem.feed_sq_end,
-        )
+        x, u, bad_piece = _solve(rows_of(problem), _bounds_of(problem))
         took = time.perf_counter() - began
         if bad_piece >= 0:
             at = problem.s[problem.piece[bad_piece]]
@@ -93,19 +138,22 @@ def _row(a, b, c, x, low, low_slope, high, high_slope):
 
 
 @njit(cache=True, error_model="numpy")
-def _parallel(i, x_max, h, d1, d2_right, limit, scale, target):
-    """Largest |a| per limit that is negligible on interval i (see `NEGLIGIBLE`)."""
-    u = max(x_max, target) / (2.0 * h)  # x stays within [0, target]
-    for k in range(d1.shape[1]):
-        a, size = abs(d1[i, k]), limit[i, k] * scale + abs(d2_right[i, k]) * x_max
+def _parallel(rows, on, x_max):
+    """Largest |a| per limit that is negligible on an interval (see `NEGLIGIBLE`)."""
+    u = max(x_max, on.target) / (2.0 * on.h)  # x stays within [0, target]
+    for k in range(rows.d1.shape[1]):
+        a = abs(rows.d1[on.i, k])
+        size = rows.limit[on.i, k] * on.scale + abs(rows.d2_right[on.i, k]) * x_max
         if a * u > size:
             u = size / a
     return NEGLIGIBLE / u
 
 
 @njit(cache=True, error_model="numpy")
-def _interval(i, x, h, d1, d2_left, d2_right, limit, scale, target, parallel):
-    """u-interval of interval i at feed^2 = x: low, its slope, high, its slope; without the rows |a| <= parallel * limit."""
+def _interval(rows, on, x, parallel):
+    """u-interval of an interval at feed^2 = x: low, its slope, high, its slope; without the rows |a| <= parallel * limit."""
+    d1, d2_left, d2_right, limit = rows
+    i, h, scale, target = on
     low, low_slope = -x / (2.0 * h), -0.5 / h  # x + 2 h u >= 0
     high, high_slope = (target - x) / (2.0 * h), -0.5 / h  # x + 2 h u <= K_{i+1}
     for k in range(d1.shape[1]):
@@ -122,9 +170,11 @@ def _interval(i, x, h, d1, d2_left, d2_right, limit, scale, target, parallel):
 
 
 @njit(cache=True, error_model="numpy")
-def _largest(i, x_max, h, d1, d2_left, d2_right, limit, scale, target):
-    """Largest x <= x_max on interval i from which some u leads to x_{i+1} in [0, target]."""
-    parallel = _parallel(i, x_max, h, d1, d2_right, limit, scale, target)
+def _largest(rows, on, x_max):
+    """Largest x <= x_max on an interval from which some u leads to x_{i+1} in [0, target]."""
+    d1, d2_left, d2_right, limit = rows
+    i, h, scale, target = on
+    parallel = _parallel(rows, on, x_max)
     x = x_max
     for k in range(d1.shape[1]):
         c = limit[i, k] * scale
@@ -140,9 +190,7 @@ def _largest(i, x_max, h, d1, d2_left, d2_right, limit, scale, target):
         if abs(d1[i + 1, k] + 2.0 * h * b) <= parallel * c:
             x = min(x, c / abs(b))
     for _ in range(NEWTON_STEPS):
-        low, low_slope, high, high_slope = _interval(
-            i, x, h, d1, d2_left, d2_right, limit, scale, target, parallel
-        )
+        low, low_slope, high, high_slope = _interval(rows, on, x, parallel)
         gap = high - low
         slope = high_slope - low_slope
         if gap >= 0.0 or slope >= 0.0:
@@ -155,32 +203,49 @@ def _largest(i, x_max, h, d1, d2_left, d2_right, limit, scale, target):
 
 
 @njit(cache=True, error_model="numpy")
-def _solve(piece, s, d1, d2_left, d2_right, limit, margin, x_max, x_start, x_end):
+def _backward(rows, bounds, g, reach):
+    """Write K of piece g into reach (P,); False, and NaN, if its end is beyond its own bound."""
+    s, margin, x_max = bounds.s, bounds.margin, bounds.x_max
+    first, last = bounds.piece[g], bounds.piece[g + 1] - 1
+    if bounds.x_end[g] > x_max[last] * (1.0 + ROUNDING):
+        reach[first : last + 1] = np.nan
+        return False
+    reach[last] = min(bounds.x_end[g], x_max[last])
+    for i in range(last - 1, first - 1, -1):
+        on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
+        reach[i] = _largest(rows, on, x_max[i])
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _controllable(rows, bounds):
+    """K (P,) of all pieces."""
+    reach = np.empty(len(bounds.s))
+    for g in range(len(bounds.piece) - 1):
+        _backward(rows, bounds, g, reach)
+    return reach
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(rows, bounds):
     """Backward and forward pass over all pieces; returns x, u and the first infeasible piece or -1."""
+    piece, s, margin, x_max, x_start, x_end = bounds
     points = len(s)
     reach = np.empty(points)
     x = np.empty(points)
     u = np.zeros(points)
     for g in range(len(piece) - 1):
         first, last = piece[g], piece[g + 1] - 1
-        if x_end[g] > x_max[last] * (1.0 + ROUNDING):
-            return x, u, g
-        reach[last] = min(x_end[g], x_max[last])
-        for i in range(last - 1, first - 1, -1):
-            h = s[i + 1] - s[i]
-            reach[i] = _largest(i, x_max[i], h, d1, d2_left, d2_right, limit, 1.0 - margin[i], reach[i + 1])
-        if x_start[g] > reach[first] * (1.0 + ROUNDING):
+        if not _backward(rows, bounds, g, reach) or x_start[g] > reach[first] * (1.0 + ROUNDING):
             return x, u, g
         x[first] = min(x_start[g], reach[first])
         for i in range(first, last):
-            h = s[i + 1] - s[i]
-            target, scale = reach[i + 1], 1.0 - margin[i]
-            parallel = _parallel(i, x_max[i], h, d1, d2_right, limit, scale, target)
-            low, _, high, _ = _interval(i, x[i], h, d1, d2_left, d2_right, limit, scale, target, parallel)
+            on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
+            low, _, high, _ = _interval(rows, on, x[i], _parallel(rows, on, x_max[i]))
             # Equal up to rounding where the set is a point. The difference of x over 2 h would be the same u but for rounding, which
             # exceeds the limits where h is a billionth of its neighbours.
             u[i] = max(high, low)
-            x[i + 1] = min(max(x[i] + 2.0 * h * u[i], 0.0), target)
+            x[i + 1] = min(max(x[i] + 2.0 * on.h * u[i], 0.0), on.target)
         if x[last] < x_end[g] * (1.0 - ROUNDING):
             return x, u, g
     return x, u, -1

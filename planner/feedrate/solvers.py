@@ -32,7 +32,7 @@ from planner.feedrate.toppra_adapter import ToppraSolver
 REACHABILITY, OWN = "reachability", "own"  # the usual ones
 
 
-class JerkLimitedSolver(Protocol):
+class ThirdOrderSolver(Protocol):
     """A solver of third order; its repr is its row label in every table."""
 
     def solve(
@@ -46,7 +46,7 @@ class JerkLimitedSolver(Protocol):
 
 
 SECOND_ORDER: dict[str, FeedrateSolver] = {REACHABILITY: Reachability(), "toppra": ToppraSolver()}
-THIRD_ORDER: dict[str, JerkLimitedSolver] = {
+THIRD_ORDER: dict[str, ThirdOrderSolver] = {
     OWN: JerkLimited(),
     "ipopt": JerkLimitedNLP(solver="ipopt"),
     "fatrop": JerkLimitedNLP(solver="fatrop"),
@@ -59,11 +59,11 @@ def second_order_solver(solver: str | FeedrateSolver) -> FeedrateSolver:
     if not isinstance(solver, str):
         return solver
     if solver not in SECOND_ORDER:
-        raise InputError(_unknown(solver, "toppra", SECOND_ORDER, THIRD_ORDER))
+        raise InputError(_unknown(solver, "second-order", SECOND_ORDER, THIRD_ORDER))
     return SECOND_ORDER[solver]
 
 
-def third_order_solver(solver: str | JerkLimitedSolver) -> JerkLimitedSolver:
+def third_order_solver(solver: str | ThirdOrderSolver) -> ThirdOrderSolver:
     """The solver with jerk limits of that name, or the solver given. Raises InputError for a name that is none of them."""
     if not isinstance(solver, str):
         return solver

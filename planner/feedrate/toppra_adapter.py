@@ -81,6 +81,32 @@ class ToppraSolver:
             solve_time=time.perf_counter() - began,
         )
 
+    def controllable_sets(self, problem: FeedrateProblem) -> FloatArray:
+        """(P, 2) lower and upper end of the controllable feed^2 at each point [mm2/s2], to compare with
+        `reachability.controllable_sets`; NaN where toppra finds none."""
+        toppra = _import_toppra()
+        sets = np.full((len(problem), 2), np.nan)
+        with _silent(logging.getLogger("toppra")):
+            for g, (first, beyond) in enumerate(zip(problem.piece[:-1], problem.piece[1:], strict=True)):
+                algorithm, length, time_unit = _algorithm(toppra, problem, g)
+                end = math.sqrt(problem.feed_sq_end[g]) / (length / time_unit)
+                found = algorithm.compute_controllable_sets(end, end)
+                if found is not None:
+                    sets[first:beyond] = found * (length / time_unit) ** 2
+        return sets
+
+
+def _algorithm(toppra: Any, problem: FeedrateProblem, g: int) -> tuple[Any, float, float]:
+    """toppra's algorithm for piece g, and the units of length [mm] and time [s] that it works in."""
+    length, time_unit = _units(problem, g)
+    grid, rows = _rows(problem, g, length, time_unit)
+    constraint = toppra.constraint.LinearConstraint()
+    constraint.identical = True
+    constraint.compute_constraint_params = lambda *_: rows
+    path = SimpleNamespace(path_interval=grid[[0, -1]], duration=grid[-1], dof=problem.d1.shape[1])
+    algorithm = toppra.algorithm.TOPPRA([constraint], path, gridpoints=grid, solver_wrapper="seidel")
+    return algorithm, length, time_unit
+
 
 def _solve_piece(
     toppra: Any, problem: FeedrateProblem, g: int, x: FloatArray, u: FloatArray
@@ -94,14 +120,8 @@ def _solve_piece(
     last = problem.piece[g + 1] - 1
     if x_end > problem.feed_sq_limit[last] * (1.0 + ROUNDING):
         return unreachable
-    length, time_unit = _units(problem, g)
+    algorithm, length, time_unit = _algorithm(toppra, problem, g)
     feed = length / time_unit
-    grid, rows = _rows(problem, g, length, time_unit)
-    constraint = toppra.constraint.LinearConstraint()
-    constraint.identical = True
-    constraint.compute_constraint_params = lambda *_: rows
-    path = SimpleNamespace(path_interval=grid[[0, -1]], duration=grid[-1], dof=problem.d1.shape[1])
-    algorithm = toppra.algorithm.TOPPRA([constraint], path, gridpoints=grid, solver_wrapper="seidel")
     algorithm.compute_parameterization(math.sqrt(x_start) / feed, math.sqrt(x_end) / feed)
     data = algorithm.problem_data
     codes = toppra.algorithm.algorithm.ParameterizationReturnCode

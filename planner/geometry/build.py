@@ -30,12 +30,12 @@ ZERO_LENGTH = 1e-9
 
 
 def toolpath_from_program(program: Program, machine: Machine, tolerance: float | None = None) -> Toolpath:
-    """Lay out the program's blocks as segments and joints.
+    """Lay out the blocks of a program as segments and joints.
 
-    tolerance : contour error budget [mm] that beats the program's G64 P and the machine's tolerance; None to use those
+    tolerance : contour tolerance [mm] that takes precedence over G64 P of the program and over the machine; None to use those
 
-    Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis that moves and
-    that the machine lacks, and coordinates beyond `COORDINATE_MAX`.
+    Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis that moves and that the machine lacks,
+    and coordinates beyond `COORDINATE_MAX`.
     """
     if tolerance is not None and not (0 < tolerance < np.inf):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
@@ -95,7 +95,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
-    """Angle between unit vectors (n, A), row by row [rad]; exact to rounding near 0 and pi, where acos is not."""
+    """Angles between unit vectors u1 and u2, (n, A) each, row by row (n,) [rad]. Exact to rounding near 0 and pi, unlike acos."""
     return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
 
 

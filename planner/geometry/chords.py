@@ -1,8 +1,8 @@
 """Arcs as chords, for motions that consist of straight legs and corners.
 
-A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices rise linearly along arc
-and chord alike. The sagitta is a stated share of the arc's tolerance, and what it is, is taken off the tolerance at the joints of
-the chords: with corners rounded inside the polygon, both together stay within the tolerance.
+A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices rise linearly along arc and
+chord alike. The sagitta is a given share of the tolerance of the arc, and is subtracted from the tolerance at the joints of the chords:
+corners rounded inside the polygon then keep the tolerance of the arc.
 """
 
 from __future__ import annotations
@@ -20,13 +20,18 @@ CHORD_ANGLE_MAX = np.pi / 4
 
 
 def chord_angle(radius: FloatArray, sagitta: FloatArray) -> FloatArray:
-    """Angle [rad] by which a chord with the `sagitta` [mm] turns on an arc of `radius` [mm]."""
+    """Angle by which a chord with a given `sagitta` [mm] turns on an arc of a given `radius` [mm], (n,) each -> (n,) [rad]."""
     # acos(1 - x) = 2 asin(sqrt(x/2)), which keeps its digits for small x
     return np.minimum(4.0 * np.arcsin(np.sqrt(np.minimum(sagitta / (2.0 * radius), 1.0))), CHORD_ANGLE_MAX)
 
 
 def arc_sagitta(toolpath: Toolpath, share: float) -> tuple[Array, FloatArray]:
-    """How many chords each segment is cut into (M,), 1 for lines, and how far they leave it at most (M,) [mm]."""
+    """Into how many chords each segment is cut.
+
+    share : sagitta over tolerance [-]
+
+    Returns the number of chords (M,), 1 for lines, and their largest distance from the segment (M,) [mm].
+    """
     arcs, curved = toolpath.arcs, toolpath.arc >= 0
     count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
     row = toolpath.arc[curved]
@@ -38,9 +43,10 @@ def arc_sagitta(toolpath: Toolpath, share: float) -> tuple[Array, FloatArray]:
 
 
 def chorded(toolpath: Toolpath, share: float, whole: Array) -> Toolpath:
-    """The same path with its arcs cut into chords, but for the arcs `whole` (M,), which get a full stop at both ends.
+    """The same path with its arcs cut into chords.
 
-    share : sagitta over tolerance, 0 < share < 1
+    share : sagitta over tolerance, 0 < share < 1 [-]
+    whole : (M,) True for arcs that stay arcs and get a full stop at both ends
     """
     count, sagitta = arc_sagitta(toolpath, share)
     count[whole], sagitta[whole] = 1, 0.0
@@ -99,14 +105,14 @@ def chorded(toolpath: Toolpath, share: float, whole: Array) -> Toolpath:
 
 
 def parted_by_feed(toolpath: Toolpath) -> Toolpath:
-    """The same path with a corner of angle 0 where the programmed feed changes on a straight line: a leg ends there."""
+    """The same path with a corner of angle 0 where the programmed feed changes on a straight line, so that a leg ends there."""
     same_way = toolpath.joint[1:-1] == Joint.SMOOTH
     change = np.flatnonzero(same_way & (toolpath.feed[1:] != toolpath.feed[:-1])) + 1
     return toolpath.with_joints(change, Joint.CORNER)
 
 
 def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
-    """Points (n, A) at the parameters x (n,) [mm] of the arcs `segment` (n,), relative to their centres."""
+    """Points (n, A) relative to the centres of the arcs `segment` (n,), at their parameters x (n,) [mm]."""
     arcs, row = toolpath.arcs, toolpath.arc[segment]
     angle = arcs.rate[row] * x
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]

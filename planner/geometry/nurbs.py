@@ -50,7 +50,7 @@ class Nurbs:
     knots   : (n + p + 1,) non-decreasing
     weights : (n,) > 0
 
-    Raises InputError for data that are no curve.
+    Raises InputError for data that do not define a curve.
     """
 
     degree: int
@@ -88,12 +88,12 @@ class Nurbs:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axis letters."""
+        """The axis letters."""
         return LINEAR_AXES[: self.points.shape[1]]
 
     @cached_property
     def breaks(self) -> FloatArray:
-        """(m+1,) the knots of the domain, each once."""
+        """(m+1,) the different knots of the domain."""
         return np.unique(self.knots[self.degree : len(self.points) + 1])
 
     @cached_property
@@ -107,7 +107,12 @@ class Nurbs:
         return np.array([spline(self.breaks[:-1], nu=power) / factorial(power) for power in powers])
 
     def at(self, u: FloatArray, *, before: bool = False) -> FloatArray:
-        """(n, 4, A) point [mm] and derivatives by u at parameters (n,); at knots those just behind, or just `before`."""
+        """Point and derivatives by u at parameters (n,).
+
+        before : take the values just before a knot instead of just behind it
+
+        Returns (n, 4, A): point [mm] and first to third derivative.
+        """
         u = np.asarray(u, float)
         side: Any = "left" if before else "right"
         span = np.clip(np.searchsorted(self.breaks, u, side=side) - 1, 0, len(self.breaks) - 2)
@@ -126,7 +131,7 @@ class Nurbs:
         return np.stack([r, r1, r2, r3], axis=1)
 
     def along(self, u: FloatArray, *, before: bool = False) -> FloatArray:
-        """(n, 4, A) point and derivatives by the arc length at parameters (n,), sides as in `at`."""
+        """Point [mm] and derivatives by the arc length at parameters (n,) -> (n, 4, A); `before` as in `at`."""
         r, r1, r2, r3 = (self.at(u, before=before)[:, k] for k in range(4))
         sigma = np.linalg.norm(r1, axis=1)[:, None]
         sigma1 = (r1 * r2).sum(axis=1)[:, None] / sigma
@@ -137,7 +142,7 @@ class Nurbs:
         return np.stack([r, s1, s2, s3], axis=1)
 
     def length_between(self, u0: FloatArray, u1: FloatArray) -> FloatArray:
-        """Arc length [mm] from u0 to u1 (n,), each pair within one span."""
+        """Arc length between parameters u0 and u1 (n,), each pair within one span -> (n,) [mm]."""
         u0, step = np.asarray(u0, float), np.asarray(u1, float) - u0
         inside = u0[:, None] + step[:, None] * GAUSS_NODES
         rate = np.linalg.norm(self.at(inside.ravel())[:, 1], axis=1).reshape(inside.shape)
@@ -156,13 +161,13 @@ class Nurbs:
         return float(self._lengths[1][-1])
 
     def arc_length(self, u: FloatArray) -> FloatArray:
-        """(n,) arc length from the start to parameters (n,) [mm]."""
+        """Arc length from the start to parameters (n,) -> (n,) [mm]."""
         knots, length = self._lengths
         part = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
         return length[part] + self.length_between(knots[part], u)
 
     def parameter(self, s: FloatArray) -> FloatArray:
-        """(n,) parameters at arc lengths (n,) [mm]: Newton within the part that holds each."""
+        """Parameters at arc lengths (n,) [mm] -> (n,), by Newton's method within the span that holds each."""
         knots, length = self._lengths
         part = np.clip(np.searchsorted(length, s, side="right") - 1, 0, len(knots) - 2)
         low, high = knots[part], knots[part + 1]
@@ -208,7 +213,11 @@ class Nurbs:
         return worst
 
     def to_program(self, sagitta: float, feed: float, *, source: str = "NURBS") -> Program:
-        """The curve as G1 chords at `feed` [mm/s] whose ends are on the curve and that leave it by at most `sagitta` [mm]."""
+        """The curve as a program of G1 moves.
+
+        sagitta : largest distance of a chord from the curve [mm]; its ends are on the curve
+        feed    : programmed feed [mm/s]
+        """
         if not 0 < feed < np.inf:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")
         points = self.at(self.stations(sagitta))[:, 0]
@@ -216,7 +225,7 @@ class Nurbs:
 
 
 def chords(points: FloatArray, axes: tuple[str, ...], feed: float, source: str) -> Program:
-    """G1 moves through points (B+1, A) [mm]; the first is where the machine stands."""
+    """A program of G1 moves at `feed` [mm/s] through points (B+1, A) [mm]; the machine stands at the first of them."""
     blocks = len(points) - 1
     none: Array = np.zeros(0)
     return Program(

@@ -33,7 +33,7 @@ class Joint(IntEnum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Arcs:
-    """Data of the K arcs and helices of a toolpath, one row each (formula in the module's text)."""
+    """The K arcs and helices of a toolpath, one row each (formula in the module text)."""
 
     center: FloatArray  # (K, A) [mm]
     e1: FloatArray  # (K, A) unit vector from the centre to the start
@@ -55,22 +55,22 @@ class Arcs:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Toolpath:
-    """The programmed path: M segments over A axes, M+1 joints.
+    """The programmed path: M segments over A axes, and M+1 joints.
 
     start, end      : (M, A) end points [mm]
     length          : (M,) range of the segment's parameter x [mm], > 0
     feed            : (M,) programmed feed [mm/s]; inf on rapids
     rapid           : (M,) True on G0 moves
-    block           : (M,) index of the program's block, non-decreasing
-    line            : (M,) source line of that block
+    block           : (M,) index of the block of the program, non-decreasing
+    line            : (M,) NC line of that block
     arc             : (M,) row in `arcs`, or -1 for a line
     tangent_start   : (M, A) unit tangent at x = 0
     tangent_end     : (M, A) unit tangent at x = length
     curvature       : (M,) bound of the curvature on the segment [1/mm], 0 on lines
     joint           : (M+1,) `Joint`; the first and the last are STOP
     theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
-    tolerance       : (M+1,) contour error budget eps at the joint [mm]
-    dwell           : (M+1,) standstill at the joint [s], > 0 only where the joint is STOP
+    tolerance       : (M+1,) contour tolerance eps at the joint [mm]
+    dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
     zero_length     : blocks that move nowhere, kept as events
     """
 
@@ -118,7 +118,7 @@ class Toolpath:
         return len(self.length)
 
     def with_joints(self, at: Array | slice, how: Joint) -> Toolpath:
-        """The same path, passed like that at the joints `at` (indices, a mask or a slice)."""
+        """The same path with `how` for the joints `at` (indices, a mask or a slice)."""
         joint = self.joint.copy()
         joint[at] = how
         return dataclasses.replace(self, joint=joint)

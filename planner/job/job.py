@@ -1,4 +1,4 @@
-"""What every method shares: its way into a job, the last stages of all, sampling and verification, and the record at the end."""
+"""What every method shares: its way into a job, the filters and periods, sampling, verification, and the plan at the end."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from planner.base.names import OPTIMAL, SECOND_ORDER
 from planner.delivery import periods
 from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
@@ -25,6 +26,7 @@ from planner.job.notes import job_notes
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, GridHistory, PriceList
 from planner.job.stages import Progress, Stages
+from planner.job.trace import Log, Tell
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
@@ -37,20 +39,22 @@ Delivered = tuple[Trajectory, Verdict]
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
-# Other methods are tried then on jobs with up to so many grid points.
-INSTEAD_POINTS = 20_000
+# Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
+INSTEAD_POINTS = 50_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
     """A program on its way to a plan.
 
-    toolpath  : the path that is planned: the program's exact path, with its tolerances, or less of them (`with_share`,
+    program   : the blocks as they were read
+    machine   : limits, interpolation period, filters
+    toolpath  : the path that is planned: the exact programmed path with its tolerances, or with smaller ones (`with_share`,
                 delivery/periods.py)
     stages    : the clock
-    judged    : machine and toolpath that the motion is kept to and judged by where it is planned with others, else None
-    noted     : what the method has said of what it gave up (`note`)
-    motion_of : the motions of the trajectories delivered so far, as long as these live
+    noted     : what the method has noted so far (`note`)
+    judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
+    motion_of : the motions of the trajectories delivered so far, as long as the trajectories exist
     """
 
     program: Program
@@ -63,12 +67,17 @@ class Job:
 
     @property
     def real(self) -> tuple[Machine, Toolpath]:
-        """Machine and toolpath that the motion is kept to and judged by."""
+        """Machine and toolpath by which the motion is judged."""
         return self.judged or (self.machine, self.toolpath)
 
     def with_share(self, share: float, seen: float) -> Job:
-        """The job planned within a share of its tolerances, the rest left to the filters behind, of which the closed forms see filters
-        of `seen` of their lengths [-]."""
+        """The job with smaller tolerances, so that the rest is left to the filters behind the setpoints.
+
+        share : of the tolerances, 0 < share <= 1 [-]
+        seen  : of the lengths of the filters, as far as closed forms use them [-]
+
+        Only for machines with filters.
+        """
         machine, toolpath = self.real
         assert machine.fir is not None
         by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
@@ -86,35 +95,47 @@ class Job:
         )
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
-        """Run a stage; yields a function that takes the fraction done."""
+        """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
         return self.stages.stage(name)
 
+    @property
+    def tell(self) -> Tell:
+        """Tell of a step (job/trace.py)."""
+        return self.stages.tell
+
     def note(self, *sentences: str) -> None:
-        """Add to the notes of the plan: what was given up, with its first line and how often."""
-        self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+        """Add sentences to the notes of the plan: what was given up, with the first line and a count. Repeated ones are dropped."""
+        for sentence in sentences:
+            if sentence not in self.noted:
+                self.noted.append(sentence)
+                self.tell("given up", what=sentence)
 
     def afresh(self) -> Job:
-        """The job for another plan of it, with notes of its own."""
+        """The same job with no notes, for another plan of it."""
         return dataclasses.replace(self, noted=[])
 
     @cached_property
     def stop_time(self) -> float:
-        """Time if every block ran from rest to rest [s], dwells included: what the plan is compared with."""
+        """Cycle time if every block ran from rest to rest [s], dwells included: the baseline of the plan."""
         machine, toolpath = self.real
         times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
         return float(times.sum() + np.sum(toolpath.dwell))
 
     def behind_filters(self, motion: TimedT) -> TimedT:
-        """The motion, slower where the machine's own filters would otherwise leave the tolerance (delivery/filters.py)."""
+        """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""
         with self.stage("filters"):
             machine, toolpath = self.real
             return kept(motion, toolpath, machine)
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
-        """Sample a motion at the interpolation period, with stops that its chords do not cut off (delivery/periods.py), and have it
-        judged, between the samples too.
+        """Sample a motion at the interpolation period and have it judged, between the samples too.
 
-        seed : of the times the judge looks at; another one where something of a verdict was fed back into the motion
+        not_limited : quantities that are reported and not judged, "jerk" for example
+        seed        : of the times at which the verifier looks; use another one if a verdict was fed back into the motion
+
+        Standstills are added where the chords between samples would cut off a full stop (delivery/periods.py).
+
+        Returns the trajectory and the verdict.
         """
         machine, toolpath = self.real
         with self.stage("sample"):
@@ -134,7 +155,7 @@ class Job:
         return trajectory, verdict
 
     def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
-        """The motion as it is delivered: with the standstills that its samples need."""
+        """The motion as it is delivered, with the standstills that its samples need."""
         machine, toolpath = self.real
         return settled(motion, toolpath, machine, "jerk" not in not_limited)
 
@@ -164,8 +185,23 @@ class Job:
         grid: GridHistory | None = None,
         prices: PriceList | None = None,
     ) -> Plan:
-        """The record of the job with what was delivered, None if it could not be solved; for the rest see `Plan`."""
+        """The plan of the job.
+
+        made : trajectory and verdict, or None if the job could not be solved
+
+        The other arguments are fields of `Plan`.
+        """
         trajectory, verdict = made or (None, None)
+        held: dict[str, Any] = {} if grid is None else {"held_by": _largest_shares(grid)}
+        self.tell(
+            "plan",
+            found=np.nan if trajectory is None else trajectory.cycle_time,
+            method=method,
+            corner=corner or "none",
+            points=grid_points,
+            passed=verdict is not None and verdict.passed,
+            **held,
+        )
         self._note_ringing(trajectory, method)
         return Plan(
             method=method,
@@ -191,18 +227,28 @@ class Job:
         """Say so where vibration modes are excited; method fir makes its filters as long as leaves them at rest."""
         shaped = trajectory is None or isinstance(self.motion_of.get(trajectory), ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
-            can = "--shaped does" if method in ("optimal", "toppra") else "optimal and toppra can: --shaped"
+            can = (
+                "--shaped does"
+                if method in (OPTIMAL, SECOND_ORDER)
+                else f"{OPTIMAL} and {SECOND_ORDER} can: --shaped"
+            )
             self.note(
                 f"method {method} does not shape its set points for the machine's vibration modes; {can}"
             )
 
 
-class Method(ABC):
-    """A way to plan a job; its repr is its row label in every table.
+def _largest_shares(grid: GridHistory) -> str:
+    """The three limits that hold a motion longest."""
+    return ", ".join(f"{name} {share:.0%}" for name, share in grid.ranked()[:3])
 
-    ways : for machines with filters behind the setpoints: shares of the tolerance, and of the filters' lengths that closed forms see
-           (`Job.with_share`), that are tried beside (1, 1); the fastest plan is taken
-    instead : methods that are tried too where the chords between samples take tolerance away: what was fastest without may not be
+
+class Method(ABC):
+    """A way to plan a job. Its repr is its row label in every table.
+
+    ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
+              `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
+    instead : methods that are tried as well if the chords between samples need some of the tolerance, because another one may then be
+              faster
     """
 
     instead: Sequence[Method] = ()
@@ -214,14 +260,17 @@ class Method(ABC):
         machine: Machine,
         tolerance: float | None = None,
         progress: Progress | None = None,
+        log: Log | None = None,
     ) -> Plan:
-        """Plan a program within a tolerance [mm] (None: the program's or the machine's).
+        """Plan a program, sample the motion and have it judged.
 
-        progress : called with the stage's name and the fraction done
+        tolerance : contour tolerance [mm]; None for the one of the program (G64 P) or the machine
+        progress  : called with the stage's name and the fraction done (0 to 1)
+        log       : called with every step of the planning, e.g. a `Trace` (job/trace.py)
 
-        Raises InputError for what cannot be planned; an unsolved problem is the plan's status.
+        Raises InputError for a program that cannot be planned. An unsolved problem is the status of the plan.
         """
-        stages = Stages(progress)
+        stages = Stages(progress, log)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
@@ -229,24 +278,33 @@ class Method(ABC):
         return self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
 
     def plan_best(self, job: Job) -> Plan:
-        """The plan of a job; for a machine with filters the fastest of those that are tried (`ways`)."""
+        """The plan of a job; on a machine with filters the fastest of those that are tried (`ways`)."""
         best = self.plan_within_periods(job)
         if job.machine.fir is None or not best.solved:
             return best
         for share, seen in self.ways:
-            best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
+            made = self.plan_within_periods(job.with_share(share, seen))
+            before, best = best, faster(best, made)
+            job.tell(
+                "share of tolerance",
+                found=_time(made),
+                before=_time(before),
+                kept=best is made,
+                share=share,
+                filters=seen,
+            )
         return best
 
     @property
     def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance; one that does not is delivered as it is, and the verdict says so."""
+        """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
         return True
 
     def plan_within_periods(self, job: Job) -> Plan:
-        """Plan a job so that the chords between its samples keep the tolerance too (delivery/periods.py)."""
+        """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py)."""
         made = self.plan_job(job)
         given, planned, (machine, programmed) = job, job.toolpath, job.real
-        for _ in range(PERIOD_ROUNDS):
+        for again in range(1, PERIOD_ROUNDS + 1):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
                 break
             with job.stage("geometry"):
@@ -255,6 +313,13 @@ class Method(ABC):
             if less is None:
                 break
             planned = less
+            stops = int((less.joint == Joint.STOP).sum() - (programmed.joint == Joint.STOP).sum())
+            job.tell(
+                "less for the period",
+                round=again,
+                corners=int((less.tolerance < programmed.tolerance).sum()),
+                stops=stops,
+            )
             job = dataclasses.replace(given, toolpath=planned, judged=(machine, programmed), noted=[])
             made = self.plan_job(job)
         if job is given:
@@ -263,7 +328,16 @@ class Method(ABC):
         made = dataclasses.replace(made, prices=None, notes=(*made.notes, _said(made, programmed, planned)))
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
             rival = other.plan_within_periods(given.afresh())
-            if faster(made, rival) is rival:
+            wins = faster(made, rival) is rival
+            job.tell(
+                "another method",
+                found=_time(rival),
+                before=_time(made),
+                kept=wins,
+                method=rival.method,
+                corner=rival.corner or "none",
+            )
+            if wins:
                 what = (
                     f"{rival.corner} corners lose"
                     if rival.method == made.method
@@ -275,16 +349,22 @@ class Method(ABC):
 
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
-        """Plan a program whose path is laid out."""
+        """Plan a job whose toolpath is laid out. What a method has to provide."""
 
 
 def faster(plan: Plan, other: Plan) -> Plan:
-    """Of two plans the one that passed or, if both did, the faster one; the first if there is no difference."""
+    """Of two plans the one that passed; if both did, the faster one; the first if they are equal."""
     if plan.trajectory is None or plan.verdict is None or other.trajectory is None or other.verdict is None:
         return plan
     if plan.verdict.passed != other.verdict.passed:
         return plan if plan.verdict.passed else other
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _time(plan: Plan) -> float:
+    """Cycle time [s], NaN for a motion that does not pass."""
+    passed = plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
+    return plan.trajectory.cycle_time if passed and plan.trajectory is not None else np.nan
 
 
 def _inside(made: Plan) -> bool:

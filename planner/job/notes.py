@@ -1,6 +1,6 @@
-"""What a plan assumed and what it gave up, in short sentences, each with its first place and how often.
+"""What a plan assumed and what it gave up: short sentences, each with its first line and a count.
 
-The reader's notes (`Program.notes`) come first, then what machine and tolerance make of the program, then what the method says.
+The notes of the reader (`Program.notes`) come first, then those on machine and tolerance, then those of the method.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TOLERANCE_OF_PART = 0.02
 
 
 def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
-    """What the reader assumed, feeds that the machine lowers, and a tolerance that is large beside the part."""
+    """Notes of the reader, on feeds that the machine lowers, and on a tolerance that is large beside the part."""
     return [*program.notes, *_feed_notes(program, machine), *_tolerance_notes(toolpath)]
 
 

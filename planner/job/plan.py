@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from planner.base.errors import NotSolvedError
+from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.job.records import CornerTable, GridHistory, PriceList
@@ -18,16 +19,19 @@ from planner.verify import CornerCheck, Verdict
 class Plan:
     """A planned job.
 
-    method, corner, solver : what was used; corner is None where the method rounds no corners
-    status, sentence       : how it ended
-    trajectory, verdict    : None unless solved
-    rounded                : the corners that the method rounds each by itself, next to their closed-form speed, or None
-    grid                   : the profile at the grid points, or None
-    prices                 : what the limits cost, or None where the solver does not tell
-    stop_time              : time if every block ran from rest to rest [s], dwells included
-    grid_points            : size of the problem that was solved
-    notes                  : what was assumed and what was given up, each with its first line and how often
-    timings                : computing time per stage [s]
+    method, solver      : names of what was used
+    corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where no corner is rounded
+    program, machine    : what was planned, and for which machine
+    toolpath            : the exact programmed path with its tolerances
+    status, sentence    : how the solution ended
+    trajectory, verdict : the motion at the interpolation period and the verifier's verdict on it; None unless solved
+    rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
+    grid                : the profile at the grid points, or None
+    prices              : cycle time saved per limit, or None where the solver gives no multipliers
+    stop_time           : cycle time if every block ran from rest to rest [s], dwells included
+    grid_points         : number of grid points of the problem that was solved
+    notes               : what was assumed and what was given up, each with its first line and a count
+    timings             : computing time by stage [s]
     """
 
     method: str
@@ -49,6 +53,14 @@ class Plan:
     timings: dict[str, float] = field(default_factory=dict)
 
     @property
+    def geometry(self) -> str | None:
+        """How the path was smoothed: "auto" or "spline", "corners" where each corner is rounded by itself; None where no corner is
+        rounded."""
+        if self.corner is None:
+            return None
+        return self.corner if self.corner in (AUTO, SPLINE) else SINGLE_CORNERS
+
+    @property
     def solved(self) -> bool:
         """True if there is a trajectory."""
         return self.trajectory is not None
@@ -59,7 +71,7 @@ class Plan:
         return self.verdict.corners if self.verdict is not None else None
 
     def require(self) -> Plan:
-        """Return self, or raise NotSolvedError with the sentence."""
+        """Return the plan itself. Raises NotSolvedError with `sentence` if there is no trajectory."""
         if not self.solved:
             raise NotSolvedError(self.sentence)
         return self

@@ -1,4 +1,4 @@
-"""What a plan is told in, whatever the method: tables of corners, the profile on the grid, prices."""
+"""The records of a plan, the same for every method: tables of corners, the profile on the grid, prices."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerTable:
-    """One row per blended corner, in the order of the path.
+    """One row for each rounded corner, in the order of the path.
 
-    line             : (C,) source line of the block that ends there
+    line             : (C,) NC line of the block that ends at the corner
     theta            : (C,) turning angle [rad]
     d_in, d_out      : (C,) tangent lengths before and after the vertex [mm]
-    tol_ap           : (C,) budget used by the rounding, eps_ap [mm]
+    tol_ap           : (C,) part of the tolerance that the rounding uses, eps_ap [mm]
     kappa_max        : (C,) curvature at the apex [1/mm]
-    feed_closed_form : (C,) error-allocation speed [mm/s]
+    feed_closed_form : (C,) speed by error allocation, eq. 19 with the curvature of this corner [mm/s]
     feed_planned     : (C,) planned speed at the apex [mm/s]
     limited_by       : (C,) name of the constraint that is closest to its limit there
     """
@@ -51,12 +51,12 @@ class CornerTable:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GridHistory:
-    """The profile at the solver's grid points, and which limit holds it there (sensitivity/activity.py).
+    """The profile at the grid points of the solver, and the active limit at each of them (sensitivity/activity.py).
 
     t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
-    active       : (P,) index in `active_names` of what holds the interval to the right of each point
-    active_names : limits, then "none" and "rest"
-    share        : of the cycle time that each of them holds [-]; they add up to 1
+    active       : (P,) index in `active_names` of the limit that is active in the interval to the right of each point
+    active_names : names of limits, then "none" and "rest"
+    share        : fraction of the cycle time in which each of them is active [-]; they add up to 1
     """
 
     t: FloatArray
@@ -67,7 +67,7 @@ class GridHistory:
     share: FloatArray
 
     def ranked(self) -> list[tuple[str, float]]:
-        """What holds any time, with its share: limits, the largest first, then "none" and "rest"."""
+        """Names and fractions of the cycle time: the limits, largest fraction first, then "none" and "rest"."""
         limits, others = (
             np.flatnonzero(self.share[:-2]),
             len(self.share) - 2 + np.flatnonzero(self.share[-2:]),
@@ -78,13 +78,13 @@ class GridHistory:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DearCorners:
-    """The corners where more tolerance saves most, the dearest first.
+    """The corners where more tolerance saves most, the largest saving first.
 
-    line     : (C,) source line of the block that ends there
+    line     : (C,) NC line of the block that ends at the corner
     position : (C, A) vertex [mm]
     theta    : (C,) turning angle [rad]
     price    : (C,) dT/d(tolerance at that corner alone) [s/mm]
-    saved    : (C,) by `MORE_TOLERANCE` there [s]
+    saved    : (C,) time saved by `MORE_TOLERANCE` there [s]
     """
 
     line: Array
@@ -106,15 +106,15 @@ class DearCorners:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PriceList:
-    """Derivatives of the cycle time T [s]; negative where more saves time.
+    """What limits and tolerance cost: derivatives of the cycle time T, negative where more of a limit saves time.
 
     limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]
     feed      : dT/d(ln feed override) [s]
-    tolerance : dT/d(tolerance) [s/mm]; None where it is not known: on splines that nothing priced
-    saved     : by `MORE_LIMIT` more of each axis limit and of the "feed", by `MORE_TOLERANCE` more "tolerance" if known [s]
-    ranges    : least and most that this may be in a plan made again [s]
-    hints     : what is told by its range only: `saved`, its middle, is no more than a hint
-    corners   : the dearest ones; None where they are not known
+    tolerance : dT/d(tolerance) [s/mm]; None where it is not known
+    saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE` more "tolerance" [s]
+    ranges    : least and most time that a new plan may save [s]
+    hints     : names whose saving is told by its range only; `saved` is its middle, and no more than a hint
+    corners   : the corners with the largest savings; None where they are not known
     """
 
     limits: dict[str, float]
@@ -126,6 +126,6 @@ class PriceList:
     hints: tuple[str, ...] = ()
 
     def ranked(self) -> list[tuple[str, float]]:
-        """What saves time, with the time saved by `MORE_LIMIT` or `MORE_TOLERANCE` more of it [s]; the most valuable first."""
+        """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""
         worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
         return sorted(worth, key=lambda entry: -entry[1])

@@ -1,48 +1,30 @@
-"""The methods by their names on the command line, and `plan`, the one call that does a whole job."""
+"""The methods by their names (`planner.base.names`), and `plan`, the one call that does a whole job."""
 
 from __future__ import annotations
 
 import dataclasses
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from planner.base.errors import InputError
-from planner.feedrate.solvers import OWN, REACHABILITY, second_order_solver, third_order_solver
+from planner.base.names import (
+    METHODS,
+    SINGLE_CORNERS,
+    method_name,
+    smoothing,
+    solver_name,
+    users_of,
+)
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
+from planner.job.trace import Log
 from planner.machine import Machine, load_machine
-from planner.methods.bezier import BezierMethod
-from planner.methods.fir import FirMethod
-from planner.methods.fir_spline import FirSplineMethod
-from planner.methods.kinematic import KinematicMethod
-from planner.methods.optimal import OptimalMethod
-from planner.methods.second_order import ToppraMethod
-from planner.methods.stop import StopMethod
-from planner.methods.tube import TubeMethod
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.optimal.geometry import AUTO, SPLINE
 
 DEFAULT_MACHINE = "mill"
-# Which methods use which setting of `plan`.
-USED_BY = {
-    "corner": ("optimal", "toppra"),
-    "solver": ("optimal", "toppra"),
-    "rounds": ("optimal", "toppra"),
-    "shaped": ("optimal", "toppra"),
-}
-METHODS = (
-    "optimal",
-    "toppra",
-    "bezier",
-    "kinematic",
-    "fir",
-    "fir-plain",
-    "fir-spline",
-    "fir-spline-plain",
-    "tube",
-    "stop",
-)
 
 
 def plan(
@@ -50,88 +32,107 @@ def plan(
     machine: Machine | str | Path | None = None,
     *,
     method: str | Method = "optimal",
+    geometry: str | None = None,
     corner: str | None = None,
     solver: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    log: Log | None = None,
 ) -> Plan:
     """Plan, sample and verify the motion of an NC program.
 
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
-    method    : a name of `METHODS`, or a method with settings of your own
-    corner    : "auto", "spline", "bezier", "fir" or "kinematic", for "toppra" and "optimal" only; None for "auto"
-    solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", None for "own"; "reachability" or "toppra" for "toppra",
-                None for "reachability" (feedrate/solvers.py)
-    rounds    : in which "optimal" and "toppra" reshape splines ("auto", "spline") by what their motion pays for; None for as many as
-                the size of the job lets pay
-    shaped    : deliver set points that leave the machine's vibration modes at rest, for "toppra" and "optimal" only
-    tolerance : contour error budget [mm]; beats the program's G64 P and the machine's
-    progress  : called with the stage's name and the fraction done
+    method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
+    geometry  : how the path is smoothed, for "optimal" and "second-order": "spline" (one spline from stop to stop), "corners" (each
+                corner by itself) or "auto" (splines, or corners where they take less time); None for "auto", or for "corners" where
+                `corner` is given
+    corner    : the shape of single corners: "bezier", "fir" or "kinematic"; None for "bezier"
+    solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
+                the first of them
+    rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for as many
+                as the size of the job allows
+    shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
+    tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
+    progress  : called with the stage's name and the fraction done (0 to 1)
+    log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
-    Raises InputError naming file, line and column, and for a setting that the method does not use. A problem that could not be
-    solved is the plan's status; `Plan.require` turns it into an exception.
+    Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status; `Plan.require` turns it into a
+    NotSolvedError.
+
+    Raises InputError for a program or machine that cannot be read, naming file, line and column, for an unknown name, and for a setting
+    that the method does not use.
     """
-    _check_used(method, corner=corner, solver=solver, rounds=rounds, shaped=shaped or None)
     if isinstance(method, str):
-        method = _method(
-            method,
-            AUTO if corner is None else corner,
-            solver,
-            rounds,
-            shaped,
+        method = method_name(method)
+    _check_used(method, geometry=geometry, corner=corner, solver=solver, rounds=rounds, shaped=shaped or None)
+    if isinstance(method, str):
+        method = make_method(
+            method, geometry=geometry, corner=corner, solver=solver, rounds=rounds, shaped=shaped
         )
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if isinstance(program, Program):
-        return method.plan(program, machine, tolerance, progress)
+        return method.plan(program, machine, tolerance, progress, log)
     reading = Stages(progress)
     with reading.stage("read"):
         program = read_program(program, machine)
-    made = method.plan(program, machine, tolerance, progress)
+    made = method.plan(program, machine, tolerance, progress, log)
     return dataclasses.replace(made, timings=reading.timings | made.timings)
+
+
+def make_method(
+    name: str,
+    *,
+    geometry: str | None = None,
+    corner: str | None = None,
+    solver: str | None = None,
+    rounds: int | None = None,
+    shaped: bool = False,
+) -> Method:
+    """The method of that name; the settings are those of `plan`, None for the method's own.
+
+    Raises InputError for an unknown name of a method, geometry, corner shape or solver, and for a negative number of rounds.
+    """
+    entry = METHODS[method_name(name)]
+    settings: dict[str, Any] = dict(entry.settings)
+    if entry.shapes:
+        kind, shape = smoothing(geometry, corner)
+        if rounds is not None and rounds < 0:
+            raise InputError(f"{rounds} rounds; it must be 0 or more")
+        settings |= {"corner": shape or kind, "rounds": rounds, "shaped": shaped}
+    if entry.solvers and solver is not None:
+        settings["solver"] = solver_name(solver)
+    module, _, class_name = entry.home.partition(":")
+    made = getattr(import_module(module), class_name)(**settings)
+    assert isinstance(made, Method)
+    return made
 
 
 def _check_used(method: str | Method, **given: str | int | None) -> None:
     """Raise InputError for a setting that the method would ignore."""
-    for setting, users in USED_BY.items():
-        if given[setting] is None or method in users:
+    for setting, value in given.items():
+        if value is None:
             continue
         if isinstance(method, Method):
             raise InputError(
-                f"{setting} = {given[setting]} beside a method with settings of its own: {method!r}; set it there"
+                f"{setting} = {value} beside a method with settings of its own: {method!r}; set it there"
             )
-        if method in METHODS:
+        if method not in users_of(setting):
             raise InputError(
-                f"{setting} = {given[setting]}: method {method} does not use it; it is for {' and '.join(users)}"
+                f"{setting} = {value}: method {method} does not use it; it is for {' and '.join(users_of(setting))}"
             )
-    if given["rounds"] is not None and given["corner"] not in (None, AUTO, SPLINE):
-        raise InputError(
-            f"rounds = {given['rounds']}: they reshape splines, and corner {given['corner']} has none"
-        )
+        if setting == "solver" and value not in METHODS[method].solvers:
+            raise InputError(
+                f"solver = {value}: method {method} does not use it; it has {', '.join(METHODS[method].solvers)}"
+            )
+    if given["rounds"] is not None:
+        kind, shape = smoothing(_text(given["geometry"]), _text(given["corner"]))
+        if kind == SINGLE_CORNERS:
+            raise InputError(f"rounds = {given['rounds']}: they reshape splines, and corner {shape} has none")
 
 
-def _method(name: str, corner: str, solver: str | None, rounds: int | None, shaped: bool) -> Method:
-    if rounds is not None and rounds < 0:
-        raise InputError(f"{rounds} rounds; it must be 0 or more")
-    if name == "optimal":
-        third_order = third_order_solver(OWN if solver is None else solver)
-        return OptimalMethod(corner=corner, solver=third_order, rounds=rounds, shaped=shaped)
-    if name == "toppra":
-        second_order = second_order_solver(REACHABILITY if solver is None else solver)
-        return ToppraMethod(corner=corner, solver=second_order, rounds=rounds, shaped=shaped)
-    if name == "bezier":
-        return BezierMethod()
-    if name == "kinematic":
-        return KinematicMethod()
-    if name in ("fir", "fir-plain"):
-        return FirMethod(plain=name == "fir-plain")
-    if name in ("fir-spline", "fir-spline-plain"):
-        return FirSplineMethod(plain=name == "fir-spline-plain")
-    if name == "tube":
-        return TubeMethod()
-    if name == "stop":
-        return StopMethod()
-    raise InputError(f"no method '{name}'; there are {', '.join(METHODS)}")
+def _text(value: str | int | None) -> str | None:
+    return None if value is None else str(value)

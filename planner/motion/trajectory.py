@@ -1,4 +1,4 @@
-"""The record of a motion in time: samples at the interpolation period, as an axis controller gets them."""
+"""The record of a motion in time: samples at the interpolation period, as the axis controllers get them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class Trajectory:
     axes         : axis letters
     dt           : interpolation period [s]
     t            : (T,) time [s], strictly increasing, t[0] = 0
-    position     : (T, A) [mm]
+    position     : (T, A) [mm]; rotary axes here and below in rad
     velocity     : (T, A) [mm/s]
     acceleration : (T, A) [mm/s2]; where it jumps, the value after the jump
     jerk         : (T, A) [mm/s3]; where it jumps, the value after the jump
-    s            : (T,) arc length along the motion's path [mm], non-decreasing
+    s            : (T,) arc length along the path of the motion [mm], non-decreasing
     feed         : (T,) ds/dt [mm/s]
-    block        : (T,) index of the program's block
-    line         : (T,) source line of that block
+    block        : (T,) index of the block of the program
+    line         : (T,) NC line of that block
     """
 
     axes: tuple[str, ...]
@@ -63,7 +63,7 @@ class Trajectory:
 
 
 def joined(chunks: list[Trajectory]) -> Trajectory:
-    """Chunks in order as one trajectory; a sample that a chunk shares with the one before counts once."""
+    """One trajectory from consecutive chunks; a sample that a chunk shares with the one before counts once."""
     names = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
     fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
     columns: dict[str, Any] = {

@@ -41,9 +41,11 @@ RUN_PERIODS = 20
 
 
 def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
-    """(blocks,) feed of each block [mm/s]; NaN for rapids and for blocks that move nowhere.
+    """F words for the blocks of a program: an upper envelope of the planned feed (module text).
 
     blocks : number of blocks of the program
+
+    Returns the feed of each block (blocks,) [mm/s]; NaN for rapids and for blocks that move nowhere.
     """
     joint = _joint_times(trajectory, toolpath)
     duration = _block_times(joint, toolpath)
@@ -75,7 +77,7 @@ def _runs(highest: FloatArray, duration: FloatArray, least: float) -> Array:
 
 
 def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(M,) planned time of each segment [s], dwells not included; with the dwells they add up to the cycle time."""
+    """(M,) planned time on each segment [s], dwells not included. With the dwells they add up to the cycle time."""
     return _block_times(_joint_times(trajectory, toolpath), toolpath)
 
 

@@ -1,7 +1,7 @@
 """Several methods on one job, side by side: a row per method, as a table, as JSON or as CSV.
 
-The best is the fastest motion that passed with all of its quantities limited; a motion without a jerk limit (method toppra) is compared
-with it but is not it, unless no other passed.
+The best is the fastest motion that passed with every quantity limited. A motion without a jerk limit (method second-order) is listed
+beside it, and is the best only if no other passed.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ QUANTITIES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What one method made of the job.
+    """The result of one method.
 
     outcome       : "passed", "failed" (a limit or the tolerance is exceeded), "not solved" or "refused"
-    sentence      : what it says about its plan, what it exceeds first, or why there is no motion
-    cycle_time    : [s], or None without a motion, as the following
-    worst         : by quantity: worst ratio to its limit and which of the limits that is ("jerk.y")
+    sentence      : how the plan was solved, the first fault, or the reason why there is no motion
+    cycle_time    : [s]; None without a motion, as the following fields
+    worst         : for each quantity the largest ratio to its limit, and the name of that limit ("jerk.y")
     free          : quantities that this method does not limit
     contour_error, vertex_error : [mm]
-    after_filters : the larger of both behind the machine's filters [mm]; None without filters, or where it is not known
-    corner_ratio  : the largest of eq. 18-19 at the programmed corners, None without corners
-    gain          : median speed there over eq. 20 of the paper's corner, None where that says nothing
+    after_filters : the larger of both behind the filters of the machine [mm]; None without filters, or where it is not known
+    corner_ratio  : the largest ratio of eq. 18-19 at the programmed corners [-]; None without corners
+    gain          : median of the speed there over eq. 20 of the paper's corner [-]; None where it is not defined
     ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
     planning_time : computing time without reading, sampling and verification [s]
-    summary       : the plan's `summary.json`
+    summary       : the content of `summary.json`
     """
 
     method: str
@@ -72,7 +72,7 @@ class Row:
 
     @property
     def passed(self) -> bool:
-        """The verdict on its motion."""
+        """Whether its motion passed the verdict."""
         return self.outcome == "passed"
 
 
@@ -123,19 +123,19 @@ def _ringing(verdict: Verdict) -> float | None:
 
 
 def refused(method: str, fault: Exception) -> Row:
-    """The row of a method that cannot do the job, with what it says."""
+    """The row of a method that cannot plan the job, with the reason."""
     return Row(method=method, outcome="refused", sentence=str(fault))
 
 
 def best_of(rows: list[Row]) -> Row | None:
-    """The fastest that passed, of those that limit everything if there is one."""
+    """The fastest method that passed, among those that limit every quantity if there is one; None if none passed."""
     passed = [row for row in rows if row.passed]
     candidates = [row for row in passed if not row.free] or passed
     return min(candidates, key=lambda row: row.cycle_time or np.inf, default=None)
 
 
 def comparison_table(rows: list[Row], title: str) -> Group:
-    """The table for the terminal; below it what failed, and why."""
+    """The table for the terminal, followed by the reason for each method that did not pass."""
     best = best_of(rows)
     shown = [name for name in QUANTITIES if any(name in (row.worst or {}) for row in rows)]
     table = Table(box=None, pad_edge=False)
@@ -177,7 +177,7 @@ def comparison_table(rows: list[Row], title: str) -> Group:
 
 
 def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
-    """The comparison ready for JSON."""
+    """The comparison, ready for JSON; `about` comes first."""
     best = best_of(rows)
     return {
         **about,
@@ -209,7 +209,7 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
 
 
 def comparison_csv(rows: list[Row]) -> str:
-    """The comparison as CSV, a row per method; empty where there is no number."""
+    """The comparison as CSV, one row for each method; a cell is empty where there is no number."""
     best = best_of(rows)
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n")
@@ -234,9 +234,12 @@ def comparison_csv(rows: list[Row]) -> str:
     return out.getvalue()
 
 
-def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Raise InputError for another suffix than .json and .csv, or a place that is no file in a directory; for one of the inputs; for a
-    file that no comparison wrote, unless `force` is set."""
+def check_comparison_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+    """Raise InputError if a comparison cannot be written to a file.
+
+    That is so for a suffix other than .json and .csv, for a directory, for one of the `inputs`, and for a file that is no comparison,
+    unless `force` is set.
+    """
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
     check_file(path, inputs, _is_comparison, force=force)
@@ -252,14 +255,14 @@ def _is_comparison(path: Path) -> bool:
 
 
 def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None:
-    """Write the comparison as JSON or CSV, the whole file or none of it. Raises InputError where it cannot be written."""
+    """Write the comparison as JSON or CSV, the whole file or nothing. Raises InputError if it cannot be written."""
     text = comparison_csv(rows) if path.suffix == ".csv" else _json(comparison_dict(rows, about))
     with replacing_file(path) as new:
         new.write_text(text, encoding="utf-8")
 
 
 def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:
-    """What all rows have in common; `tolerance` [mm] is None where the program or the machine sets it."""
+    """What all rows have in common. `tolerance` [mm] is None if the program or the machine sets it."""
     return {
         "program": source,
         "machine": machine.model_dump(mode="json", exclude_none=True),

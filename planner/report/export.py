@@ -1,8 +1,8 @@
 """The files of a plan, and the plan in numbers.
 
-`trajectory.parquet`, `.csv` or `.npz` (see `planner.report.trajectory_file`), `planned.ngc` where the program
-came from a file (see `planner.report.planned`), `summary.json`, and the pictures where asked. They appear
-together or not at all: see `planner.report.replace`. Trajectory and summary carry the same `run_id`.
+`trajectory.parquet`, `.csv` or `.npz` (`planner.report.trajectory_file`), `planned.ngc` if the program was read from a file
+(`planner.report.planned`), `summary.json`, and pictures if asked for. They take their places together (`planner.report.replace`), and
+trajectory and summary carry the same `run_id`.
 """
 
 from __future__ import annotations
@@ -46,13 +46,16 @@ def write_plan(
     plots: bool = False,
     force: bool = False,
 ) -> list[str]:
-    """Write the files of a solved plan into `directory`, all or nothing; return their names.
+    """Write the files of a solved plan into a directory, all of them or none.
 
-    force : replace files of these names that no run wrote, too
+    file_format : of the trajectory
+    plots       : write pictures too
+    force       : replace files of these names even if no run wrote them
 
-    What is left out, and why, is among the `notes` of the summary, behind those of the plan.
+    Returns the names of the files. The `notes` of the summary are those of the plan, followed by what was left out and why.
 
-    Raises InputError if the directory cannot be written, or if a file stands in the way that no run wrote.
+    Raises InputError if the directory cannot be written, or if a file is in the way that no run wrote. Raises ValueError for a plan
+    without a trajectory.
     """
     if plan.trajectory is None:
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
@@ -85,8 +88,11 @@ def write_plan(
 def check_places(
     directory: Path, inputs: Sequence[Path], *, file_format: Format, plots: bool, force: bool
 ) -> None:
-    """Raise InputError if `write_plan` could not write into `directory`: one of its files is among the `inputs`, program and machine,
-    or stands there and no run wrote it. A `planned.ngc` that is the program stays as it is, and is no reason."""
+    """Raise InputError if `write_plan` could not write into a directory.
+
+    That is so if one of its files is among the `inputs` (program and machine), or exists and no run wrote it. A `planned.ngc` that is
+    the program itself stays as it is and is no reason.
+    """
     names = [f"trajectory.{file_format}", SUMMARY]
     names += [CSV_METADATA] * (file_format == "csv") + ["toolpath.png", "profiles.png"] * plots
     refuse_inputs([directory / name for name in names], inputs)
@@ -104,6 +110,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "program": plan.program.source,
             "machine": plan.machine.name,
             "method": plan.method,
+            "geometry": plan.geometry,
             "corner": plan.corner,
             "solver": plan.solver,
             "status": plan.status.name,
@@ -124,7 +131,7 @@ def summary(plan: Plan) -> dict[str, Any]:
 
 
 def verdict_summary(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers: worst ratio per limit, errors, faults."""
+    """A verdict in numbers: the largest ratio to each limit, errors, faults."""
     return _plain({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
 
 
@@ -139,14 +146,14 @@ def _not_limited(verdict: Verdict) -> list[str]:
 
 
 def info_summary(info: ProgramInfo) -> dict[str, Any]:
-    """A program's figures, ready for JSON; keys are the fields of `ProgramInfo`, whose units they keep."""
+    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`."""
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
     fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported]
     return _plain(fields)
 
 
 def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
-    """What a trajectory file says about itself; `planner verify` uses machine, tolerance, `not_limited`."""
+    """The metadata of a trajectory file. `planner verify` reads machine, tolerance and `not_limited` from it."""
     trajectory = plan.trajectory
     assert trajectory is not None
     return _plain(
@@ -156,6 +163,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "program": plan.program.source,
             "method": plan.method,
+            "geometry": plan.geometry,
             "corner": plan.corner,
             "dt_s": trajectory.dt,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
@@ -168,7 +176,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Version of this package, of Python, and of the packages that compute."""
+    """Versions of this package, of Python, and of the packages that compute."""
     found = {"planner": metadata.version("feedrate-planner"), "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in PACKAGES}
 

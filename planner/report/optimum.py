@@ -1,6 +1,7 @@
-"""What a plan tells about the job beside its motion: what holds it, what more of it would save, and which corners are dear.
+"""What a plan says beside its motion: the active limits, what more of them would save, and the corners where tolerance saves most.
 
-The figures are those of sensitivity/activity.py and sensitivity/prices.py, in words for the terminal and as numbers for `summary.json`.
+The figures come from sensitivity/activity.py and sensitivity/prices.py; here they become words for the terminal and numbers for
+`summary.json`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ HINT = "no more than a hint"
 
 
 def held_by_text(grid: GridHistory) -> str:
-    """What holds the motion, with its share of the time: "jerk.y 41 %, feed 12 %, ..."."""
+    """Active limits with their share of the time: "jerk.y 41 %, feed 12 %, ..."."""
     ranked = grid.ranked()
     told = [(name, share) for name, share in ranked if share >= SHARE_SHOWN]
     rest = sum(share for _, share in ranked) - sum(share for _, share in told)
@@ -35,7 +36,10 @@ def held_by_text(grid: GridHistory) -> str:
 
 
 def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
-    """Rows of the plan's table: what more of the limits saves, what more tolerance saves, and where."""
+    """Rows of the table of a plan: what more of each limit saves, what more tolerance saves, and where.
+
+    cycle_time : of the plan [s]
+    """
     from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
 
     least = SAVED_SHOWN * cycle_time
@@ -74,7 +78,7 @@ def _seconds(prices: PriceList, name: str) -> str:
 
 
 def optimum_summary(grid: GridHistory | None, prices: PriceList | None) -> dict[str, Any]:
-    """`held_by` and `prices` of a plan in numbers; None for what is not known."""
+    """`held_by` and `prices` of a plan in numbers; None where they are not known."""
     return {
         "held_by": dict(grid.ranked()) if grid is not None else None,
         "prices": _price_summary(prices) if prices is not None else None,

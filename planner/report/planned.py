@@ -1,6 +1,6 @@
-"""`planned.ngc`: the program of a plan with its planned feeds as F words, read back before it is given out.
+"""`planned.ngc`: the program of a plan with the planned feeds as F words, read back before it is written.
 
-An NC program stays as it is but for its F words. A plotter file is written anew as an NC program.
+An NC program changes only in its F words. A plotter file is written as a new NC program.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ SAME_PATH = 1e-6
 
 
 class LeftOut(Exception):
-    """There is no re-timed program; the message says why."""
+    """There is no program with planned feeds; the message says why."""
 
 
 def planned_program(plan: Plan) -> bytes:
-    """The plan's program file with an F word where the planned feed changes. Raises LeftOut where that cannot be.
+    """The program file of a plan, with an F word where the planned feed changes.
 
-    The file must still be the one that was planned, and the result must read back as the same motion: a line that
-    would grow too long, for example, gives no file rather than a wrong one.
+    Raises LeftOut if the file has changed since it was planned, or if the result does not read back as the same motion, for example
+    because a line would become too long.
     """
     assert plan.trajectory is not None
     source = Path(plan.program.source)
@@ -62,7 +62,7 @@ def planned_program(plan: Plan) -> bytes:
 
 
 def planned_notes(plan: Plan, text: bytes) -> list[str]:
-    """Where a control is as well off with the program as it was."""
+    """Notes on blocks for which a control gains nothing from the planned feeds."""
     assert plan.trajectory is not None
     if _is_source(plan, text):
         return ["planned.ngc is the program as it was: no block is planned to be slower than its F word"]

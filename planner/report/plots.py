@@ -36,7 +36,7 @@ STYLE: Any = {
 
 
 def write_figures(plan: Plan, directory: Path) -> None:
-    """Write `toolpath.png` and `profiles.png` of a solved plan into `directory`."""
+    """Write `toolpath.png` and `profiles.png` of a solved plan into a directory."""
     with matplotlib.rc_context(STYLE):
         toolpath_figure(plan).savefig(directory / "toolpath.png", bbox_inches="tight")
         profiles_figure(plan).savefig(directory / "profiles.png", bbox_inches="tight")

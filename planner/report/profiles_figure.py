@@ -30,7 +30,7 @@ SHARE_MIN = 0.005  # constraints that limit a smaller share of the time are show
 
 
 def profiles_figure(plan: Plan) -> Figure:
-    """Feed over the limiting constraint, then acceleration and jerk of each moving axis with their limits."""
+    """Feed with the active limit below it, then acceleration and jerk of each moving axis with their limits, over time."""
     trajectory = plan.trajectory
     assert trajectory is not None
     moving = [k for k in range(len(trajectory.axes)) if np.ptp(trajectory.position[:, k]) > 0]

@@ -23,9 +23,12 @@ SUFFIXES = (".parquet", ".csv")
 COLUMNS = ("t", "axis", "direction", "count", "line")
 
 
-def check_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Raise InputError for another suffix than those of pulse files, one of the inputs, or a file that holds no pulses of ours, unless
-    `force` is set."""
+def check_pulse_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+    """Raise InputError if pulses cannot be written to a file.
+
+    That is so for a suffix other than .parquet and .csv, for one of the `inputs`, and for a file that holds no pulses of this package,
+    unless `force` is set.
+    """
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
     check_file(path, inputs, _is_pulse_file, force=force)
@@ -43,7 +46,10 @@ def _is_pulse_file(path: Path) -> bool:
 
 
 def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
-    """Write the pulses with `about` as their metadata. Raises InputError for another suffix or a place that cannot be written."""
+    """Write pulses with `about` as their metadata.
+
+    Raises InputError for a suffix other than .parquet and .csv, and for a place that cannot be written.
+    """
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))

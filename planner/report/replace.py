@@ -53,7 +53,7 @@ _undo: list[Callable[[], object]] = []  # what removes the temporaries of this p
 
 
 def remove_temporaries() -> None:
-    """Remove what is written only in part, before the process ends without unwinding."""
+    """Remove files that are only partly written, before the process ends without unwinding."""
     for step in reversed(_undo):
         with contextlib.suppress(OSError):
             step()
@@ -73,13 +73,14 @@ def _undone(step: Callable[[], object]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False) -> Iterator[Path]:
-    """Give an empty directory to write files into; when the block ends well, they take their places in `directory`.
+    """A context in which files of a run are written into an empty directory; at its end they take their places in `directory`.
 
-    kept  : files of the run before that stay, though the new one lacks them
+    kept  : names of files of the earlier run that stay although the new run lacks them
     force : replace files that no run wrote, too
 
-    One of the files is `summary.json`, with `checksums` of the others. After an exception in the block `directory` is as before.
-    Raises InputError if `directory` cannot be written, or if a file stands in the way that no run wrote.
+    One of the files is `summary.json`, with `checksums` of the others. After an exception `directory` is as before.
+
+    Raises InputError if `directory` cannot be written, or if a file is in the way that no run wrote.
     """
     with contextlib.ExitStack() as stack:
         try:
@@ -114,9 +115,9 @@ def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False
 
 @contextlib.contextmanager
 def replacing_file(path: Path) -> Iterator[Path]:
-    """The same for one file: give the place of a new one to write; when the block ends well, it takes the place of `path`.
+    """The same for one file: yields the place of a new file to write, which takes the place of `path` at the end.
 
-    After an exception `path` is as before. Raises InputError where it cannot be written.
+    After an exception `path` is as before. Raises InputError if it cannot be written.
     """
     new = path.with_name(_hidden_name() + path.suffix)
     try:
@@ -130,7 +131,7 @@ def replacing_file(path: Path) -> Iterator[Path]:
 
 
 def check_output(directory: Path, names: Iterable[str], *, force: bool = False) -> None:
-    """Raise InputError if `directory` cannot be written, or a file of `names` in it was not written by a run and `force` is not set."""
+    """Raise InputError if a directory cannot be written, or if one of `names` in it exists, no run wrote it, and `force` is not set."""
     try:
         if directory.exists() and not directory.is_dir():
             raise InputError("cannot be written: is a file, not a directory", source=str(directory))
@@ -146,9 +147,9 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
 def check_file(
     path: Path, inputs: Iterable[Path], written_by_us: Callable[[Path], bool], *, force: bool = False
 ) -> None:
-    """Raise InputError if `path` is a directory, an input, or there already without being ours and `force` is not set.
+    """Raise InputError if a file cannot be written: a directory, an input, or a file of another kind while `force` is not set.
 
-    written_by_us : whether a file is one of the kind that we write
+    written_by_us : says whether a file is of the kind that is to be written
     """
     try:
         if path.is_dir():
@@ -166,14 +167,14 @@ def check_file(
 
 
 def starts_with(path: Path, line: str) -> bool:
-    """Whether that is the first line of a file."""
+    """Whether the first line of a file is `line`."""
     start = (line + "\n").encode()
     with path.open("rb") as stream:
         return stream.read(len(start)) == start
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Raise InputError if one of the files to write is one of those that are read."""
+    """Raise InputError if one of the files to write is among the files that are read."""
     for output in outputs:
         for given in inputs:
             with contextlib.suppress(OSError):

@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.optimum import held_by_text, price_rows
@@ -27,10 +28,11 @@ NOTES_SHOWN = 8
 
 
 def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
-    """The plan in a dozen lines: times, worst ratio per limit, errors, corners, what holds it, time per stage, how it was solved;
-    then the notes (None: the plan's)."""
-    corner = f" on {plan.corner} corners" if plan.corner else ""
-    title = f"{plan.program.source}: {plan.method}{corner}, machine {plan.machine.name}"
+    """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing time, how it was solved.
+
+    notes : printed below; None for those of the plan
+    """
+    title = f"{plan.program.source}: {plan.method}{_smoothing(plan)}, machine {plan.machine.name}"
     table = _pairs()
     if plan.trajectory is not None:
         time = plan.trajectory.cycle_time
@@ -55,8 +57,18 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
 
 
+def _smoothing(plan: Plan) -> str:
+    """How the path was smoothed, where the method's name does not say it."""
+    if plan.corner in (None, plan.method):
+        return ""
+    return f" on {plan.corner} corners" if plan.geometry == SINGLE_CORNERS else f", geometry {plan.geometry}"
+
+
 def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
-    """A verdict by itself; before it what was asked, name and text."""
+    """A verdict by itself.
+
+    asked : name and text of the lines before it
+    """
     table = _pairs()
     for name, text in (asked or {}).items():
         table.add_row(name, text)
@@ -64,8 +76,8 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
     return _titled(title, table)
 
 
-def corner_table(corners: CornerCheck) -> Table | None:
-    """Eq. 18-20 at every programmed corner, of many those that come closest to them; None without corners."""
+def corners_table(corners: CornerCheck) -> Table | None:
+    """Eq. 18-20 at every programmed corner; of many corners those closest to the limits. None without corners."""
     if not len(corners):
         return None
     closest = np.maximum(corners.speed_ratio, corners.budget_ratio)
@@ -97,7 +109,7 @@ def corner_table(corners: CornerCheck) -> Table | None:
 
 
 def info_table(info: ProgramInfo) -> Group:
-    """What a program holds, then what the reader assumed and every construct that is not supported."""
+    """What a program contains, then what the reader assumed and every construct that is not supported."""
     blocks = sum(info.blocks.values())
     title = f"{info.source}: {info.lines:,} lines, {blocks:,} blocks"
     table = _pairs()
@@ -223,7 +235,7 @@ def _by_quantity(verdict: Verdict) -> dict[str, list]:
 
 
 def ratio_text(value: float) -> str:
-    """A ratio to a limit; near 1 to the sixth digit, the verdict's own rounding."""
+    """A ratio to a limit as text; near 1 with six digits, to which the verdict rounds."""
     if not np.isfinite(value):
         return "-"
     return f"{value:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"

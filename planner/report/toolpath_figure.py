@@ -1,6 +1,6 @@
 """The tool path coloured by feed (viridis), over the programmed path.
 
-A job of an hour has millions of samples: of them one point per pixel that the motion passes is kept.
+An hour of motion has millions of samples; of them one point is kept for each pixel that the motion passes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DASHED = (0, (3, 2))
 
 
 def toolpath_figure(plan: Plan) -> Figure:
-    """The motion coloured by feed over the programmed path; rapids dashed."""
+    """The motion coloured by feed over the programmed path; rapids are dashed."""
     trajectory = plan.trajectory
     assert trajectory is not None
     linear = [k for k, axis in enumerate(trajectory.axes) if axis in LINEAR_AXES]

@@ -46,7 +46,10 @@ TIME_STEP_MIN = 1e-9
 
 
 def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, Any] | None = None) -> None:
-    """Write a trajectory in the format that the suffix names, with `about` as its metadata."""
+    """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its metadata.
+
+    Raises InputError for another suffix.
+    """
     path = Path(path)
     columns, text = _columns(trajectory), json.dumps(about or {}, allow_nan=False)
     match path.suffix:
@@ -62,7 +65,7 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, 
 
 
 def units(axes: tuple[str, ...]) -> dict[str, str]:
-    """Unit of every column."""
+    """The unit of every column, by its name."""
     said = {"t": "s"}
     for axis in axes:
         length = "rad" if axis in ROTARY_AXES else "mm"
@@ -116,12 +119,12 @@ def _write_csv(path: Path, columns: dict[str, Array]) -> None:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TrajectoryFile:
-    """A trajectory as read from a file.
+    """A trajectory as it was read from a file.
 
     trajectory : the samples
-    given      : which columns were delivered, and to how many digits
+    given      : which columns the file had, and with how many digits
     metadata   : what the file says about itself; empty for files made elsewhere
-    notes      : columns the file lacks and how they were filled, one sentence each
+    notes      : columns that the file lacks and how they were filled, one sentence each
     """
 
     trajectory: Trajectory
@@ -131,12 +134,11 @@ class TrajectoryFile:
 
 
 def read_trajectory(path: str | Path) -> TrajectoryFile:
-    """Read a trajectory file, ours or made elsewhere.
+    """Read a trajectory file, written by this package or by another program.
 
-    Required are `t` [s] and one column per axis, at least one. Missing velocities, accelerations and jerks are
-    divided differences of what is there, at rest before the first and after the last sample; `s` is
-    the length of the polyline through the samples, `feed` the speed; `line` and `block` become 0 and -1,
-    "unknown".
+    Required are `t` [s] and at least one column for an axis [mm]. Missing velocities, accelerations and jerks are divided differences
+    of the other columns, at rest before the first sample and after the last; a missing `s` is the length of the polyline through the
+    samples, a missing `feed` the speed on it. Missing `line` and `block` are 0 and -1, "unknown".
 
     Raises InputError naming the file and the column.
     """
@@ -307,11 +309,14 @@ _LEVELS = ("positions", "velocity", "acceleration")
 
 
 def divided_difference(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
-    """Derivative of `order` 1, 2 or 3 of samples at times t (T,), values (T, A), by divided differences.
+    """Derivative of samples by divided differences.
 
-    At sample i: order 1 over i-1, i+1; order 2 over i-1, i, i+1; order 3 over i-1 .. i+2. Before the first
-    and after the last sample the values are held, as a machine at rest does. Exact for polynomials of degree
-    1, 2 and 3 on equal steps.
+    t      : (T,) times [s]
+    values : (T, A) samples
+    order  : 1, 2 or 3
+
+    At sample i: order 1 over i-1, i+1; order 2 over i-1, i, i+1; order 3 over i-1 .. i+2. Before the first sample and after the last
+    the values are held, as a machine at rest holds them. Exact for polynomials of degree 1, 2 and 3 on equal steps.
     """
     after = 1 if order < 3 else 2
     steps = np.diff(t)

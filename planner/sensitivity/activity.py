@@ -1,9 +1,9 @@
-"""Which limit holds the motion where, and for what share of the cycle time.
+"""Which limit is active where, and for what share of the cycle time.
 
-Along a time-optimal motion nearly always some limit is reached: a larger one would be faster there, at once or once the motion has
-adapted to it (what that is worth is the price, sensitivity/prices.py). A limit holds an interval if the ratio to it is within `HELD`
-of 1 on it. Where several do at the same time they share its time equally, so that the shares add up to 1 with "none", the time
-in which no limit is reached, and "rest", the dwells.
+A time-optimal motion is nearly always at some limit: with a larger limit it would be faster there, at once or after the rest of the
+motion has adapted (sensitivity/prices.py says by how much). A limit is active in an interval if its ratio is within `HELD` of 1. If
+several are, they share the time of the interval equally, so that all shares add up to 1 with "none", the time in which no limit is
+reached, and "rest", the dwells.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NONE, REST = "none", "rest"
 
 
 def history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) -> GridHistory:
-    """The profile of a solution that runs in the time of a law, with what holds it. Raises NotSolvedError without a solution."""
+    """The profile of a solution in the time of a law, with the active limits. Raises NotSolvedError if there is no solution."""
     names = (*active_names(problem), NONE, REST)
     none, rest = len(names) - 2, len(names) - 1
     moving = problem.interval

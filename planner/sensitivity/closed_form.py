@@ -21,7 +21,7 @@ from planner.path.samples import PathSamples
 
 
 def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> CornerTable:
-    """Put the planned speeds at all corners next to the closed form. Raises NotSolvedError without a solution."""
+    """The planned speeds at all rounded corners, beside the closed form. Raises NotSolvedError if there is no solution."""
     apex = corner_apexes(samples)
     ratio, which = constraint_ratios(problem, solution)
     before = ratio[apex - 1] > ratio[apex]  # the interval that ends at the apex may be the one that limits it
@@ -30,14 +30,19 @@ def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: Feedr
 
 
 def corner_apexes(samples: PathSamples) -> Array:
-    """(C,) grid points in the middle of the corners."""
+    """(C,) indices of the grid points at the apexes of the corners."""
     middle = (samples.element < 0) & (samples.w0 == 0.5)
     middle[samples.piece[1:] - 1] = False  # they repeat what is said of the interval before
     return np.flatnonzero(middle)
 
 
 def corners_at(samples: PathSamples, apex: Array, feed: FloatArray, limited_by: Array) -> CornerTable:
-    """The table of the corners whose middles are the grid points `apex` (C,), passed at `feed` [mm/s]."""
+    """The table of the corners with their apexes at given grid points.
+
+    apex       : (C,) indices of grid points
+    feed       : (C,) planned speed there [mm/s]
+    limited_by : (C,) name of the constraint that is closest to its limit there
+    """
     path, joint = samples.path, ~samples.element[apex]
     kappa = np.linalg.norm(samples.d2_right[apex], axis=1)
     return CornerTable(

@@ -49,8 +49,12 @@ BUDGETS = ("chord_error", "filter_error")  # bounds in proportion to what the ro
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerPrices:
-    """What the R+1 corners of a path do to the time: size (R+1,) dT/d(d) [s/mm], budget (R+1,) dT/d(ln budget) [s], and
-    segment (M,), the same of the budgets of segments between corners."""
+    """What the R+1 corners of a path do to the cycle time T.
+
+    size    : (R+1,) dT/d(d), d the tangent length [s/mm]
+    budget  : (R+1,) dT/d(ln budget) of the chord and filter errors [s]
+    segment : (M,) the same of the budgets of segments between corners [s]
+    """
 
     path: SmoothPath
     machine: Machine
@@ -59,24 +63,28 @@ class CornerPrices:
     segment: FloatArray
 
     def by_acceleration(self, axis: str) -> float:
-        """dT/d(ln acceleration) of an axis as far as it works through the corners' sizes and budgets [s]."""
+        """dT/d(ln acceleration) of an axis, as far as it acts through sizes and budgets of the corners [s]."""
         machine = more_of(self.machine, f"acceleration.{axis}")(STEP)
         return float(self._change(machine, self.path.toolpath.tolerance).sum()) / STEP
 
     def by_tolerance(self) -> FloatArray:
-        """(R+1,) what each corner adds to dT/d(tolerance of all corners) [s/mm]; the segments between them add `between`."""
+        """(R+1,) contribution of each corner to dT/d(tolerance of all corners) [s/mm]; `between` is that of the segments."""
         before = self.path.toolpath.tolerance
         step = STEP * float(before.mean())
         return self._change(self.machine, before + step) / step
 
     def between(self) -> float:
-        """dT/d(tolerance) by the error bounds of the segments between the corners [s/mm]."""
+        """dT/d(tolerance) through the error bounds of the segments between corners [s/mm]."""
         tolerance = self.path.toolpath.tolerance
         return float((self.segment / np.minimum(tolerance[:-1], tolerance[1:])).sum())
 
     def dearest(self, together: FloatArray) -> DearCorners:
-        """Prices of single corners; of those that share a leg only the `CANDIDATES` that look dearest when the tolerance of all is
-        raised `together`."""
+        """Prices of single corners.
+
+        together : (R+1,) price of each corner when the tolerance of all is raised [s/mm]
+
+        Of corners that share a leg only the `CANDIDATES` with the largest `together` are looked at.
+        """
         toolpath, at = self.path.toolpath, self.path.legs.first
         joint = np.argsort(-np.asarray(_saved(together, self.path.tol)), kind="stable")[:CANDIDATES]
         joint = np.sort(joint[together[joint] < 0.0])
@@ -138,7 +146,10 @@ def corner_prices(
     machine: Machine,
     now: Lagrangian,
 ) -> CornerPrices:
-    """Grow every corner a little (module text, 1.), and sort the multipliers of the error bounds by corner (2.)."""
+    """Grow every corner a little (module text, 1.) and sort the multipliers of the error bounds by corner (2.).
+
+    now : the Lagrangian of the solution on its own grid
+    """
     joints = np.arange(len(path.d))
     corner, leg = samples.element < 0, np.maximum(samples.element, 0)
     growth, total = _growth(path), np.zeros(len(joints))
@@ -184,7 +195,7 @@ def _growth(path: SmoothPath) -> FloatArray:
 
 
 def sums(index: Array, values: FloatArray, count: int) -> FloatArray:
-    """Sums of values by their index."""
+    """(count,) sums of `values` (n,) by their `index` (n,)."""
     return np.bincount(index, values, count).astype(np.float64)
 
 

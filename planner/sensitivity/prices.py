@@ -5,7 +5,7 @@ tolerance works through the path: more of it makes corners larger. So do acceler
 the more of its budget is set aside for the chord error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
 
 Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with the corners, the splines
-and the `limit_scale` that it has (optimal/between_points.py). Where two limits hold together and both must give (equal axes at 45
+and the `limit_scale` that it has (optimal/tighten.py). Where two limits hold together and both must give (equal axes at 45
 degrees) the time has a kink and the price is a slope between the left one and the right one. Prices of the programmed feed and of axis
 velocities are those of more of them: where both are equal, neither alone is worth anything.
 
@@ -66,8 +66,12 @@ CHORDS = 0.2  # what chords between samples may use of the tolerance before what
 
 
 class SitePrices(NamedTuple):
-    """What the tube of splines costs at J sites: `place` along the legs (J,) [mm], dT/d(tolerance) there now (J,) and with
-    `MORE_TOLERANCE` more (J,) [s/mm] (`reshape.tube_prices`)."""
+    """What the corridor of splines costs at J sites.
+
+    place : (J,) along the legs [mm]
+    now   : (J,) dT/d(tolerance) there [s/mm]
+    wider : (J,) the same with `MORE_TOLERANCE` more [s/mm]
+    """
 
     place: FloatArray
     now: FloatArray
@@ -81,9 +85,11 @@ def price_list(
     machine: Machine,
     by_site: SitePrices | None = None,
 ) -> PriceList:
-    """The prices of a solution. Raises ValueError if its solver gives no multipliers.
+    """The prices of a solution.
 
-    by_site : for splines
+    by_site : what the corridor of splines costs; None for single corners
+
+    Raises ValueError if the solver of the solution gives no multipliers.
     """
     now = lagrangian(problem, solution)
     prices = solution.prices
@@ -138,23 +144,26 @@ def price_list(
 
 
 class Saving(NamedTuple):
-    """What is saved, between a least and a most [s]."""
+    """Time saved, between a least and a most [s]."""
 
     least: float
     most: float
 
     @property
     def middle(self) -> float:
+        """The middle of the range [s]."""
         return 0.5 * (self.least + self.most)
 
     def widened(self, by: float) -> Saving:
+        """The range with `by` [s] more on both sides."""
         return Saving(self.least - by, self.most + by)
 
     def below(self, bound: float) -> Saving:
+        """The range cut off at a bound [s]."""
         return Saving(min(self.least, bound), min(self.most, bound))
 
     def vague(self, cycle_time: float) -> bool:
-        """True if its middle may be off by more than a number that is told."""
+        """True if the middle may be off by too much to be told as a number."""
         return 0.5 * (self.most - self.least) > max(HINT * abs(self.middle), HINT_LEAST * cycle_time)
 
 

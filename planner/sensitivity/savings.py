@@ -50,7 +50,12 @@ SLOPE_STEP = 1e-4  # for the thinned problem's own price [-]: as in sensitivity/
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Change:
-    """A share more of something: the machine that has it, the factor on the programmed feed, what is added to the tolerance [mm]."""
+    """More of something, as functions of the share that is added [-].
+
+    machine   : share -> the machine with so much more
+    feed      : share -> factor on the programmed feed [-]
+    tolerance : share -> what is added to the tolerance [mm]
+    """
 
     machine: Callable[[float], Machine]
     feed: Callable[[float], float] = lambda share: 1.0
@@ -59,10 +64,10 @@ class Change:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Thinned:
-    """A solved part of a job's grid, to try changes on.
+    """A solved part of the grid of a job, to try changes on.
 
     samples, scale : the grid, and its limit_scale
-    sampled        : True if it is windows of the path only
+    sampled        : True if it consists of windows of the path only
     """
 
     samples: PathSamples
@@ -73,11 +78,15 @@ class Thinned:
 
     @property
     def rounds_again(self) -> bool:
-        """True if changes move the path too, False if it is a spline that stays."""
+        """True if changes move the path too; False for splines, which stay."""
         return rounds_again(self.samples.path)
 
     def saves(self, change: Change, share: float, price: float) -> float | None:
-        """Seconds that the whole job saves, of which the price is the slope dT/d(share); None where that is not found."""
+        """Time that a change saves for the whole job [s]; None if it is not found.
+
+        share : how much more it is, as a fraction [-]
+        price : dT/d(share) of the whole job [s]
+        """
         try:
             near = lagrangian(_problem(*self._changed(change, SLOPE_STEP)), self.solution).value.sum()
             samples, machine, scale = self._changed(change, share)
@@ -127,7 +136,7 @@ def thinned(
     machine: Machine,
     rows: int,
 ) -> Thinned | None:
-    """The thinned grid of a solution, small enough for so many changes, solved without any; None where that has no solution."""
+    """The thinned grid of a solution, small enough for `rows` changes, solved without any of them; None if it has no solution."""
     again = rounds_again(samples.path)
     kept = _kept(samples, solution, machine, elements=again)
     piece, kept, sampled = _windows(samples.piece, kept, int(max(POINTS, len(samples) / 4) / (rows + 1)))
@@ -147,7 +156,7 @@ def thinned(
 
 
 def more_of(machine: Machine, name: str) -> Callable[[float], Machine]:
-    """The machine with a share more of an axis limit."""
+    """A function that makes the machine with a given share more of the axis limit `name`."""
     quantity, _, axis = name.partition(".")
     limits = machine.axes[axis]
 
@@ -159,7 +168,7 @@ def more_of(machine: Machine, name: str) -> Callable[[float], Machine]:
 
 
 def rounds_again(path: SmoothPath) -> bool:
-    """True for paths whose corners can be rounded again: all that have no splines."""
+    """True for paths whose corners can be rounded again: those without splines."""
     return isinstance(path, SmoothPath) and not len(path.spline)
 
 

@@ -23,11 +23,11 @@ def run(*arguments: object) -> Result:
     ("arguments", "said"),
     [
         (["--method", "stop", "--corner", "auto"], "corner = auto: method stop does not use it"),
-        (["--method", "bezier", "--corner", "bezier"], "it is for optimal and toppra"),
+        (["--method", "bezier", "--corner", "bezier"], "it is for optimal and second-order"),
         (["--solver", "reachability"], "solver = reachability: method optimal does not use it"),
         (["--method", "bezier", "--rounds", "0"], "rounds = 0: method bezier does not use it"),
         (["--corner", "bezier", "--rounds", "2"], "corner bezier has none"),
-        (["--format", "parquet"], "give one with -o DIR"),
+        (["--format", "parquet"], "name one with -o DIR"),
     ],
 )
 def test_options_that_would_be_ignored_are_refused(tmp_path: Path, arguments: list[str], said: str) -> None:

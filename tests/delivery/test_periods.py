@@ -138,7 +138,7 @@ def coarse(dt: float, eps: float):
 
 
 @pytest.mark.parametrize(("dt", "eps"), PERIODS)
-@pytest.mark.parametrize("method", ["stop", "kinematic", "bezier", "fir", "fir-spline", "toppra"])
+@pytest.mark.parametrize("method", ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order"])
 def test_every_period_keeps_the_tolerance(method, dt, eps):
     made = plan(LAW_JOB, coarse(dt, eps), method=method).require()
     assert made.verdict.passed, made.verdict.faults
@@ -158,7 +158,7 @@ def test_stops_wait_less_than_a_period():
 
 
 def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged():
-    made = plan(LAW_JOB, coarse(0.02, 5e-3), method="toppra")
+    made = plan(LAW_JOB, coarse(0.02, 5e-3), method="second-order")
     assert any(note.startswith("samples 20 ms apart") for note in made.notes)
     np.testing.assert_array_equal(made.toolpath.tolerance, 5e-3)
     assert (made.toolpath.joint[1:-1] != Joint.STOP).all()
@@ -167,7 +167,7 @@ def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged
 def test_without_it_chords_leave_the_tolerance(monkeypatch):
     """What the law would say of a planner that forgot its period."""
     monkeypatch.setattr(jobs, "PERIOD_ROUNDS", 0)
-    assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="toppra").verdict.passed
+    assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="second-order").verdict.passed
     monkeypatch.setattr(jobs, "settled", lambda motion, *given: motion)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="stop").verdict.passed
 

@@ -197,7 +197,7 @@ def test_a_window_behind_motion_that_fails_gets_another_end(monkeypatch, failure
     def failing(window, behind, tol, iterations):
         if behind is not None and len(failed) < failures:
             failed.append(len(window.asked))
-            return None, 0
+            return None, 0, 1
         return solve(window, behind, tol, iterations)
 
     monkeypatch.setattr(ScaledWindow, "solve", failing)
@@ -214,7 +214,7 @@ def test_a_window_behind_motion_that_never_converges_ends_in_the_stop_before(mon
     def failing(window, behind, tol, iterations):
         if behind is not None and len(rest) < 3:
             rest.append(len(behind.x))
-            return None, 0
+            return None, 0, 1
         return solve(window, behind, tol, iterations)
 
     monkeypatch.setattr(ScaledWindow, "solve", failing)

@@ -16,7 +16,7 @@ from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.reachability import Reachability, _largest
+from planner.feedrate.reachability import Interval, Reachability, _largest, controllable_sets, rows_of
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 
 JOBS = problems.all_jobs()
@@ -100,9 +100,18 @@ def test_controllable_sets_are_those_of_a_linear_programme(seed: int) -> None:
     for i in range(last - 1, -1, -1):
         expected = controllable_by_lp(problem, i, target)
         h, share = problem.s[i + 1] - problem.s[i], 1.0 - problem.margin[i]
-        args = (problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit, share, target)
-        target = _largest(i, problem.feed_sq_max[i], h, *args)
+        target = _largest(rows_of(problem), Interval(i, h, share, target), problem.feed_sq_max[i])
         assert target == pytest.approx(expected, rel=1e-8)
+
+
+def test_controllable_sets_of_a_line_are_braking_distances() -> None:
+    """K = x_end + 2 a (L - s) below the feed; the profile follows it as soon as it gets there."""
+    problem = line(10.0, 101, feed_sq_max=900.0, acceleration=100.0, feed_sq_end=np.array([400.0]))
+    sets = controllable_sets(problem)
+    np.testing.assert_allclose(sets, np.minimum(900.0, 400.0 + 2.0 * 100.0 * (10.0 - problem.s)), rtol=1e-12)
+    assert (plan(problem).feed_sq <= sets * (1.0 + 1e-12)).all()
+    too_fast = dataclasses.replace(problem, feed_sq_end=np.array([1000.0]))
+    assert np.isnan(controllable_sets(too_fast)).all()
 
 
 def loosened(problem: FeedrateProblem) -> dict[str, FeedrateProblem]:

@@ -14,6 +14,7 @@ from benchmarks.random_paths import random_path
 from planner import plan
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.base.names import METHODS
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
@@ -165,14 +166,16 @@ def test_a_solver_of_ones_own_is_taken(tmp_path):
 
 
 def test_names():
-    assert list(THIRD_ORDER) == ["own", "ipopt", "fatrop", "sequential-convex"]
-    assert list(SECOND_ORDER) == ["reachability", "toppra"]
+    assert tuple(THIRD_ORDER) == METHODS["optimal"].solvers
+    assert tuple(SECOND_ORDER) == METHODS["second-order"].solvers
     assert third_order_solver("own") == JerkLimited()
     with pytest.raises(InputError, match=r"no solver 'snopt'.*own, ipopt, fatrop, sequential-convex"):
         third_order_solver("snopt")
     with pytest.raises(InputError, match=r"toppra: method optimal does not use it; there are own, ipopt"):
         third_order_solver("toppra")
-    with pytest.raises(InputError, match=r"ipopt: method toppra does not use it; there are reachability"):
+    with pytest.raises(
+        InputError, match=r"ipopt: method second-order does not use it; there are reachability"
+    ):
         second_order_solver("ipopt")
 
 

@@ -11,7 +11,7 @@ from whole_plans import solve
 
 from benchmarks import problems
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.reachability import Reachability
+from planner.feedrate.reachability import Reachability, controllable_sets
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.nc.reader import read_program
@@ -51,6 +51,17 @@ def keeps_limits(problem: FeedrateProblem, solution: FeedrateSolution) -> None:
     assert ratio.max() <= 1.0 + RATIO
     free = problem.interval & (ratio < 1.0 - 1e-6)
     assert not (free[:-1] & free[1:]).any()
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 3))
+def test_controllable_sets(seed: int) -> None:
+    """Their upper ends; from rest to rest the lower ones are 0."""
+    problem = random_problem(seed)
+    own, other = controllable_sets(problem), ToppraSolver().controllable_sets(problem)
+    assert np.isfinite(own).all()
+    np.testing.assert_allclose(other[:, 1], own, rtol=1e-6, atol=1e-9 * own.max())
+    if not problem.feed_sq_end.any():
+        assert other[:, 0].max() <= 1e-9 * own.max()
 
 
 @pytest.mark.parametrize("part", range(10))

@@ -135,7 +135,7 @@ def mixed(blocks: int) -> str:
 
 @pytest.mark.parametrize(
     "method",
-    ["optimal", "toppra", "bezier", "kinematic", "fir", "fir-spline", "stop"],
+    ["optimal", "second-order", "bezier", "kinematic", "fir", "fir-spline", "stop"],
 )
 def test_every_method_names_the_block_it_is_at(method: str) -> None:
     program = parse_program(mixed(16), MACHINE)

@@ -13,13 +13,13 @@ from scipy.spatial import cKDTree
 from benchmarks import problems
 from planner.job import job as job_module
 from planner.machine import Fir
-from planner.methods import optimal as optimal_module
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.registry import plan
 from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
+from planner.optimal import loop as loop_module
 
 FINE = 2e-4  # [s] of the convolution
 STEP = 2e-3  # [mm] between points of the path
@@ -30,8 +30,8 @@ JOB = parse_program(
 )
 CORNER = problems.polyline([[0, 0], [5, 0], [5, 5]], source="corner")
 LENGTHS = [(0.01, 0.004), (0.02, 0.013), (0.05, 0.03)]
-BEZIER = {"optimal": "bezier", "toppra": "bezier"}  # on splines below
-METHODS = ["stop", "kinematic", "bezier", "fir", "fir-spline", "toppra", "optimal"]
+BEZIER = {"optimal": "bezier", "second-order": "bezier"}  # on splines below
+METHODS = ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order", "optimal"]
 
 
 def machine(lengths, **more):
@@ -132,9 +132,7 @@ def test_a_shorter_filter_costs_less():
 @pytest.mark.parametrize("method", ["stop", "optimal"])
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
-    monkeypatch.setattr(
-        optimal_module, "within_filters", lambda planned, motion, solve, real: (planned, motion)
-    )
+    monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, order, job: (planned, motion))
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed
     assert all("after the filters" in fault for fault in made.verdict.faults)
@@ -153,7 +151,7 @@ def steady_feed(made):
 def test_an_arc_is_run_as_fast_as_the_filter_error_allows():
     """kappa v^2 (dt^2/8 + sum T^2/24) is the whole tolerance in the steady part, of which the filters' part is measured behind them."""
     limits = machine((0.03, 0.05), velocity=1000.0)
-    made = plan(CIRCLE, limits, method="toppra", corner="bezier")
+    made = plan(CIRCLE, limits, method="second-order", corner="bezier")
     rate = limits.dt**2 / 8 + (0.03**2 + 0.05**2) / 24
     assert steady_feed(made) == pytest.approx(np.sqrt(0.05 / rate * 5.0), rel=2e-3)
     assert made.verdict.after_filters.contour_error_mm == pytest.approx(0.05, rel=2e-2)
@@ -161,5 +159,5 @@ def test_an_arc_is_run_as_fast_as_the_filter_error_allows():
 
 def test_an_arc_turns_by_no_more_than_the_phase_lag():
     fir = Fir(time_constants=(0.02, 0.01), phase_lag_max=3.0)
-    made = plan(CIRCLE, problems.machine(fir=fir), method="toppra", corner="bezier")
+    made = plan(CIRCLE, problems.machine(fir=fir), method="second-order", corner="bezier")
     assert steady_feed(made) == pytest.approx(2 * 5.0 * np.deg2rad(3.0) / 0.03, rel=2e-3)

@@ -46,7 +46,7 @@ def planned(job: str, method: str) -> planner.Plan:
     return planner.plan(JOBS[job], MACHINE, method=method)
 
 
-METHODS = ("optimal", "toppra", "bezier", "kinematic", "fir", "fir-spline", "stop")
+METHODS = ("optimal", "second-order", "bezier", "kinematic", "fir", "fir-spline", "stop")
 
 
 @pytest.mark.parametrize("job", JOBS)
@@ -99,7 +99,7 @@ def by_hand(plan: planner.Plan, machine: Machine) -> tuple[list[float], list[flo
     return speed, budget, gain
 
 
-@pytest.mark.parametrize("method", ["optimal", "toppra", "kinematic", "fir"])
+@pytest.mark.parametrize("method", ["optimal", "second-order", "kinematic", "fir"])
 @pytest.mark.parametrize(
     ("job", "gains"), [("pentagon", (1.3, 1.75)), ("zigzag", (1.4, 1.7)), ("five points", (0.9, 1.75))]
 )
@@ -125,11 +125,11 @@ def laws_broken(corners: CornerCheck) -> tuple[bool, bool]:
 
 def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypatch):
     machine = problems.machine(normal_acceleration=300.0)
-    kept = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
+    kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert kept.verdict.passed, kept.verdict.faults
     assert 0.99 < kept.corners.worst_speed_ratio <= 1 + RATIO_ROUNDING
     monkeypatch.setattr(bounds, "normal_acceleration", lambda kappa, limit: np.full(len(kappa), np.inf))
-    free = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
+    free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[0]
     assert any(fault.startswith("eq. 19") for fault in free.verdict.faults)
@@ -137,22 +137,22 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
 
 def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch):
     machine = problems.machine(dt=0.008, tolerance=0.01, velocity=1000.0)
-    kept = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
+    kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not any(laws_broken(kept.corners))
     assert kept.corners.worst_budget_ratio > 0.9
     monkeypatch.setattr(bounds, "chord_error", lambda kappa, tol, dt: np.full(len(kappa), np.inf))
-    repaired = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
+    repaired = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not any(
         laws_broken(repaired.corners)
     )  # planned again with less of the tolerance (delivery/periods.py)
     monkeypatch.setattr(job, "PERIOD_ROUNDS", 0)
-    free = planner.plan(JOBS["pentagon"], machine, method="toppra", corner="bezier")
+    free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[1]
     assert any(fault.startswith("eq. 18") for fault in free.verdict.faults)
 
 
-@pytest.mark.parametrize("method", ["optimal", "toppra", "kinematic", "fir"])
+@pytest.mark.parametrize("method", ["optimal", "second-order", "kinematic", "fir"])
 def test_a_plan_for_faster_axes_breaks_equation_19(method):
     """All of a plan's corners, planned with the axes' acceleration limits out of the way."""
     plan = planner.plan(JOBS["zigzag"], problems.machine(acceleration=8000.0, jerk=1.6e6), method=method)

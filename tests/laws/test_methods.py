@@ -24,7 +24,7 @@ PLAIN = {"fir-plain", "fir-spline-plain"}
 # `tube` takes seconds per corner: tests/methods/test_tube.py has its laws.
 HOLDING = tuple(name for name in METHODS if name not in PLAIN | {"tube"})
 # Methods that choose a full stop where it is faster: never slower than stopping everywhere, to the accuracy of their grids.
-NOT_SLOWER = {"optimal": 2e-3, "bezier": 1e-6, "kinematic": 1e-6, "toppra": 1e-6, "stop": 1e-9}
+NOT_SLOWER = {"optimal": 2e-3, "bezier": 1e-6, "kinematic": 1e-6, "second-order": 1e-6, "stop": 1e-9}
 seeds = st.integers(0, 10**6)
 UNITS = {"x": 1.0, "y": 1.0, "z": 1.0, "a": 180.0 / np.pi}  # a machine file's rotary axes are in degrees
 
@@ -73,7 +73,7 @@ def machine(seed: int = 0, **more) -> Machine:
 def test_tolerance_and_limits_hold(method, seed, axes):
     made = plan(random_job(seed, axes), machine(seed), method=method)
     assert made.require().verdict.passed, made.verdict.faults
-    free = {"jerk"} if method == "toppra" else set()
+    free = {"jerk"} if method == "second-order" else set()
     for name, check in made.verdict.limits.items():
         assert check.limited == (name.partition(".")[0] not in free)
         assert check.ratio <= 1 + RATIO_ROUNDING or not check.limited
@@ -155,9 +155,9 @@ def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed
 @given(theta=corners, axes=st.integers(2, 4), seed=seeds)
 @settings(max_examples=15)
 def test_the_optimum_misses_the_vertex_by_the_share_of_its_rounding(theta, axes, seed):
-    """`optimal` and `toppra` stay on the rounded path: eps_ap of eq. (20) at the apex, and no more than the bow of a period beyond."""
+    """`optimal` and `second-order` stay on the rounded path: eps_ap of eq. (20) at the apex, plus at most the bow of a period."""
     limits = machine(seed, dt=1e-4)
-    for method in ("optimal", "toppra"):
+    for method in ("optimal", "second-order"):
         made = plan(corner_job(theta, axes, seed), limits, method=method, corner="bezier")
         assume(len(made.rounded))
         share, bow = made.rounded.tol_ap[0], 1e4 * limits.dt**2 / 8

@@ -25,7 +25,7 @@ def test_jobs_are_verified_with_their_jerk_limited(name, corner):
     plan = OptimalMethod(corner=corner).plan(JOBS[name], MACHINE)
     assert plan.verdict.passed, plan.verdict.faults
     assert all(check.limited for check in plan.verdict.limits.values())
-    bound = planner.plan(JOBS[name], MACHINE, method="toppra", corner=corner)
+    bound = planner.plan(JOBS[name], MACHINE, method="second-order", corner=corner)
     assert bound.trajectory.cycle_time * (1 - 2e-3) <= plan.trajectory.cycle_time <= plan.stop_time
     assert plan.rounded.worst_ratio() <= 1 + 1e-9
     assert plan.corners.held == len(plan.corners) > 0

@@ -24,7 +24,7 @@ def pentagon():
     return problems.all_jobs()["pentagon"]
 
 
-@pytest.mark.parametrize("method", ["optimal", "toppra"])
+@pytest.mark.parametrize("method", ["optimal", "second-order"])
 def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
     """Without shaping it rings with 0.8 mm; method fir, which chooses its filters for the mode, takes 1.0419 s."""
     made = plan(pentagon, SHAKEN, method=method, shaped=True)
@@ -59,14 +59,14 @@ def test_arcs_stops_and_dwells_with_two_modes_and_filters():
         modes=(Mode(frequency=25.0, damping=0.02), Mode(frequency=60.0)),
         fir=Fir(time_constants=(0.01, 0.004)),
     )
-    made = plan(parse_program(PROGRAM, machine), machine, method="toppra", corner="bezier", shaped=True)
+    made = plan(parse_program(PROGRAM, machine), machine, method="second-order", corner="bezier", shaped=True)
     assert made.verdict.passed, made.verdict.faults
     assert left(made) < LEFT
 
 
 def test_an_exact_stop_stands_still():
     machine = problems.machine(modes=(Mode(frequency=25.0),))
-    made = plan(parse_program(PROGRAM, machine), machine, method="toppra", corner="bezier", shaped=True)
+    made = plan(parse_program(PROGRAM, machine), machine, method="second-order", corner="bezier", shaped=True)
     corner = np.linalg.norm(made.trajectory.position - [4.0, 12.0, 0.0], axis=1)
     assert ((corner < 1e-6).sum() - 1) * machine.dt >= 0.05 - 2 * machine.dt
     assert made.verdict.passed

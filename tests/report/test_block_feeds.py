@@ -46,7 +46,7 @@ def test_blocks_from_rest_to_rest_take_the_closed_form_s_time() -> None:
     assert got.sum() + made.toolpath.dwell.sum() == pytest.approx(made.trajectory.cycle_time, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["toppra", "stop"])
+@pytest.mark.parametrize("method", ["second-order", "stop"])
 def test_which_blocks_have_a_feed(method: str) -> None:
     made = plan(parse_program(PROGRAM, MACHINE), MACHINE, method=method)
     program, path = made.program, made.toolpath
@@ -63,7 +63,7 @@ def feeds_of(made: Plan) -> np.ndarray:
 
 
 def test_no_block_is_held_below_its_planned_feed() -> None:
-    made = plan(parse_program(PROGRAM, MACHINE), MACHINE, method="toppra")
+    made = plan(parse_program(PROGRAM, MACHINE), MACHINE, method="second-order")
     feeds, got = feeds_of(made), made.trajectory
     cut = np.isfinite(feeds[got.block])
     assert (feeds[got.block][cut] >= got.feed[cut] * (1.0 - 1e-9)).all()

@@ -10,7 +10,7 @@ from rich.console import Console, RenderableType
 from planner.machine import builtin_machines, load_machine
 from planner.nc.faults import Fault
 from planner.nc.info import describe
-from planner.report.tables import corner_table, info_table, machines_table, plan_table
+from planner.report.tables import corners_table, info_table, machines_table, plan_table
 from planner.verify import CornerCheck
 
 
@@ -47,14 +47,14 @@ def test_unsolved_plan() -> None:
 
 
 def test_corners() -> None:
-    said = text(corner_table(make_corners()))
+    said = text(corners_table(make_corners()))
     assert [line.split()[:3] for line in said.splitlines()[-3:]] == [
         ["3", "90.00", "14.000"],
         ["4", "90.00", "13.000"],
         ["5", "90.00", "0.000"],
     ]
     assert "1.400" in said  # over eq. 20
-    assert corner_table(make_corners(turns=False)) is None
+    assert corners_table(make_corners(turns=False)) is None
     assert "turns nowhere" in text(plan_table(make_plan(turns=False)))
 
 
@@ -71,14 +71,14 @@ def test_a_corner_that_was_not_looked_at_is_listed() -> None:
     ):
         columns[name][1] = np.nan
     corners = CornerCheck(**columns)
-    assert "not looked at" in text(corner_table(corners))
+    assert "not looked at" in text(corners_table(corners))
     assert corners.sentence().endswith("1 could not be looked at")
     assert (corners.count, corners.not_looked_at, corners.held) == (2, 1, 2)
 
 
 def test_of_many_corners_those_closest_to_the_law_are_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planner.report.tables.CORNERS_SHOWN", 2)
-    said = text(corner_table(make_corners()))
+    said = text(corners_table(make_corners()))
     assert "the 2 closest to eq. 18-19 of 3 corners" in said
     assert [line.split()[0] for line in said.splitlines()[-2:]] == ["3", "4"]
 

@@ -1,44 +1,78 @@
-"""The interior-point step behind `JerkLimited` (solver.py), in numba: weigh, factorise, step. All in scaled units.
+"""The interior-point method behind `JerkLimited` (solver.py), in numba: model, weigh, factorise, step. All in scaled units.
+
+It is a primal-dual method for optimal control whose every step is a linear-quadratic problem, solved by a Riccati recursion
+over the grid (Rao, Wright & Rawlings 1998, J. Optim. Theory Appl. 99:723; as a library HPIPM, Frison & Diehl 2020, IFAC-PapersOnLine
+53:6563), here with two states and one control written out, and with the end fixed too (riccati.py).
 
 Each row of rows.py has slacks s and multipliers lam. Eliminating their Newton steps adds lam/s times the row's square to the
-Hessian; what remains is the linear-quadratic problem of riccati.py. The Hessian is that of the Lagrangian; where it is not
-convex, the curvature of rows and dynamics counts less, or not at all. Steps are predictor-corrector (Mehrotra 1992): the step
+Hessian; what remains is the linear-quadratic problem. The Hessian is that of the Lagrangian; where it is not convex, only a fraction
+of the curvature of rows and dynamics counts, or none. Steps are predictor-corrector (Mehrotra 1992, SIAM J. Optim. 2:575): the step
 without a barrier says how far the barrier may fall, and its second-order terms are made up for.
 
 The barrier counts by time: an interval's rows share mu times its duration h, as if the barrier were integrated along the motion. So a
 ramp of a nanometre beside millimetres at constant speed has no more than its part in it, and finer grids do not change the problem.
+
+What every number is set to, and why: settings.py.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.feedrate.jerk.riccati import offsets, riccati, slope
-from planner.feedrate.jerk.rows import empty_model, kinematics, linearise
+from planner.feedrate.jerk.rows import Profile, at_profile, empty_model, kinematics, linearise
 
-HESSIAN_MIN = 1e-12  # keeps the reduced Hessian positive where no row is near; far below any row's weight [-]
-SLACK_MIN = 0.3  # of the first slacks [-]; smaller ones block the way of a start that violates other rows
-START_GAP = 0.3  # the first barrier: complementarity of every row per time [-]
-RESIDUAL = 1e-6  # of the rows at the end, share of the limits [-]
-DEFECT = 1e-9  # of the kinematics at the end, share of the largest feed [-]
-GAP_FLOOR = 0.1  # the barrier stays above this share of the gap asked for [-]
-STEP_TO_BOUNDARY = 0.995  # share of the way to the nearest bound that a step may take [-]
-DOMAIN_EDGE = 0.98  # share of the kinematics' domain that a step may reach; the rows ask for less [-]
-STEP_MIN = 1e-3  # shorter steps are not shortened any further [-]
-PREDICTED_MIN = 0.1  # a shorter predictor step says nothing about second-order terms [-]
-SIGMA_MAX = 0.9  # the barrier falls by at least this factor ... [-]
-STALL_STEP = 0.01  # steps shorter than this ...
-STALL_ROUNDS = 10  # ... so often in a row lead nowhere
-CHANGE_MAX = 0.4  # while some x changes by more than this share, the barrier stays; far from the solution it must not fall first [-]
-SHARE_MIN = 0.05  # a smaller share of the curvature is none [-]
-FEED_SQ_SHRINK = 0.9  # largest share of x that one step may take away [-]
+# How `minimise_time` ended.
+SOLVED, OUT_OF_ITERATIONS, NOT_CONVEX, STALLED = range(4)
+
+
+class Minimum(NamedTuple):
+    """What `minimise_time` found for a window of N intervals, and how good it is.
+
+    profile    : the motion
+    status     : `SOLVED`, `OUT_OF_ITERATIONS`: what was reached by then; `NOT_CONVEX`, `STALLED`: no use
+    iterations : used
+    gap        : complementarity, as a fraction of the time
+    residual   : largest of the rows, as a fraction of the limits
+    defect     : largest of the dynamics, as a fraction of the largest feed
+    lam        : (N, M) multipliers of the rows' upper sides, then of their lower sides
+    pi         : (N,) of the dynamics of x
+    """
+
+    profile: Profile
+    status: int
+    iterations: int
+    gap: float
+    residual: float
+    defect: float
+    lam: FloatArray
+    pi: FloatArray
+
+
+class Step(NamedTuple):
+    """A Newton step of an `Iterate`.
+
+    z     : (N+1, 3) of x, u and p
+    slack : (N, M)
+    lam   : (N, M)
+    pi    : (N,)
+    """
+
+    z: FloatArray
+    slack: FloatArray
+    lam: FloatArray
+    pi: FloatArray
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def weigh(model, slack, lam):
+def weigh(model, at, settings):
     """Add the rows' weights to the model's convex Hessian and gradient, without a barrier; returns their largest residual."""
     gradient, rows, values, hessian = model.gradient, model.rows, model.values, model.convex
+    slack, lam, least = at.slack, at.lam, settings.hessian_min
     n, count = values.shape
     lower = slack.shape[1] - count
     weights, pushes = np.empty(count), np.empty(count)
@@ -55,7 +89,7 @@ def weigh(model, slack, lam):
             weights[r] += w
             pushes[r] -= w * residual
             worst = max(worst, abs(residual))
-        hxx, hxu, hxp, huu, hup, hpp = 0.0, 0.0, 0.0, HESSIAN_MIN, 0.0, HESSIAN_MIN
+        hxx, hxu, hxp, huu, hup, hpp = 0.0, 0.0, 0.0, least, 0.0, least
         gx, gu, gp = 0.0, 0.0, 0.0
         for r in range(count):
             a, b, c, w = rows[i, 0, r], rows[i, 1, r], rows[i, 2, r], weights[r]
@@ -81,21 +115,22 @@ def weigh(model, slack, lam):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def correct(model, h, slack, mu, bending, dslack, dlam):
+def correct(model, at, mu, second_order, step):
     """Second half of a predictor-corrector step: add the barrier mu h to the gradient, less the predicted steps' second-order terms
-    dslack dlam, which replace dlam."""
-    gradient, rows = model.gradient, model.rows
+    dslack dlam, which replace the step's lam (zeros if `second_order` is 0 instead of 1)."""
+    gradient, rows, h = model.gradient, model.rows, model.duration
+    slack, dslack, dlam = at.slack, step.slack, step.lam
     n, _, count = rows.shape
     lower = slack.shape[1] - count
     pushes = np.empty(count)
     for i in range(n):
         asked = mu * h[i]
         for r in range(count):
-            bent = bending * dslack[i, r] * dlam[i, r]
+            bent = second_order * dslack[i, r] * dlam[i, r]
             dlam[i, r] = bent
             pushes[r] = (asked - bent) / slack[i, r]
         for r in range(lower):
-            bent = bending * dslack[i, count + r] * dlam[i, count + r]
+            bent = second_order * dslack[i, count + r] * dlam[i, count + r]
             dlam[i, count + r] = bent
             pushes[r] -= (asked - bent) / slack[i, count + r]
         gx, gu, gp = 0.0, 0.0, 0.0
@@ -109,19 +144,22 @@ def correct(model, h, slack, mu, bending, dslack, dlam):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def direction(model, h, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi):
-    """Newton step (dx, du, dp) in dz (N+1, 3), of slacks, multipliers and costates.
+def direction(model, fraction, gains, at, mu, step, settings):
+    """Fill the Newton step from an iterate, with the feedback `gains`; on entry step.lam holds the second-order terms to make up for.
 
-    dlam : (N, M) in, the second-order terms to make up for; out, the step
+    fraction : of the curvature of rows and dynamics that counts [-]
 
-    Returns the two step lengths and the complementarity sum(slack * lam) after them.
+    Returns the lengths that profile and slacks, and that multipliers can go, and the complementarity sum(slack * lam) after them.
     """
     dynamics, rows, values, costate = model.dynamics, model.rows, model.values, model.costate
+    h, x, slack, lam, pi = model.duration, at.x, at.slack, at.lam, at.pi
+    dz, dslack, dlam, dpi = step.z, step.slack, step.lam, step.pi
+    shrink, to_boundary = settings.feed_sq_shrink, settings.to_boundary
     n, count = values.shape
     lower = slack.shape[1] - count
     after = np.empty(count)
     primal, nearest, nearest_dual = 1.0, 0.0, 0.0
-    mixed, mixed_dual, product, now = 0.0, 0.0, 0.0, 0.0
+    now, mixed, mixed_dual, product = 0.0, 0.0, 0.0, 0.0  # sums of s lam, ds lam, s dlam, ds dlam
     dz[0, 0] = dz[0, 1] = 0.0
     for i in range(n):
         asked = mu * h[i]
@@ -129,45 +167,41 @@ def direction(model, h, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, d
         dp = gains[i, 0] * dx + gains[i, 1] * du + gains[i, 2]
         dz[i, 2] = dp
         if i < n - 1:  # the multipliers of the last two intervals come last
-            step = dynamics[i, 0] * dx + dynamics[i, 1] * du + dynamics[i, 2] * dp + dynamics[i, 3]
-            dz[i + 1, 0], dz[i + 1, 1] = step, du + dp
-            ahead = gains[i + 1, 3] * step + gains[i + 1, 4] * (du + dp) + gains[i + 1, 7]
+            next_dx = dynamics[i, 0] * dx + dynamics[i, 1] * du + dynamics[i, 2] * dp + dynamics[i, 3]
+            dz[i + 1, 0], dz[i + 1, 1] = next_dx, du + dp
+            ahead = gains[i + 1, 3] * next_dx + gains[i + 1, 4] * (du + dp) + gains[i + 1, 7]
             dpi[i] = costate[i, 0] * (ahead + costate[i, 1]) - pi[i]
-            if step < -FEED_SQ_SHRINK * x[i + 1]:
-                primal = min(primal, -FEED_SQ_SHRINK * x[i + 1] / step)
+            if next_dx < -shrink * x[i + 1]:
+                primal = min(primal, -shrink * x[i + 1] / next_dx)
         for r in range(count):
             after[r] = values[i, r] + rows[i, 0, r] * dx + rows[i, 1, r] * du + rows[i, 2, r] * dp
         for r in range(count):
             s, y = slack[i, r], lam[i, r]
             move = 1.0 - after[r] - s
-            share_s = move / s
-            push = (asked - dlam[i, r]) / s - y * (1.0 + share_s)
+            relative = move / s
+            push = (asked - dlam[i, r]) / s - y * (1.0 + relative)
             dslack[i, r], dlam[i, r] = move, push
-            nearest, nearest_dual = min(nearest, share_s), min(nearest_dual, push / y)
-            mixed, mixed_dual, product, now = (
-                mixed + move * y,
-                mixed_dual + s * push,
-                product + move * push,
-                now + s * y,
-            )
+            nearest, nearest_dual = min(nearest, relative), min(nearest_dual, push / y)
+            mixed += move * y
+            mixed_dual += s * push
+            product += move * push
+            now += s * y
         for r in range(lower):
             s, y = slack[i, count + r], lam[i, count + r]
             move = 1.0 + after[r] - s
-            share_s = move / s
-            push = (asked - dlam[i, count + r]) / s - y * (1.0 + share_s)
+            relative = move / s
+            push = (asked - dlam[i, count + r]) / s - y * (1.0 + relative)
             dslack[i, count + r], dlam[i, count + r] = move, push
-            nearest, nearest_dual = min(nearest, share_s), min(nearest_dual, push / y)
-            mixed, mixed_dual, product, now = (
-                mixed + move * y,
-                mixed_dual + s * push,
-                product + move * push,
-                now + s * y,
-            )
-    if -nearest > STEP_TO_BOUNDARY:
-        primal = min(primal, -STEP_TO_BOUNDARY / nearest)
-    dual = -STEP_TO_BOUNDARY / nearest_dual if -nearest_dual > STEP_TO_BOUNDARY else 1.0
-    last_x, last_u, last_p = slope(model, share, dz, n - 1)
-    _, _, before_p = slope(model, share, dz, n - 2)
+            nearest, nearest_dual = min(nearest, relative), min(nearest_dual, push / y)
+            mixed += move * y
+            mixed_dual += s * push
+            product += move * push
+            now += s * y
+    if -nearest > to_boundary:
+        primal = min(primal, -to_boundary / nearest)
+    dual = -to_boundary / nearest_dual if -nearest_dual > to_boundary else 1.0
+    last_x, last_u, last_p = slope(model, fraction, dz, n - 1)
+    _, _, before_p = slope(model, fraction, dz, n - 2)
     b2 = dynamics[n - 2, 2]
     pivot = dynamics[n - 1, 0] * b2 + dynamics[n - 1, 1] - dynamics[n - 1, 2]
     ahead = -(before_p + last_x * b2 + last_u - last_p) / pivot
@@ -178,21 +212,24 @@ def direction(model, h, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, d
 
 
 @njit(cache=True, error_model="numpy")
-def within_domain(ds, x, p, dz, primal):
+def within_domain(ds, at, step, primal, settings):
     """The step length, reduced until the kinematics of every interval have a solution: p ds < 3 vm^2."""
+    x, p, dz = at.x, at.p, step.z
     n = len(p)
     for i in range(n):
-        while primal >= STEP_MIN:
+        while primal >= settings.shortest:
             vm = 0.5 * (np.sqrt(x[i] + primal * dz[i, 0]) + np.sqrt(x[i + 1] + primal * dz[i + 1, 0]))
-            if (p[i] + primal * dz[i, 2]) * ds[i] <= 3.0 * DOMAIN_EDGE * vm * vm:
+            if (p[i] + primal * dz[i, 2]) * ds[i] <= 3.0 * settings.domain_edge * vm * vm:
                 break
-            primal *= 0.7
+            primal *= settings.shortening
     return primal
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual):
-    """Take the step; returns the complementarity sum(slack * lam) and the largest relative change of x."""
+def advance(at, step, primal, dual):
+    """Take the step, in place; returns the complementarity sum(slack * lam) and the largest relative change of x."""
+    x, u, p, slack, lam, pi = at
+    dz, dslack, dlam, dpi = step
     n, sides = slack.shape
     gap, change = 0.0, 0.0
     for i in range(n):
@@ -210,13 +247,26 @@ def advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual):
 
 
 @njit(cache=True, error_model="numpy")
-def track(grid, jerk, x, u, p, smoothing, rounds, defect_max):
-    """Bring a motion x, u (N+1,), p (N,) onto exact kinematics and not far from its x: Gauss-Newton on the time integral of
-    (dx/x)^2 J + j^2/J, with the jerk j of the result and a jerk J of the machine's size; without smoothing, j is the change of the
-    jerk. Both ends stay. Returns the defect that is left."""
-    n, asked = len(p), x.copy()
-    ds, lam, pi = grid.ds, np.zeros((n, 0)), np.zeros(n)
-    model, gains, dz, dpi = empty_model(n, 0), np.empty((n, 8)), np.zeros((n + 1, 3)), np.zeros(n)
+def empty_step(at):
+    """Room for a step of an iterate, all zero."""
+    n, sides = at.slack.shape
+    return Step(np.zeros((n + 1, 3)), np.zeros((n, sides)), np.zeros((n, sides)), np.zeros(n))
+
+
+@njit(cache=True, error_model="numpy")
+def track(grid, jerk, start, smoothing, rounds, defect_max, settings):
+    """A motion on exact kinematics, not far from the x of a profile: Gauss-Newton on the time integral of (dx/x)^2 J + j^2/J, with the
+    jerk j of the result and a jerk J of the machine's size; without smoothing, j is the change of the jerk. Both ends stay.
+
+    rounds     : at most
+    defect_max : that it ends with, if it gets there
+
+    Returns the profile and the defect that is left.
+    """
+    at = at_profile(start, 0)
+    x, u, p, asked, ds = at.x, at.u, at.p, start.x, grid.ds
+    n = len(p)
+    model, gains, step = empty_model(n, 0), np.empty((n, 8)), empty_step(at)
     worst = np.inf
     for _ in range(rounds):
         worst = 0.0
@@ -232,67 +282,93 @@ def track(grid, jerk, x, u, p, smoothing, rounds, defect_max):
         if worst <= defect_max or not riccati(model, 0.0, gains):
             break
         offsets(model, 0.0, gains)
-        primal, _, _ = direction(model, ds, 0.0, gains, x, lam, lam, pi, 0.0, dz, lam, lam, dpi)
-        primal = within_domain(ds, x, p, dz, primal)
+        primal, _, _ = direction(model, 0.0, gains, at, 0.0, step, settings)
+        primal = within_domain(ds, at, step, primal, settings)
         for i in range(n):
-            x[i] += primal * dz[i, 0]
-            u[i] += primal * dz[i, 1]
-            p[i] += primal * dz[i, 2]
-    return worst
+            x[i] += primal * step.z[i, 0]
+            u[i] += primal * step.z[i, 1]
+            p[i] += primal * step.z[i, 2]
+    return Profile(x, u, p), worst
 
 
 @njit(cache=True, error_model="numpy")
-def minimise(grid, x, u, p, jumps, tol, iterations):
-    """Solve one window in place, from the profile x, u (N+1,), p (N,) to the optimal one; x_0, u_0, x_N = u_N = 0 are given.
-
-    Returns iterations used, relative gap, residual of rows and of dynamics, multipliers (N, M) of the
-    rows' upper sides, then their lower sides, and (N,) of the dynamics of x.
-    """
-    n = len(x) - 1
-    lower = grid.d1.shape[1] * (3 + jumps)
-    count = lower + 2
-    h, pi, dpi = np.empty(n), np.zeros(n), np.zeros(n)
-    model = empty_model(n, count)
-    gains, dz = np.empty((n, 8)), np.zeros((n + 1, 3))
-    slack, lam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
-    dslack, dlam = np.zeros((n, count + lower)), np.zeros((n, count + lower))
-    total, _ = linearise(grid, x, u, p, h, lam, pi, model, jumps)
-    mu = START_GAP
+def first_iterate(grid, start, model, jumps, settings):
+    """An iterate at the start, with slacks of at least `slack_min` and multipliers that have the first barrier as complementarity; also
+    their sum(slack * lam)."""
+    n, count = model.values.shape
+    lower = count - 2
+    at = at_profile(start, count + lower)
+    total, _ = linearise(grid, at, model, jumps)
     for i in range(n):
         for r in range(count):
-            slack[i, r] = max(1.0 - model.values[i, r], SLACK_MIN)
+            at.slack[i, r] = max(1.0 - model.values[i, r], settings.slack_min)
         for r in range(lower):
-            slack[i, count + r] = max(1.0 + model.values[i, r], SLACK_MIN)
+            at.slack[i, count + r] = max(1.0 + model.values[i, r], settings.slack_min)
         for r in range(count + lower):
-            lam[i, r] = mu * h[i] / slack[i, r]
-    share, stalled = 1.0, 0
-    gap, hold, residual, defect, done = mu * total * (count + lower), 0.0, np.inf, np.inf, iterations
-    for it in range(iterations):
-        total, defect = linearise(grid, x, u, p, h, lam, pi, model, jumps)
-        residual = weigh(model, slack, lam)
-        if gap <= tol * total and residual <= RESIDUAL and defect <= DEFECT:
-            done = it
+            at.lam[i, r] = settings.start_gap * model.duration[i] / at.slack[i, r]
+    return at, settings.start_gap * total * (count + lower)
+
+
+@njit(cache=True, error_model="numpy")
+def minimise_time(grid, start, jumps, tol, iterations, settings):
+    """The fastest profile over a window, a `Minimum`, from the profile `start`; x_0, u_0, x_N = u_N = 0 are given.
+
+    jumps      : 1 if r'' jumps anywhere (rows.linearise)
+    tol        : relative gap that is asked for [-]
+    iterations : at most
+    """
+    n = len(start.p)
+    count = grid.d1.shape[1] * (3 + jumps) + 2
+    model, gains = empty_model(n, count), np.empty((n, 8))
+    at, gap = first_iterate(grid, start, model, jumps, settings)
+    sides = at.slack.shape[1]
+    step = empty_step(at)
+    total, residual, defect = 1.0, np.inf, np.inf
+    fraction, stalled, far = 1.0, 0, False
+    status, done = OUT_OF_ITERATIONS, iterations
+    for iteration in range(iterations):
+        # Model the Lagrangian at the iterate; its gradient and Hessian with the slacks eliminated.
+        total, defect = linearise(grid, at, model, jumps)
+        residual = weigh(model, at, settings)
+        if gap <= tol * total and residual <= settings.residual and defect <= settings.defect:
+            status, done = SOLVED, iteration
             break
-        share = min(4.0 * share, 1.0)
-        while not riccati(model, share, gains):
-            if share == 0.0:
-                return it, gap / total, np.inf, np.inf, lam, pi
-            share = 0.25 * share if share > SHARE_MIN else 0.0
-        offsets(model, share, gains)
-        dlam[:] = 0.0
-        primal, dual, left = direction(model, h, share, gains, x, slack, lam, pi, 0.0, dz, dslack, dlam, dpi)
-        sigma = hold if hold > 0.0 else min((left / gap) ** 3, SIGMA_MAX)
-        mu = max(sigma * gap / total, GAP_FLOOR * tol) / (count + lower)
-        bending = 1.0 if min(primal, dual) > PREDICTED_MIN else 0.0
-        correct(model, h, slack, mu, bending, dslack, dlam)
-        offsets(model, share, gains)
-        primal, dual, _ = direction(model, h, share, gains, x, slack, lam, pi, mu, dz, dslack, dlam, dpi)
-        primal = within_domain(grid.ds, x, p, dz, primal)
-        gap, change = advance(x, u, p, slack, lam, pi, dz, dslack, dlam, dpi, primal, dual)
-        hold = 1.0 if change > CHANGE_MAX else 0.0
-        stalled = 0 if primal >= STALL_STEP else stalled + 1
-        if stalled == STALL_ROUNDS or not gap < np.inf:
-            return it, gap / total, np.inf, np.inf, lam, pi
-    if done == iterations:  # the last step has not been looked at yet
-        total, defect = linearise(grid, x, u, p, h, lam, pi, model, jumps)
-    return done, gap / total, residual, defect, lam, pi
+
+        # Factorise, with as much of the curvature of rows and dynamics as leaves the model convex.
+        fraction = min(settings.fraction_more * fraction, 1.0)
+        convex = riccati(model, fraction, gains)
+        while not convex and fraction > 0.0:
+            fraction = settings.fraction_less * fraction if fraction > settings.fraction_min else 0.0
+            convex = riccati(model, fraction, gains)
+        if not convex:
+            status, done = NOT_CONVEX, iteration
+            break
+
+        # Predictor: Newton's step without a barrier.
+        offsets(model, fraction, gains)
+        step.lam[:] = 0.0
+        primal, dual, affine_gap = direction(model, fraction, gains, at, 0.0, step, settings)
+
+        # How far the barrier falls: as the predictor's gap says, not at all while x still changes much.
+        sigma = 1.0 if far else min((affine_gap / gap) ** 3, settings.sigma_max)
+        mu = max(sigma * gap / total, settings.gap_floor * tol) / sides
+
+        # Corrector: the step to that barrier, second-order terms of the predictor made up for; the factorisation stays.
+        second_order = 1.0 if min(primal, dual) > settings.predicted_min else 0.0
+        correct(model, at, mu, second_order, step)
+        offsets(model, fraction, gains)
+        primal, dual, _ = direction(model, fraction, gains, at, mu, step, settings)
+
+        # Go as far as slacks, multipliers and kinematics stay in their domains.
+        primal = within_domain(grid.ds, at, step, primal, settings)
+        gap, change = advance(at, step, primal, dual)
+
+        # Give up where steps lead nowhere.
+        far = change > settings.change_max
+        stalled = 0 if primal >= settings.stall_step else stalled + 1
+        if stalled == settings.stall_rounds or not gap < np.inf:
+            status, done = STALLED, iteration
+            break
+    if status == OUT_OF_ITERATIONS:  # the last step has not been looked at yet
+        total, defect = linearise(grid, at, model, jumps)
+    return Minimum(Profile(at.x, at.u, at.p), status, done, gap / total, residual, defect, at.lam, at.pi)

@@ -46,6 +46,35 @@ class Grid(NamedTuple):
     per_jerk: FloatArray
 
 
+class Profile(NamedTuple):
+    """A motion over a window, in scaled units: x, u (N+1,) and p (N,) of the module text."""
+
+    x: FloatArray
+    u: FloatArray
+    p: FloatArray
+
+    def slower(self, factor: float) -> Profile:
+        """The motion slowed down as a whole."""
+        return Profile(self.x / factor**2, self.u / factor**2, self.p / factor**2)
+
+
+class Iterate(NamedTuple):
+    """A profile with slacks and multipliers: M row sides, the R upper ones first, then the lower ones of all but the last two.
+
+    x, u, p : of `Profile`
+    slack   : (N, M), positive
+    lam     : (N, M) multipliers of the rows, positive
+    pi      : (N,) multipliers of the dynamics
+    """
+
+    x: FloatArray
+    u: FloatArray
+    p: FloatArray
+    slack: FloatArray
+    lam: FloatArray
+    pi: FloatArray
+
+
 class Model(NamedTuple):
     """The problem at a profile, to second order: N intervals, R rows, in terms of steps (dx, du, dp)_i.
 
@@ -56,6 +85,7 @@ class Model(NamedTuple):
     convex   : (N, 6) Hessian of the time, as (xx, xu, xp, uu, up, pp)
     curved   : (N, 6) Hessian of rows and dynamics, weighed by their multipliers
     costate  : (N, 2) what turns the derivative of the cost to go into the multiplier of the dynamics: pi = C0 (dV/dx + C1)
+    duration : (N,) of the intervals
     """
 
     dynamics: FloatArray
@@ -65,6 +95,7 @@ class Model(NamedTuple):
     convex: FloatArray
     curved: FloatArray
     costate: FloatArray
+    duration: FloatArray
 
 
 @njit(cache=True, error_model="numpy")
@@ -78,6 +109,21 @@ def empty_model(n, count):
         np.zeros((n, 6)),
         np.zeros((n, 6)),
         np.zeros((n, 2)),
+        np.zeros(n),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def at_profile(profile, sides):
+    """An iterate at a copy of the profile, with slacks and multipliers of no rows or `sides` row sides, all zero."""
+    n = len(profile.p)
+    return Iterate(
+        profile.x.copy(),
+        profile.u.copy(),
+        profile.p.copy(),
+        np.zeros((n, sides)),
+        np.zeros((n, sides)),
+        np.zeros(n),
     )
 
 
@@ -113,7 +159,9 @@ def kinematics(x0, x1, u, p, ds, last):
 
 
 @njit(cache=True, error_model="numpy")
-def _put(rows, values, i, r, cx, cu, cp, value, scale):
+def _put(rows, values, i, r, slope, value, scale):
+    """Enter row r of interval i with its derivatives in x, u, p and its value, all times `scale`."""
+    cx, cu, cp = slope
     rows[i, 0, r], rows[i, 1, r], rows[i, 2, r] = cx * scale, cu * scale, cp * scale
     values[i, r] = value * scale
 
@@ -131,17 +179,16 @@ def _reduce(out, i, q, e0, e1, e2):
 
 
 @njit(cache=True, error_model="numpy")
-def linearise(grid, x, u, p, h, lam, pi, model, jumps):
-    """Fill the model at the profile (x, u, p) with the multipliers of rows and dynamics.
+def linearise(grid, at, model, jumps):
+    """Fill the model at an iterate's profile and multipliers.
 
-    lam, pi  : (N, M), (N,) multipliers of the rows, upper sides first, and of the dynamics
-    h        : (N,) out, durations
     jumps    : 1 if r'' jumps anywhere: a row for the acceleration left of each point
 
     Returns the total time and the largest defect of the dynamics, as a speed.
     """
     ds, x_max, d1, d2_left, d2_right, d3_left, d3_right, per_acceleration, per_jerk = grid
-    dynamics, gradient, rows, values, convex, curved, costate = model
+    dynamics, gradient, rows, values, convex, curved, costate, h = model
+    x, u, p, lam, pi = at.x, at.u, at.p, at.lam, at.pi
     n, axes, below = len(h), d1.shape[1], values.shape[1]
     total, worst = 0.0, 0.0
     for i in range(n):
@@ -176,21 +223,21 @@ def linearise(grid, x, u, p, h, lam, pi, model, jumps):
         for k in range(axes):
             a = per_acceleration[i, k]
             value = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) * inner
-            _put(rows, values, i, r, d2_right[i, k] * inner, d1[i, k] * inner, 0.0, value, a)
+            _put(rows, values, i, r, (d2_right[i, k] * inner, d1[i, k] * inner, 0.0), value, a)
             b, b1 = per_jerk[i, k], per_jerk[i + 1, k]
             turn = 3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i]
             by_h = d1[i, k] * j_t
             cx = v0 * d3_right[i, k] + 0.5 * turn * per_v0
             value = d1[i, k] * j + v0 * turn + by_h * h0
             cu = 3.0 * v0 * d2_right[i, k] + by_h * hu
-            _put(rows, values, i, r + 1, cx + by_h * hx, cu, d1[i, k] * per_t + by_h * hp, value, b)
+            _put(rows, values, i, r + 1, (cx + by_h * hx, cu, d1[i, k] * per_t + by_h * hp), value, b)
             turn = 3.0 * d2_left[i + 1, k] * u1 + d3_left[i + 1, k] * x[i + 1]
             by_h = d1[i + 1, k] * j_t
             cx = (v1 * d3_left[i + 1, k] + 0.5 * turn * per_v1) * end
             cu = 3.0 * v1 * d2_left[i + 1, k]
             value = d1[i + 1, k] * j + v1 * turn + by_h * h0 + cx * e3 * end
             cp = d1[i + 1, k] * per_t + by_h * hp + cx * e2 + cu
-            _put(rows, values, i, r + 2, cx * e0 + by_h * hx, cx * e1 + cu + by_h * hu, cp, value, b1)
+            _put(rows, values, i, r + 2, (cx * e0 + by_h * hx, cx * e1 + cu + by_h * hu, cp), value, b1)
             lam0 = (lam[i, r + 1] - lam[i, below + r + 1]) * b
             lam1 = (lam[i, r + 2] - lam[i, below + r + 2]) * b1
             lam_j += lam0 * d1[i, k] + lam1 * d1[i + 1, k]
@@ -203,10 +250,10 @@ def linearise(grid, x, u, p, h, lam, pi, model, jumps):
                 a = per_acceleration[i + 1, k]
                 cx, cu = d2_left[i + 1, k] * end, d1[i + 1, k] * end
                 value = cu * u1 + cx * (x[i + 1] + e3)
-                _put(rows, values, i, r, cx * e0, cx * e1 + cu, cx * e2 + cu, value, a)
+                _put(rows, values, i, r, (cx * e0, cx * e1 + cu, cx * e2 + cu), value, a)
                 jump += (lam[i, r] - lam[i, below + r]) * a * cx
                 r += 1
-        _put(rows, values, i, r, inner, 0.0, 0.0, inner * x[i], 1.0 / x_max[i])
+        _put(rows, values, i, r, (inner, 0.0, 0.0), inner * x[i], 1.0 / x_max[i])
 
         # Lagrangian of the interval: h + lam_j p/h + pi q h^2/12 + the last row's, as a function L(mean, p, u, h).
         w = pi[i]
@@ -217,7 +264,7 @@ def linearise(grid, x, u, p, h, lam, pi, model, jumps):
             c = step / (3.0 * DOMAIN * mean * mean)
             by_v = -2.0 * c * p[i] / mean
             cx, cu, cp = by_v * (m0 + m1 * e0), by_v * m1 * e1, c + by_v * m1 * e2
-            _put(rows, values, i, r + 1, cx, cu, cp, c * p[i] + by_v * m1 * e3, 1.0)
+            _put(rows, values, i, r + 1, (cx, cu, cp), c * p[i] + by_v * m1 * e3, 1.0)
             weight = lam[i, r + 1]
             l_v += weight * by_v
             l_vv += -3.0 * weight * by_v / mean
@@ -228,7 +275,7 @@ def linearise(grid, x, u, p, h, lam, pi, model, jumps):
             c = -0.125 * p[i]
             cx, cu, cp = m0 + m1 * e0 + c * hx, m1 * e1 + c * hu, m1 * e2 + c * hp - 0.125 * t
             value = 0.5 * middle + m1 * e3 + c * h0
-            _put(rows, values, i, r + 1, cx, cu, cp, value, scale * middle)
+            _put(rows, values, i, r + 1, (cx, cu, cp), value, scale * middle)
             weight = lam[i, r + 1] * scale
             l_v += weight * middle
             l_vv += weight

@@ -29,11 +29,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.settings import SETTINGS, Settings
 from planner.feedrate.jerk.window import ScaledWindow, Window
 from planner.feedrate.lagrangian import acceleration_limits, lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
@@ -59,11 +60,13 @@ class JerkLimited:
     tol        : relative gap at which a window is optimal
     iterations : at most, per window
     window     : intervals solved at a time
+    settings   : of the interior-point method; the same for every problem
     """
 
     tol: float = 1e-4
     iterations: int = 100
     window: int = 1_000
+    settings: Settings = field(default=SETTINGS, repr=False)
 
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
@@ -104,6 +107,13 @@ class JerkLimited:
             iterations=profile.iterations,
             jerk_limited=True,
             multipliers=profile.multipliers(),
+            effort={
+                "windows": profile.windows,
+                "other starts": profile.other_starts,
+                "other ends": profile.other_ends,
+                "divided": profile.divided,
+                "standstills": len(profile.stops),
+            },
         )
         found = lagrangian(problem, solution)
         prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
@@ -128,6 +138,8 @@ class _Profile:
             np.zeros(points),
         )
         self.iterations = 0
+        # windows solved; how often not from the first start, not with the first end, and divided into smaller ones
+        self.windows = self.other_starts = self.other_ends = self.divided = 0
         self.stops: list[int] = []  # points where the profile rests because nothing better was found
         self._rest: Window | None = None  # what the window before knew of the way ahead, down to its stop
         self.acceleration = acceleration_limits(problem)
@@ -140,6 +152,7 @@ class _Profile:
             if found is None:
                 if end - begin > SMALLEST_WINDOW and self.x[begin] == 0.0:
                     size, divided = max((end - begin) // DIVISION, SMALLEST_WINDOW), True
+                    self.divided += 1
                 else:
                     begin = self._stop(begin, end)
                     size, divided = self.solver.window, False
@@ -174,6 +187,7 @@ class _Profile:
                 ends.append(end)
                 found = self._solve_window(begin, end)
                 if found is not None:
+                    self.other_ends += len(ends) > 1
                     return end, found
         return ends[0], None
 
@@ -197,13 +211,15 @@ class _Profile:
         return end
 
     def _scaled(self, begin: int, end: int) -> ScaledWindow:
-        return ScaledWindow.of(self.problem, self.acceleration, begin, end)
+        return ScaledWindow.of(self.problem, self.acceleration, begin, end, self.solver.settings)
 
     def _solve_window(self, begin: int, end: int) -> Window | None:
         """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
         behind = self._rest if self.x[begin] > 0.0 else None
-        found, done = self._scaled(begin, end).solve(behind, self.solver.tol, self.solver.iterations)
+        found, done, starts = self._scaled(begin, end).solve(behind, self.solver.tol, self.solver.iterations)
         self.iterations = max(self.iterations, done)
+        self.windows += 1
+        self.other_starts += starts - 1
         return found
 
     def _unfelt(self, begin: int, end: int, found: Window) -> int:

@@ -15,7 +15,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
-from planner.feedrate.jerk.rows import Grid, empty_model, linearise
+from planner.feedrate.jerk.rows import Grid, Profile, at_profile, empty_model, linearise
+from planner.feedrate.jerk.settings import SETTINGS, Settings
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 
 START_ROOM = 0.9  # a start keeps every limit times this [-] ...
@@ -27,8 +28,6 @@ GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still 
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
 JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
-
-_Profile = tuple[FloatArray, FloatArray, FloatArray]  # x, u (N+1,), p (N,) of rows.py
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,16 +59,30 @@ class Window:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ScaledWindow:
-    """A window's problem in units of its own: fastest feed 1, largest acceleration 1; `asked` is its envelope (start.py)."""
+    """A window's problem in units of its own: fastest feed 1, largest acceleration 1.
+
+    jumps : 1 if r'' jumps at an inner point, else 0
+    asked : (N+1,) its envelope (start.py)
+    feed  : unit of speed [mm/s]
+    time  : unit of time [s]
+    """
 
     grid: Grid
     jumps: int
     asked: FloatArray
     feed: float
     time: float
+    settings: Settings = SETTINGS
 
     @classmethod
-    def of(cls, problem: FeedrateProblem, acceleration: FloatArray, begin: int, end: int) -> ScaledWindow:
+    def of(
+        cls,
+        problem: FeedrateProblem,
+        acceleration: FloatArray,
+        begin: int,
+        end: int,
+        settings: Settings = SETTINGS,
+    ) -> ScaledWindow:
         """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
         own = slice(begin, end + 1)
         feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
@@ -92,99 +105,105 @@ class ScaledWindow:
             asked=envelope(problem, begin, end) / feed**2,
             feed=feed,
             time=t,
+            settings=settings,
         )
 
-    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int]:
+    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
-        Also the iterations of the longest try."""
-        most = 0
-        for x, u, p in self._starts(behind):
-            done, gap, residual, defect, lam, pi = kernel.minimise(
-                self.grid, x, u, p, self.jumps, tol, iterations
-            )
-            most = max(most, done)
-            if gap <= GAP_ACCEPTED and residual <= RESIDUAL_ACCEPTED and defect <= DEFECT_ACCEPTED:
-                kernel.track(self.grid, self._jerk, x, u, p, 0.0, POLISHING_ROUNDS, POLISHED)
-                return self._window(x, u, p, lam, pi), most
-        return None, most
+        Also the iterations of the longest try, and from how many starts it was tried."""
+        most = starts = 0
+        for starts, start in enumerate(self._starts(behind), start=1):
+            found = kernel.minimise_time(self.grid, start, self.jumps, tol, iterations, self.settings)
+            most = max(most, found.iterations)
+            if _accepted(found):
+                profile, _ = self._track(found.profile, 0.0, POLISHING_ROUNDS, POLISHED)
+                return self._window(profile, found.lam, found.pi), most, starts
+        return None, most, starts
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""
-        x, u, p = self._slowed(*self._plain(1.0))
-        n = len(p)
-        return self._window(x, u, p, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+        profile = self._slowed(self._plain(1.0))
+        n = len(profile.p)
+        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
 
     def near(self, x: FloatArray, u: FloatArray) -> Window | None:
         """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
         none. It may exceed its limits a little, and has no multipliers."""
-        x, u = x / self.feed**2, u * self.time / self.feed
-        p = np.diff(u)
-        if kernel.track(self.grid, self._jerk, x, u, p, 0.0, TRACKING_ROUNDS, POLISHED) > kernel.DEFECT:
+        rate = u * self.time / self.feed
+        profile, defect = self._track(
+            Profile(x / self.feed**2, rate, np.diff(rate)), 0.0, TRACKING_ROUNDS, POLISHED
+        )
+        if defect > self.settings.defect:
             return None
-        return self._window(x, u, p, np.zeros((len(p), 2 * self._rows - 2)), np.zeros(len(p)))
+        n = len(profile.p)
+        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
 
-    def _starts(self, behind: Window | None) -> Iterator[_Profile]:
+    def _starts(self, behind: Window | None) -> Iterator[Profile]:
         """Profiles to start from, the best first."""
         for start in self._from_rest():
             if behind is None:
                 yield start
             else:
-                joined = self._joined(behind, *start)
-                yield self._tracked(*joined) or joined
+                joined = self._joined(behind, start)
+                yield self._tracked(joined) or joined
 
-    def _from_rest(self) -> Iterator[_Profile]:
+    def _from_rest(self) -> Iterator[Profile]:
         """The same from rest."""
         asked, rate = envelope_profile(self.asked, self.grid.ds)
-        near = asked, rate, np.diff(rate)
-        tracked = self._tracked(*near)
+        near = Profile(asked, rate, np.diff(rate))
+        tracked = self._tracked(near)
         if tracked is not None:
-            yield self._slowed(*tracked, SLOWER_MAX)
-        yield self._slowed(*near, SLOWER_MAX)
-        yield self._slowed(*self._plain(asked.max()), SLOWER_MAX)
-        yield self._slowed(*self._plain(1.0))
+            yield self._slowed(tracked, SLOWER_MAX)
+        yield self._slowed(near, SLOWER_MAX)
+        yield self._slowed(self._plain(asked.max()), SLOWER_MAX)
+        yield self._slowed(self._plain(1.0))
 
-    def _joined(self, behind: Window, x: FloatArray, u: FloatArray, p: FloatArray) -> _Profile:
+    def _joined(self, behind: Window, start: Profile) -> Profile:
         """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
         ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
-        beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
-        x, u = np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
-        return x, u, np.diff(u)
+        beyond = 1 + int(np.flatnonzero(ahead > start.x[: len(ahead)])[-1])  # the first at least
+        x, u = np.append(ahead[:beyond], start.x[beyond:]), np.append(rate[:beyond], start.u[beyond:])
+        return Profile(x, u, np.diff(u))
 
-    def _tracked(self, x: FloatArray, u: FloatArray, p: FloatArray) -> _Profile | None:
+    def _track(
+        self, profile: Profile, smoothing: float, rounds: int, defect_max: float
+    ) -> tuple[Profile, float]:
+        """`interior_point.track` with the jerk of the slowest axis as the machine's."""
+        jerk = float(1.0 / self.grid.per_jerk.max())
+        tracked: tuple[Profile, float] = kernel.track(
+            self.grid, jerk, profile, smoothing, rounds, defect_max, self.settings
+        )
+        return tracked
+
+    def _tracked(self, profile: Profile) -> Profile | None:
         """A profile near to the given one with exact kinematics; None where that is not found."""
-        x, u, p = x.copy(), u.copy(), p.copy()
-        defect = kernel.track(self.grid, self._jerk, x, u, p, 1.0, TRACKING_ROUNDS, kernel.DEFECT)
-        return (x, u, p) if defect <= kernel.DEFECT else None
+        tracked, defect = self._track(profile, 1.0, TRACKING_ROUNDS, self.settings.defect)
+        return tracked if defect <= self.settings.defect else None
 
-    def _plain(self, fastest: float) -> _Profile:
+    def _plain(self, fastest: float) -> Profile:
         """The plain start with a largest feed^2, whatever its limits."""
         x, u = plain_start(np.concatenate([[0.0], np.cumsum(self.grid.ds)]))
-        return fastest * x, fastest * u, fastest * np.diff(u)
-
-    @property
-    def _jerk(self) -> float:
-        """Of the slowest axis."""
-        return float(1.0 / self.grid.per_jerk.max())
+        return Profile(fastest * x, fastest * u, fastest * np.diff(u))
 
     @property
     def _rows(self) -> int:
         """Rows per interval."""
         return (3 + self.jumps) * self.grid.d1.shape[1] + 2
 
-    def _slowed(self, x: FloatArray, u: FloatArray, p: FloatArray, most: float = np.inf) -> _Profile:
+    def _slowed(self, profile: Profile, most: float = np.inf) -> Profile:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
-        n, axes = len(p), self.grid.d1.shape[1]
-        model, h = empty_model(n, self._rows), np.empty(n)
-        lam = np.zeros((n, 2 * self._rows - 2))
-        linearise(self.grid, x, u, p, h, lam, np.zeros(n), model, self.jumps)
+        axes = self.grid.d1.shape[1]
+        model = empty_model(len(profile.p), self._rows)
+        linearise(self.grid, at_profile(profile, 2 * self._rows - 2), model, self.jumps)
         worst = np.abs(model.values).max(axis=0)
         jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
         worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
         slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
-        return x / slower**2, u / slower**2, p / slower**2
+        return profile.slower(slower)
 
-    def _window(self, x: FloatArray, u: FloatArray, p: FloatArray, lam: FloatArray, pi: FloatArray) -> Window:
+    def _window(self, profile: Profile, lam: FloatArray, pi: FloatArray) -> Window:
         """A profile in the problem's units, with the multipliers of its rows and dynamics."""
+        x, u, p = profile
         vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
         h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
         feed, t, lower = self.feed, self.time, self._rows - 2
@@ -203,6 +222,16 @@ class ScaledWindow:
             feed=of_feed * t,
             dynamics=pi * t / feed**2,
         )
+
+
+def _accepted(found: kernel.Minimum) -> bool:
+    """Whether a window's profile is good enough; one that used up its iterations may be."""
+    return (
+        found.status in (kernel.SOLVED, kernel.OUT_OF_ITERATIONS)
+        and found.gap <= GAP_ACCEPTED
+        and found.residual <= RESIDUAL_ACCEPTED
+        and found.defect <= DEFECT_ACCEPTED
+    )
 
 
 def _jumps(grid: Grid) -> int:

@@ -1,4 +1,4 @@
-"""Corners taken slowly enough for the filters behind: what methods `optimal` and `toppra` do before `behind.kept` has the last word.
+"""Corners taken slowly enough for the filters behind: what `optimal` and `second-order` do before `behind.kept` has the last word.
 
 A filtered motion passes a vertex by the mean of where the motion was within Td: the longer the motion takes for the corner itself, the
 less its way in and out counts. So it is the feed close to a place where the filtered motion leaves the tolerance that is limited, and
@@ -11,17 +11,17 @@ Along arcs, where curvature and feed are constant, the closed form says it befor
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.filters import ROOM_LEAST, Behind, Places, kept, rested
-from planner.geometry.toolpath import Toolpath
-from planner.machine import Machine
+from planner.job.job import Job
 from planner.motion.timing import Motion
-from planner.optimal.reshape import OnPath
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import Order, solve_again
+from planner.optimal.tighten import within_limits
 
 ROUNDS = 10
 # The feed is limited this far on both sides of a place [tolerances]. Pentagon at 20/13 and 50/30 ms with 0.3, 1, 2, 4: 1.030, 1.033,
@@ -33,18 +33,13 @@ WORTH = 0.05
 CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-]
 BOUND = "filter_error"
 
-Finish = Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]
 
-
-def within_filters(
-    planned: OnPath, motion: Motion, solve: Finish, real: tuple[Machine, Toolpath]
-) -> tuple[OnPath, Motion]:
+def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> tuple[OnPath, Motion]:
     """The fastest motion found that keeps the tolerance behind the machine's filters, and the solution that it comes from.
 
     motion : that of `planned`, which keeps all limits
-    solve  : the motion of another problem on the same grid, None if there is none
     """
-    machine, toolpath = real
+    machine, toolpath = job.real
     if machine.fir is None:
         return planned, motion
     behind = Behind(toolpath, machine)
@@ -58,6 +53,12 @@ def within_filters(
         places = behind.places(waiting, path)
         if not len(places.time) and (best is None or waiting.end < best[1].end):
             best = planned, waiting
+        job.tell(
+            "filters",
+            found=waiting.end,
+            places=len(places.time),
+            kept=best is not None and best[1] is waiting,
+        )
         zone = _zones(plain, waiting, behind, places.near_time)
         now = np.array([waiting.law.feed[a:b].min() ** 2 for a, b in zone])
         change = np.where(now > 0.0, _change(places, path[1]), 1.0)  # a full stop is not made slower
@@ -67,10 +68,10 @@ def within_filters(
             np.isfinite(corner) | (change < 1.0), change, 1.0
         )
         elsewhere = _elsewhere(elsewhere, plain, waiting, behind, places)
-        slower = solve(planned, _limited(plain, zone, corner, elsewhere, least))
-        if slower is None:
+        slower = solve_again(planned, _limited(plain, zone, corner, elsewhere, least), order.solver)
+        if not slower.solution.solved:
             break
-        planned, motion = slower
+        planned, motion = within_limits(slower, order, job.toolpath, job.machine)
     last = planned, kept(motion, toolpath, machine)
     return last if best is None or last[1].end < best[1].end else best
 

@@ -1,4 +1,4 @@
-"""What a motion exceeds a limit by between grid points, and two ways to make up for it.
+"""What a motion exceeds a limit by between grid points, and two ways to make up for it: tighter limits there, or less speed.
 
 A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
 divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
@@ -10,19 +10,19 @@ only. What is left, whole runs between full stops are slowed down by; that alway
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import paced, runs_of
-from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Toolpath
+from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
-from planner.motion.time_law import TimeLaw, law_of_solution
+from planner.motion.time_law import TimeLaw
 from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
-from planner.optimal.reshape import OnPath
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import Order, solve_again
 from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
@@ -107,16 +107,17 @@ def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
 
 
 def within_limits(
-    planned: OnPath,
-    solve: Callable[[FeedrateProblem], FeedrateSolution],
-    toolpath: Toolpath,
-    machine: Machine,
+    planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine, tell: Tell = tell_nobody
 ) -> tuple[OnPath, Motion]:
     """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
-    `planned` has a solution."""
-    motion = _motion(planned)
+    `planned` has a solution. Without jerk limits the motion is taken as it is: accelerations step at grid points, between which they
+    are close to straight lines."""
+    motion = planned.motion()
+    if not order.jerk_limited:
+        return planned, motion
     factor = excess(motion, toolpath, machine)
     best = planned, slowed(motion, toolpath, machine, factor)
+    tell("between points", found=best[1].end, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
     for _ in range(1 if large else TIGHTENING_ROUNDS):
@@ -124,19 +125,22 @@ def within_limits(
             break
         room *= np.maximum(factor, 1.0)
         problem = tightened(planned.problem, room)
-        tighter = dataclasses.replace(planned, problem=problem, solution=solve(problem))
+        tighter = solve_again(planned, problem, order.solver)
         if not tighter.solution.solved:
             break
-        motion = _motion(tighter)
+        motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
         kept = slowed(motion, toolpath, machine, factor)
+        tell(
+            "tighten",
+            found=kept.end,
+            before=best[1].end,
+            kept=kept.end < best[1].end,
+            excess=float(factor.max() - 1.0),
+        )
         if kept.end < best[1].end:
             best = tighter, kept
     return best
-
-
-def _motion(planned: OnPath) -> Motion:
-    return Motion(samples=planned.samples, law=law_of_solution(planned.samples, planned.solution))
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:

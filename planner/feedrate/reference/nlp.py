@@ -66,8 +66,8 @@ from planner.feedrate.solution import FeedrateSolution, Status
 SLOWER = 0.7
 # Largest violation of a scaled row or bound that a solution may have [-].
 VIOLATION_MAX = 1e-6
-# Grid points of the largest problem that is tried (benchmarks/results/solver-sizes.md).
-POINTS_MAX = {"ipopt": 50_000, "fatrop": 5_000}
+# Grid points of the largest problem that is tried: one that takes about a minute (benchmarks/results/solver-sizes.md).
+POINTS_MAX = {"ipopt": 20_000, "fatrop": 5_000}
 # Residual of ipopt's rows [-]; its default of 1e-4 leaves ratios to the limits of 1 + 1e-5 on long pieces.
 FEASIBILITY = 1e-8
 
@@ -99,7 +99,7 @@ class JerkLimitedNLP:
     solver         : "ipopt" (with mumps), or "fatrop", which uses the stages
     tol            : relative tolerance of optimality [-]
     max_iterations : per piece
-    points_max     : larger problems are refused: the largest that takes some minutes; None for `POINTS_MAX` of the solver
+    points_max     : larger problems are refused; None for `POINTS_MAX` of the solver
     """
 
     solver: Literal["ipopt", "fatrop"] = "ipopt"

@@ -100,13 +100,13 @@ class SequentialConvex:
     tol            : a pass that gains a smaller share of the time is the last [-]
     max_passes     : per piece
     max_iterations : of ipopt, per pass
-    points_max     : larger problems are refused: the largest that takes some minutes
+    points_max     : larger problems are refused: this one takes about a minute
     """
 
     tol: float = 1e-5
     max_passes: int = 20
     max_iterations: int = 200
-    points_max: int = 20_000  # benchmarks/results/solver-sizes.md
+    points_max: int = 10_000  # benchmarks/results/solver-sizes.md
 
     def __post_init__(self) -> None:
         if not self.tol > 0:

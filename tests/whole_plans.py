@@ -22,7 +22,7 @@ from planner.machine import Machine
 from planner.motion.time_law import TimeLaw, law_of_solution
 from planner.motion.timing import Motion
 from planner.nc.program import Program
-from planner.optimal.on_path import corner_shape
+from planner.optimal.geometry import corner_shape
 from planner.path.samples import RESOLUTION, PathSamples, sample_path
 
 CORNERS = ("bezier", "fir", "kinematic")

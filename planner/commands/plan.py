@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -69,6 +70,14 @@ def plan_command(
     corners: Annotated[
         bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18-20")
     ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option("-v", "--verbose", help="say on standard error what planning tries, step by step"),
+    ] = False,
+    trace: Annotated[
+        Path | None,
+        typer.Option("--trace", metavar="FILE", help="write what planning tried into FILE (JSON)"),
+    ] = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
     force: ForceOption = False,
@@ -81,13 +90,18 @@ def plan_command(
             "--format is the format of the trajectory in the output directory: name one with -o DIR"
         )
     from planner import plan
+    from planner.job.trace import Trace
+    from planner.report import trace_file
     from planner.report.export import SUMMARY, check_places, summary, write_plan
 
     form = file_format or Format.parquet
     if output is not None:
         inputs = [job, Path(machine or DEFAULT_MACHINE)]
         check_places(output, inputs, file_format=form.value, plots=plot, force=force)
-    with ProgressBar(quiet=quiet) as progress:
+    if trace is not None:
+        trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+    steps = Trace(line=partial(say, err=True) if verbose else None)
+    with ProgressBar(quiet=quiet or verbose) as progress:
         result = plan(
             job,
             machine or DEFAULT_MACHINE,
@@ -99,12 +113,15 @@ def plan_command(
             shaped=shaped,
             tolerance=tolerance,
             progress=progress,
+            log=steps if verbose or trace is not None else None,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)
             written = write_plan(result, output, file_format=form.value, plots=plot, force=force)
 
+    if trace is not None:
+        trace_file.write_trace(trace, steps, result)
     said = summary(result)
     if written and output is not None:  # with what was not written, and why
         said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]

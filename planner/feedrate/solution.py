@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
@@ -95,6 +95,7 @@ class FeedrateSolution:
     duration     : (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile rests at both ends
     solve_time   : [s]
     iterations   : of an iterative solver; the largest of all pieces
+    effort       : what else the solver counted, by name
     jerk_limited : True if the jerk limits of the problem were kept
     prices       : what the limits cost, if the solver knows
     multipliers  : of limits and kinematics, if the solver knows; see feedrate/lagrangian.py
@@ -109,6 +110,7 @@ class FeedrateSolution:
     duration: FloatArray
     solve_time: float
     iterations: int = 0
+    effort: dict[str, int] = field(default_factory=dict)
     jerk_limited: bool = False
     prices: Prices | None = None
     multipliers: Multipliers | None = None

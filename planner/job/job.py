@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,6 +26,7 @@ from planner.job.notes import job_notes
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, GridHistory, PriceList
 from planner.job.stages import Progress, Stages
+from planner.job.trace import Log, Tell
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
@@ -97,9 +98,17 @@ class Job:
         """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
         return self.stages.stage(name)
 
+    @property
+    def tell(self) -> Tell:
+        """Tell of a step (job/trace.py)."""
+        return self.stages.tell
+
     def note(self, *sentences: str) -> None:
         """Add sentences to the notes of the plan: what was given up, with the first line and a count. Repeated ones are dropped."""
-        self.noted.extend(sentence for sentence in sentences if sentence not in self.noted)
+        for sentence in sentences:
+            if sentence not in self.noted:
+                self.noted.append(sentence)
+                self.tell("given up", what=sentence)
 
     def afresh(self) -> Job:
         """The same job with no notes, for another plan of it."""
@@ -183,6 +192,16 @@ class Job:
         The other arguments are fields of `Plan`.
         """
         trajectory, verdict = made or (None, None)
+        held: dict[str, Any] = {} if grid is None else {"held_by": _largest_shares(grid)}
+        self.tell(
+            "plan",
+            found=np.nan if trajectory is None else trajectory.cycle_time,
+            method=method,
+            corner=corner or "none",
+            points=grid_points,
+            passed=verdict is not None and verdict.passed,
+            **held,
+        )
         self._note_ringing(trajectory, method)
         return Plan(
             method=method,
@@ -218,6 +237,11 @@ class Job:
             )
 
 
+def _largest_shares(grid: GridHistory) -> str:
+    """The three limits that hold a motion longest."""
+    return ", ".join(f"{name} {share:.0%}" for name, share in grid.ranked()[:3])
+
+
 class Method(ABC):
     """A way to plan a job. Its repr is its row label in every table.
 
@@ -236,15 +260,17 @@ class Method(ABC):
         machine: Machine,
         tolerance: float | None = None,
         progress: Progress | None = None,
+        log: Log | None = None,
     ) -> Plan:
         """Plan a program, sample the motion and have it judged.
 
         tolerance : contour tolerance [mm]; None for the one of the program (G64 P) or the machine
         progress  : called with the stage's name and the fraction done (0 to 1)
+        log       : called with every step of the planning, e.g. a `Trace` (job/trace.py)
 
         Raises InputError for a program that cannot be planned. An unsolved problem is the status of the plan.
         """
-        stages = Stages(progress)
+        stages = Stages(progress, log)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
@@ -257,7 +283,16 @@ class Method(ABC):
         if job.machine.fir is None or not best.solved:
             return best
         for share, seen in self.ways:
-            best = faster(best, self.plan_within_periods(job.with_share(share, seen)))
+            made = self.plan_within_periods(job.with_share(share, seen))
+            before, best = best, faster(best, made)
+            job.tell(
+                "share of tolerance",
+                found=_time(made),
+                before=_time(before),
+                kept=best is made,
+                share=share,
+                filters=seen,
+            )
         return best
 
     @property
@@ -269,7 +304,7 @@ class Method(ABC):
         """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py)."""
         made = self.plan_job(job)
         given, planned, (machine, programmed) = job, job.toolpath, job.real
-        for _ in range(PERIOD_ROUNDS):
+        for again in range(1, PERIOD_ROUNDS + 1):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
                 break
             with job.stage("geometry"):
@@ -278,6 +313,13 @@ class Method(ABC):
             if less is None:
                 break
             planned = less
+            stops = int((less.joint == Joint.STOP).sum() - (programmed.joint == Joint.STOP).sum())
+            job.tell(
+                "less for the period",
+                round=again,
+                corners=int((less.tolerance < programmed.tolerance).sum()),
+                stops=stops,
+            )
             job = dataclasses.replace(given, toolpath=planned, judged=(machine, programmed), noted=[])
             made = self.plan_job(job)
         if job is given:
@@ -286,7 +328,16 @@ class Method(ABC):
         made = dataclasses.replace(made, prices=None, notes=(*made.notes, _said(made, programmed, planned)))
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
             rival = other.plan_within_periods(given.afresh())
-            if faster(made, rival) is rival:
+            wins = faster(made, rival) is rival
+            job.tell(
+                "another method",
+                found=_time(rival),
+                before=_time(made),
+                kept=wins,
+                method=rival.method,
+                corner=rival.corner or "none",
+            )
+            if wins:
                 what = (
                     f"{rival.corner} corners lose"
                     if rival.method == made.method
@@ -308,6 +359,12 @@ def faster(plan: Plan, other: Plan) -> Plan:
     if plan.verdict.passed != other.verdict.passed:
         return plan if plan.verdict.passed else other
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _time(plan: Plan) -> float:
+    """Cycle time [s], NaN for a motion that does not pass."""
+    passed = plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
+    return plan.trajectory.cycle_time if passed and plan.trajectory is not None else np.nan
 
 
 def _inside(made: Plan) -> bool:

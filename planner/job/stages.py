@@ -1,4 +1,4 @@
-"""The clock over the stages of a job."""
+"""The clock over the stages of a job, and who is told of its steps."""
 
 from __future__ import annotations
 
@@ -6,18 +6,29 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from planner.job.trace import Log, Tell, Teller, tell_nobody
+
 Progress = Callable[[str, float], None]
 
 
 class Stages:
     """Measures the time of the stages of a job, and tells the caller which stage is running.
 
-    timings : seconds by stage; a stage that runs several times is summed up
+    timings  : seconds by stage; a stage that runs several times is summed up
+    progress : called with the stage's name and the fraction done
+    log      : called with every step (job/trace.py)
     """
 
-    def __init__(self, progress: Progress | None = None):
+    def __init__(self, progress: Progress | None = None, log: Log | None = None):
         self.timings: dict[str, float] = {}
+        self.tell: Tell = tell_nobody if log is None else Teller(log)
         self._progress = progress
+
+    def own_clock(self) -> Stages:
+        """Another clock, for a plan inside the plan: it tells of its steps too, but not of its progress."""
+        other = Stages()
+        other.tell = self.tell
+        return other
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[[float], None]]:

@@ -48,7 +48,7 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     """The largest speed at which each corner of a path can be run through from end to end."""
     axes = samples.path.toolpath.axes
     limits = np.array([machine.limits("acceleration", axes), machine.limits("jerk", axes)])
-    problem = feedrate_problem(samples, machine)
+    problem = feedrate_problem(samples, machine.with_own(()))
     interval = samples.intervals
     at = interval[samples.element[interval] < 0]
     joint = ~samples.element[at]

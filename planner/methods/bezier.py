@@ -30,7 +30,7 @@ from planner.lookahead.ramps import JointKind
 from planner.machine import Machine
 from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion
-from planner.optimal.between_points import slowed
+from planner.optimal.tighten import slowed
 from planner.path.samples import PathSamples, sample_path
 from planner.sensitivity.closed_form import corner_apexes, corners_at
 

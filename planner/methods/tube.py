@@ -26,7 +26,6 @@ from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.job.job import Delivered, Job, Method
 from planner.job.plan import Plan
-from planner.job.stages import Stages
 from planner.methods.optimal import OptimalMethod
 from planner.motion.axis_motion import AxisMotion
 from planner.motion.passing import passing_times, standstills
@@ -175,7 +174,7 @@ class _Starts:
     def __iter__(self) -> Iterator[_Start]:
         yield from list(self.made)
         while self._methods:
-            own_clock = dataclasses.replace(self._job, stages=Stages(), noted=[])
+            own_clock = dataclasses.replace(self._job, stages=self._job.stages.own_clock(), noted=[])
             plan = self._methods.pop(0).plan_best(own_clock)
             if plan.trajectory is None:
                 self.failed.append(plan)

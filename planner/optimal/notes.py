@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.base.arrays import Array
+from planner.base.arrays import Array, FloatArray
+from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.optimal.reshape import OnPath
+from planner.optimal.on_path import OnPath
+from planner.smoothing.spline_path import SplineShape
 
 
 def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
@@ -32,6 +34,36 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     if len(lost):
         notes.append(_at(toolpath, lost, "full stop", "where the solver did not converge"))
     return notes
+
+
+def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
+    """That no run of corners got a spline, if there are any."""
+    runs = len(shape.laid.fits)
+    if not runs:
+        return ()
+    line = _line(rounded, int(rounded.legs.first[shape.runs.joint_first[0]]))
+    return (f"line {line}: no spline was found inside the tolerance, here and on all {runs} runs of corners",)
+
+
+def not_compared_note(rounded: SmoothPath, left: Array, points: FloatArray) -> tuple[str, ...]:
+    """That single corners were not compared on some stretches between full stops (optimal/compare_corners.py).
+
+    left   : (L,) these stretches
+    points : (G,) of the grid that each stretch would have
+    """
+    if not len(left):
+        return ()
+    stops = np.flatnonzero(rounded.joint == Joint.STOP)
+    line = _line(rounded, int(rounded.legs.first[stops[left[0] + 1]]))
+    return (
+        f"line {line}: single corners were not compared on {len(left)} stretches between full stops, of which the first ends "
+        f"here: their grids would have some {points[left].sum():.2g} points",
+    )
+
+
+def _line(path: SmoothPath, joint: int) -> int:
+    """The program's line that ends at a joint of the toolpath."""
+    return int(path.toolpath.line[joint - 1])
 
 
 def _standstills(best: OnPath) -> Array:

@@ -1,97 +1,48 @@
-"""What methods `second-order` and `optimal` share: which path the feedrate problem is solved on, and the plan of its solution."""
+"""The time-optimal motion on a path: what the stages of the loop (optimal/loop.py) hand to each other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
-from planner.base.errors import InputError
-from planner.base.names import SMOOTHINGS
-from planner.corners.bezier import BezierCorner
-from planner.corners.fir import FirCorner
-from planner.corners.kinematic import KinematicCorner
-from planner.corners.smooth import CornerShape, SmoothPath
-from planner.geometry.toolpath import Toolpath
-from planner.job.job import Delivered, Job
-from planner.job.plan import Plan
-from planner.job.records import PriceList
-from planner.machine import Machine
-from planner.motion.shaping import ShapedMotion
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.solution import FeedrateSolution
+from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion
-from planner.optimal.geometry import AUTO, SPLINE, on_spline
-from planner.optimal.notes import path_notes
-from planner.optimal.reshape import OnPath
-from planner.sensitivity.activity import history
-from planner.sensitivity.closed_form import corner_table
+from planner.path.samples import PathSamples
+from planner.smoothing.spline_path import SplineShape
 
 
-def corner_shape(
-    corner: str | CornerShape, machine: Machine, toolpath: Toolpath, bezier: CornerShape | None = None
-) -> CornerShape:
-    """The corner shape of that name with the machine's settings; `bezier`: the one of "bezier" and beside splines, None for the
-    usual one. Raises InputError for an unknown name."""
-    if corner in (AUTO, SPLINE, "bezier"):
-        return bezier or BezierCorner()
-    if corner == "fir":
-        return FirCorner.from_machine(machine, toolpath.axes)
-    if corner == "kinematic":
-        return KinematicCorner.from_machine(machine, toolpath.axes)
-    if isinstance(corner, str):
-        raise InputError(f"no corner shape '{corner}'; there are {', '.join(SMOOTHINGS)}")
-    return corner
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OnPath:
+    """A smooth path and the time-optimal motion on it.
 
+    path     : rounded corners or splines
+    samples  : its grid
+    problem  : the feedrate problem on the grid
+    solution : the motion, or the status of a failure
+    shape    : what the path's splines are made of, if it has some that may be reshaped
+    notes    : sentences on what was given up
+    """
 
-def best_on_path(
-    job: Job,
-    rounded: SmoothPath,
-    corner: str | CornerShape,
-    plan_on: Callable[[SmoothPath, float], OnPath],
-    *,
-    blend_tangents: bool,
-    rounds: int | None,
-) -> OnPath:
-    """The time-optimal motion on rounded corners, or on splines if `corner` says so; the arguments are those of `on_spline`."""
-    if corner not in (AUTO, SPLINE):
-        return plan_on(rounded, 1.0)
-    return on_spline(
-        rounded,
-        job.machine,
-        plan_on,
-        blend_tangents=blend_tangents,
-        auto=corner == AUTO,
-        rounds=rounds,
-        stages=job.stages,
-    )
+    path: SmoothPath
+    samples: PathSamples
+    problem: FeedrateProblem
+    solution: FeedrateSolution
+    shape: SplineShape | None = None
+    notes: tuple[str, ...] = ()
 
+    def faster_than(self, other: OnPath) -> bool:
+        """True if this motion was found and takes less time than another that was found."""
+        return self.solution.solved and self.solution.cycle_time < other.solution.cycle_time
 
-def plan_of_solution(
-    job: Job,
-    best: OnPath,
-    made: Delivered | None,
-    *,
-    method: str,
-    corner: str | CornerShape,
-    prices: PriceList | None = None,
-) -> Plan:
-    """The plan of a solution and what was delivered of it, None unless solved."""
-    rounded = grid = None
-    if made is not None:
-        delivered = job.motion_of[made[0]]  # with the standstills that its samples need
-        if isinstance(delivered, ShapedMotion):
-            delivered = delivered.motion  # what the solution is of
-        assert isinstance(delivered, Motion)
-        with job.stage("report"):
-            rounded = corner_table(best.samples, best.problem, best.solution)
-            grid = history(best.problem, best.solution, delivered.law)
-        job.note(*path_notes(job.toolpath, best), *best.notes)
-    return job.plan(
-        made,
-        method=method,
-        corner=corner if isinstance(corner, str) else corner.name,
-        solver=best.solution.solver,
-        status=best.solution.status,
-        sentence=best.solution.sentence,
-        grid_points=len(best.samples),
-        rounded=rounded,
-        grid=grid,
-        prices=prices,
-    )
+    def motion(self) -> Motion:
+        """The motion in time; the problem must be solved."""
+        return Motion(samples=self.samples, law=law_of_solution(self.samples, self.solution))
+
+    def stop_to_stop(self) -> FloatArray:
+        """(G,) time between full stops [s]."""
+        return np.add.reduceat(self.solution.duration, self.samples.piece[:-1])

@@ -5,7 +5,7 @@ tolerance works through the path: more of it makes corners larger. So do acceler
 the more of its budget is set aside for the chord error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
 
 Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with the corners, the splines
-and the `limit_scale` that it has (optimal/between_points.py). Where two limits hold together and both must give (equal axes at 45
+and the `limit_scale` that it has (optimal/tighten.py). Where two limits hold together and both must give (equal axes at 45
 degrees) the time has a kink and the price is a slope between the left one and the right one. Prices of the programmed feed and of axis
 velocities are those of more of them: where both are equal, neither alone is worth anything.
 

@@ -17,8 +17,8 @@ from planner.machine import Machine, load_machine
 from planner.methods.stop import StopMethod
 from planner.nc.reader import parse_program
 from planner.optimal.notes import path_notes
-from planner.optimal.reshape import OnPath
-from planner.optimal.second_order import second_order
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import second_order
 from planner.path.samples import sample_path
 
 MACHINE = load_machine("mill")

@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from quick import slow_but
 from scipy.spatial import cKDTree
 
 from benchmarks import problems
 from planner.job import job as job_module
 from planner.machine import Fir
-from planner.methods import optimal as optimal_module
 from planner.methods.fir import FirMethod
 from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.optimal import OptimalMethod
 from planner.methods.registry import plan
 from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
+from planner.optimal import loop as loop_module
 
 FINE = 2e-4  # [s] of the convolution
 STEP = 2e-3  # [mm] between points of the path
@@ -83,17 +84,19 @@ def assert_kept(made, lengths):
     np.testing.assert_allclose(position[-1], made.toolpath.end[-1], atol=1e-6)
 
 
-@pytest.mark.parametrize("lengths", LENGTHS, ids=str)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("lengths", slow_but([(0.02, 0.013)], LENGTHS), ids=str)
+@pytest.mark.parametrize("method", slow_but(("stop", "kinematic", "fir", "second-order"), METHODS))
 def test_behind_the_filters_nothing_leaves_the_tolerance(method, lengths):
     assert_kept(plan(JOB, machine(lengths), method=method, corner=BEZIER.get(method)), lengths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(0.02, 0.013), (0.01, 0.02, 0.005), (0.03,)], ids=str)
 def test_any_number_of_filters_on_splines(lengths):
     assert_kept(OptimalMethod(rounds=1).plan(CORNER, machine(lengths)), lengths)
 
 
+@pytest.mark.slow
 def test_tube_too():
     assert_kept(TubeMethod().plan(CORNER, machine((0.02, 0.013))), (0.02, 0.013))
 
@@ -132,9 +135,7 @@ def test_a_shorter_filter_costs_less():
 @pytest.mark.parametrize("method", ["stop", "optimal"])
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
-    monkeypatch.setattr(
-        optimal_module, "within_filters", lambda planned, motion, solve, real: (planned, motion)
-    )
+    monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, order, job: (planned, motion))
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed
     assert all("after the filters" in fault for fault in made.verdict.faults)

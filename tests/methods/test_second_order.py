@@ -12,7 +12,7 @@ from benchmarks import problems
 from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.reachability import Reachability
 from planner.methods.registry import plan
-from planner.methods.second_order import ToppraMethod
+from planner.methods.second_order import SecondOrderMethod
 
 MACHINE = problems.machine()
 JOBS = {
@@ -56,6 +56,6 @@ def test_fewer_limits_take_less_time(name):
     """Reshaped by its own multipliers, it is faster than as laid, and than with jerk limits as well."""
     made = plan(JOBS[name], MACHINE, method="second-order").require()
     assert made.verdict.passed, made.verdict.faults
-    laid = ToppraMethod(rounds=0).plan(JOBS[name], MACHINE)
+    laid = SecondOrderMethod(rounds=0).plan(JOBS[name], MACHINE)
     assert made.trajectory.cycle_time < laid.trajectory.cycle_time
     assert made.trajectory.cycle_time < plan(JOBS[name], MACHINE).trajectory.cycle_time

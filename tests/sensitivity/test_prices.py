@@ -20,7 +20,7 @@ from planner.job.records import SAVED_MIN
 from planner.machine import Fir
 from planner.methods.optimal import SIGMA2, OptimalMethod
 from planner.nc.reader import parse_program
-from planner.optimal.on_path import corner_shape
+from planner.optimal.geometry import corner_shape
 from planner.path.samples import sample_path
 from planner.sensitivity import prices
 from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, price_list

@@ -11,40 +11,37 @@ Along arcs, where curvature and feed are constant, the closed form says it befor
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.filters import ROOM_LEAST, Behind, Places, kept, rested
-from planner.geometry.toolpath import Toolpath
-from planner.machine import Machine
+from planner.job.job import Job
 from planner.motion.timing import Motion
-from planner.optimal.reshape import OnPath
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import Order, solve_again
+from planner.optimal.tighten import within_limits
 
-ROUNDS = 10
+ROUNDS = 10  # at most; pentagon and zig-zag behind 20/13 and 50/30 ms take 1 to 7
 # The feed is limited this far on both sides of a place [tolerances]. Pentagon at 20/13 and 50/30 ms with 0.3, 1, 2, 4: 1.030, 1.033,
 # 1.055, 1.102 s and 1.177, 1.195, 1.221, 1.307 s: the shorter, the more it is like waiting at the vertex.
 REACH = 0.3
-POWER = 1.0  # of the factor that the error has to fall by, on the square of the feed
+# The error of a corner goes with the square of its feed, so that the square changes by the factor by which the error has to; in a round
+# by no more than these [-], since braking and speeding up around the corner change that factor.
+CHANGE_MIN, CHANGE_MAX = 0.1, 2.0
 AIM = 0.01  # of the tolerance: what the search leaves unused [-]; it ends where no feed may grow by more than WORTH [-]
 WORTH = 0.05
-CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-]
+CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-], or the motion would stand where it cannot go on
 BOUND = "filter_error"
 
-Finish = Callable[[OnPath, FeedrateProblem], tuple[OnPath, Motion] | None]
 
-
-def within_filters(
-    planned: OnPath, motion: Motion, solve: Finish, real: tuple[Machine, Toolpath]
-) -> tuple[OnPath, Motion]:
+def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> tuple[OnPath, Motion]:
     """The fastest motion found that keeps the tolerance behind the machine's filters, and the solution that it comes from.
 
     motion : that of `planned`, which keeps all limits
-    solve  : the motion of another problem on the same grid, None if there is none
     """
-    machine, toolpath = real
+    machine, toolpath = job.real
     if machine.fir is None:
         return planned, motion
     behind = Behind(toolpath, machine)
@@ -58,6 +55,12 @@ def within_filters(
         places = behind.places(waiting, path)
         if not len(places.time) and (best is None or waiting.end < best[1].end):
             best = planned, waiting
+        job.tell(
+            "filters",
+            found=waiting.end,
+            places=len(places.time),
+            kept=best is not None and best[1] is waiting,
+        )
         zone = _zones(plain, waiting, behind, places.near_time)
         now = np.array([waiting.law.feed[a:b].min() ** 2 for a, b in zone])
         change = np.where(now > 0.0, _change(places, path[1]), 1.0)  # a full stop is not made slower
@@ -67,10 +70,10 @@ def within_filters(
             np.isfinite(corner) | (change < 1.0), change, 1.0
         )
         elsewhere = _elsewhere(elsewhere, plain, waiting, behind, places)
-        slower = solve(planned, _limited(plain, zone, corner, elsewhere, least))
-        if slower is None:
+        slower = solve_again(planned, _limited(plain, zone, corner, elsewhere, least), order.solver)
+        if not slower.solution.solved:
             break
-        planned, motion = slower
+        planned, motion = within_limits(slower, order, job.toolpath, job.machine)
     last = planned, kept(motion, toolpath, machine)
     return last if best is None or last[1].end < best[1].end else best
 
@@ -78,7 +81,7 @@ def within_filters(
 def _change(places: Places, path: FloatArray) -> FloatArray:
     """(N+1,) by what the square of the feed at every vertex may change."""
     room = np.maximum(1.0 - AIM - path, ROOM_LEAST)
-    return np.clip((room / np.maximum(places.near - path, room / 4.0)) ** POWER, 0.1, 2.0)
+    return np.clip(room / np.maximum(places.near - path, room / 4.0), CHANGE_MIN, CHANGE_MAX)
 
 
 def _zones(
@@ -110,7 +113,7 @@ def _elsewhere(
         _zones(problem, motion, behind, places.time[contour]), places.less[contour], strict=True
     ):
         less[a:b] = np.minimum(less[a:b], by)
-    return np.where(less < 1.0, np.minimum(bound, now * less**POWER), bound)
+    return np.where(less < 1.0, np.minimum(bound, now * less), bound)
 
 
 def _limited(

@@ -1,4 +1,4 @@
-"""What a motion exceeds a limit by between grid points, and two ways to make up for it.
+"""What a motion exceeds a limit by between grid points, and two ways to make up for it: tighter limits there, or less speed.
 
 A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
 divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
@@ -10,27 +10,29 @@ only. What is left, whole runs between full stops are slowed down by; that alway
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import paced, runs_of
-from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import Toolpath
+from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
-from planner.motion.time_law import TimeLaw, law_of_solution
+from planner.motion.time_law import TimeLaw
 from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
-from planner.optimal.reshape import OnPath
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import Order, solve_again
 from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
-# the time it takes counts, by more than the second, once: it leaves less than half of the excess.
+# Tightening pays while a run is slowed down by more than the first of these [-], and not for long: the first round gains 4e-3 of the
+# time, the second 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid
+# points, where the time it takes counts, it is done once, above the second: that leaves less than half of the excess.
 TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 6, 50_000
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
@@ -61,11 +63,15 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
             most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
             worst = np.maximum(worst, most ** (1.0 / order))
+        for order, ratio in ratios(machine.own, seen):
+            worst = np.maximum(worst, ratio.reshape(times.shape).max(axis=1) ** (1.0 / order))
         factor[own] = worst
     for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
+        for order, ratio in ratios(machine.own, chunk):
+            worst = np.maximum(worst, ratio ** (1.0 / order))
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor
@@ -107,16 +113,17 @@ def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
 
 
 def within_limits(
-    planned: OnPath,
-    solve: Callable[[FeedrateProblem], FeedrateSolution],
-    toolpath: Toolpath,
-    machine: Machine,
+    planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine, tell: Tell = tell_nobody
 ) -> tuple[OnPath, Motion]:
     """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
-    `planned` has a solution."""
-    motion = _motion(planned)
+    `planned` has a solution. Without jerk limits the motion is taken as it is: accelerations step at grid points, between which they
+    are close to straight lines."""
+    motion = planned.motion()
+    if not order.jerk_limited:
+        return planned, motion
     factor = excess(motion, toolpath, machine)
     best = planned, slowed(motion, toolpath, machine, factor)
+    tell("between points", found=best[1].end, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
     for _ in range(1 if large else TIGHTENING_ROUNDS):
@@ -124,19 +131,22 @@ def within_limits(
             break
         room *= np.maximum(factor, 1.0)
         problem = tightened(planned.problem, room)
-        tighter = dataclasses.replace(planned, problem=problem, solution=solve(problem))
+        tighter = solve_again(planned, problem, order.solver)
         if not tighter.solution.solved:
             break
-        motion = _motion(tighter)
+        motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
         kept = slowed(motion, toolpath, machine, factor)
+        tell(
+            "tighten",
+            found=kept.end,
+            before=best[1].end,
+            kept=kept.end < best[1].end,
+            excess=float(factor.max() - 1.0),
+        )
         if kept.end < best[1].end:
             best = tighter, kept
     return best
-
-
-def _motion(planned: OnPath) -> Motion:
-    return Motion(samples=planned.samples, law=law_of_solution(planned.samples, planned.solution))
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:

@@ -7,10 +7,12 @@ import dataclasses
 import pytest
 
 from benchmarks.never_slower import compared, job, slower
+from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import Status
-from planner.methods import rivals
 from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program
+from planner.optimal import loop
+from planner.optimal.order import ThirdOrder
 
 
 @pytest.mark.parametrize("seed", [3, 17, 27, 28, 40, 52, 70, 99])
@@ -38,8 +40,11 @@ def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):
     class Asked:
         stop_time = 1.01 * plan.trajectory.cycle_time
 
-    monkeypatch.setattr(rivals, "_chances", lambda best, job, on_path: iter(()))
-    assert rivals.fastest(plan, Asked(), None, None) is plan
-    large = dataclasses.replace(plan, grid_points=rivals.RIVAL_POINTS + 1)
-    monkeypatch.setattr(rivals, "_chances", None)
-    assert rivals.fastest(large, Asked(), None, None) is large
+    settings = loop.Settings(method="optimal", corner="auto", order=ThirdOrder(JerkLimited()))
+    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings: plan)
+    monkeypatch.setattr(loop, "chances", lambda best, job, order: iter(()))
+    assert loop.fastest_plan(Asked(), settings) is plan
+    large = dataclasses.replace(plan, grid_points=loop.RIVAL_POINTS + 1)
+    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings: large)
+    monkeypatch.setattr(loop, "chances", None)
+    assert loop.fastest_plan(Asked(), settings) is large

@@ -17,7 +17,9 @@ from planner.feedrate.solution import ratios_by_limit
 from planner.geometry.build import toolpath_from_program
 from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion, sample_motion
-from planner.optimal.between_points import (
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import ThirdOrder
+from planner.optimal.tighten import (
     SLOWING_MORE,
     excess,
     slowed,
@@ -26,7 +28,6 @@ from planner.optimal.between_points import (
     within_limits,
     without_seen_excess,
 )
-from planner.optimal.reshape import OnPath
 from planner.path.samples import RESOLUTION, sample_path
 from planner.verify import verify
 
@@ -85,7 +86,7 @@ def test_the_slowed_motion_has_no_excess(coarse):
 
 def test_tightening_costs_less_than_slowing_down(coarse):
     planned, motion, toolpath, _ = coarse
-    best, kept = within_limits(planned, SOLVE, toolpath, MACHINE)
+    best, kept = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
     assert excess(kept, toolpath, MACHINE).max() <= 1.0 + SLOWING_MORE
     plain = slowed(motion, toolpath, MACHINE)
     assert kept.end - motion.end < 0.5 * (plain.end - motion.end)

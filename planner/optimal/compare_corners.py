@@ -1,0 +1,96 @@
+"""Single corners instead of splines, between the full stops where they are faster.
+
+How long corners take at least is known from the motion without jerk limits on a coarse grid; where that is more than what the splines
+take, there is nothing to compare. The others are planned, which takes a grid point of their own grid at least, of which corners of a
+few um need 200 each where jerks are low: stretches are compared in the order of what they could gain by point, up to
+`COMPARED_POINTS`, and the rest is said.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.reachability import Reachability
+from planner.job.job import Job
+from planner.machine import Machine
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import Order, second_order
+from planner.path.samples import RESOLUTION, sample_path
+from planner.smoothing.spline_path import with_spline
+
+COMPARED_POINTS = 1_000_000  # some 10 s and 1 GB
+# On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on chords of 0.1 mm): this
+# share of it is less than what corners take (tested). The errors of a grid go with the square of its intervals: it has a tenth of the
+# usual one's points (22.7 and 213 for each corner on chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
+COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
+
+
+class CornerBounds(NamedTuple):
+    """Of a motion on corners between full stops: time (G,) that it takes at least [s], points (G,) of its grid, about."""
+
+    time: FloatArray
+    points: FloatArray
+
+
+def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
+    """From the motion without jerk limits on a coarse grid; no time at all where that has no solution: then the corners are planned to
+    see."""
+    samples = sample_path(path, machine, COARSER * RESOLUTION, third_order=True)
+    points = FEWER * np.diff(samples.piece)
+    planned = second_order(path, samples, machine, Reachability())
+    if not planned.solution.solved:
+        return CornerBounds(np.zeros(len(points)), points)
+    return CornerBounds(COARSE_SHARE * planned.stop_to_stop(), points)
+
+
+def with_corners(
+    rounded: SmoothPath, best: OnPath, corners: CornerBounds, job: Job, order: Order
+) -> tuple[OnPath, Array]:
+    """Corners instead of splines between the full stops where they are faster, and where that was too much to find out.
+
+    rounded : the path with the corners that the splines of `best` replace
+    corners : bounds on the motion on them
+    """
+    none = np.zeros(0, dtype=np.int64)
+    shape = best.shape
+    assert shape is not None
+    if not best.solution.solved:
+        if corners.points.sum() > COMPARED_POINTS:
+            return best, none
+        planned = order.solve(rounded, job)
+        return dataclasses.replace(planned, shape=shape) if planned.solution.solved else best, none
+    piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
+    chosen = np.zeros(len(corners.time), dtype=bool)
+    chosen[piece[shape.laid.fits]] = True  # elsewhere there is nothing to choose
+    gain = best.stop_to_stop() - corners.time
+    chosen &= gain > 0.0
+    ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
+    left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
+    chosen[left] = False
+    job.tell("bound on corners", found=corners.time.sum(), stretches=len(ranked), left=len(left))
+    for _ in range(2):  # the second time on those that turned out to be faster
+        fits = shape.laid.fits & ~chosen[piece]
+        if (fits == shape.laid.fits).all():
+            break
+        mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
+        planned = order.solve(with_spline(rounded, mixed), job)
+        if not planned.solution.solved:
+            break
+        job.tell(
+            "corners",
+            found=planned.solution.cycle_time,
+            before=best.solution.cycle_time,
+            kept=planned.faster_than(best),
+            stretches=int(chosen.sum()),
+        )
+        slower = chosen & (planned.stop_to_stop() >= best.stop_to_stop())
+        if not slower.any():
+            faster = planned.faster_than(best)
+            return dataclasses.replace(planned, shape=mixed) if faster else best, left
+        chosen &= ~slower
+    return best, left

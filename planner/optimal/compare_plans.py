@@ -1,0 +1,82 @@
+"""Plans that may be faster than the time-optimal motion on splines and Bezier corners, and how to tell cheaply that they are not.
+
+A smooth path is not always the fastest: where every corner is sharp and the legs are short, stopping at each takes no tolerance and no
+grid; other corner shapes use the tolerance otherwise; and a verdict that fails at a long interpolation period may be another's pass.
+
+stop         its time is known before it is planned, as the sum of closed forms over the blocks
+fir corners  their time without jerk limits on a coarse grid is less than what they take (compare_corners.py); where that leaves a
+             chance, their time with jerk limits on a coarse grid is more, by less than `CHANCE` says
+kinematic    runs, with less freedom, on the corners of its own shape: a chance like theirs. Time-optimal motions on these corners are
+             not planned: of 300 random jobs they were the fastest on none, at 7 % of the computing time (benchmarks/ablation.py)
+
+Beyond `RIVAL_POINTS` grid points only stopping is looked at, and `kinematic` where nothing passes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+from planner.corners.smooth import round_corners
+from planner.job.job import Job
+from planner.job.plan import Plan
+from planner.job.trace import Tell
+from planner.optimal.compare_corners import corner_bounds
+from planner.optimal.geometry import corner_shape
+from planner.optimal.order import Order
+
+RIVAL_POINTS = (
+    20_000  # of the plan, and of each corner shape: as many as are solved once more on a finer grid
+)
+SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
+# On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes
+# on random jobs of benchmarks/never_slower.py): one that takes more than `CHANCE` times the best there is not the fastest [-].
+COARSER, CHANCE = 25.0, 1.03
+# A rival that is faster by less is taken for the same motion without the grid's error: what holds it and what limits cost is what the
+# plan says of itself [-].
+SAME_MOTION = 2e-3
+FASTER = 1e-4  # less is the same time [-]: the solver's own gap
+
+
+def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
+    """Corner shapes on which a motion may be faster than the plan."""
+    dwell = float(job.toolpath.dwell.sum())
+    for name in SHAPES:
+        with job.stage("geometry"):
+            shape = corner_shape(name, job.machine, job.toolpath)
+            path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
+        with job.stage("solve"):
+            bounds = corner_bounds(path, job.machine)
+        job.tell(
+            "bound on corners", found=bounds.time.sum() + dwell, corner=name, points=int(bounds.points.sum())
+        )
+        if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= counted_time(best):
+            continue
+        coarse = order.solve(path, job, COARSER).solution
+        if coarse.solved and coarse.cycle_time + dwell < CHANCE * counted_time(best):
+            yield name
+
+
+def counted_time(plan: Plan) -> float:
+    """Cycle time [s], inf unless the verdict is passed, or nothing but chords between samples stands against it: then the job is
+    planned again with less tolerance (delivery/periods.py)."""
+    if plan.trajectory is None or plan.verdict is None:
+        return float("inf")
+    chords = all(fault.startswith(("vertex", "contour", "eq. 18")) for fault in plan.verdict.faults)
+    return plan.trajectory.cycle_time if chords else float("inf")
+
+
+def better(best: Plan, rival: Plan, why: str, tell: Tell) -> Plan:
+    """The rival if it takes less time, with the sentence `why`, else the best."""
+    kept = counted_time(rival) < (1.0 - FASTER) * counted_time(best)
+    tell(
+        "compare",
+        found=counted_time(rival),
+        before=counted_time(best),
+        kept=kept,
+        method=rival.method,
+        corner=rival.corner or "none",
+    )
+    if kept:
+        return dataclasses.replace(rival, sentence=f"{why} than splines; {rival.sentence}")
+    return best

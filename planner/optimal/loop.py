@@ -1,0 +1,247 @@
+"""The default algorithm on one page: choose a geometry, solve, reshape, solve, tighten, deliver, compare.
+
+  geometry  round the corners; lay splines over the runs between full stops                       corners/, smoothing/
+  solve     the time-optimal feed on that path, all limits at grid points                         order.py, feedrate/
+  reshape   the multipliers of that motion say where the path should give way, inside the
+            tolerance; solve on the new path; in turns                                            reshape.py, smoothing/
+  compare   single corners between the full stops, where they may be faster                       compare_corners.py
+  tighten   where the motion exceeds a limit between grid points, allow less and solve again      tighten.py
+  filters   the same where it leaves the tolerance behind the machine's own filters               behind_filters.py
+  deliver   setpoints at the interpolation period, judged by the verifier                         job/job.py, verify/
+  compare   full stops, fir corners, method kinematic, where they may be faster                   compare_plans.py
+
+Methods `optimal` (third order: with jerk limits) and `second-order` (second order: without) run the same loop with another `Order`.
+
+What is tried more than once:
+
+  what                           when                                      at most           costs         afterwards
+  -----------------------------  ----------------------------------------  ----------------  ------------  -----------------------------
+  full stop where a run gets no  no curve inside the tolerance, or a cusp  4 times           splines anew  at last fenced by two stops,
+    spline                                                                                                   with its single corners
+  round of reshaping             on splines                                WORK/points, 40;  shape, solve  faster runs keep the new one,
+                                                                             5 in vain                       others are pulled more
+  only the runs that got faster  others got slower                         each round        solve         the fastest of three stays
+  corners between full stops     "auto", a bound on their time is lower    2                 solve         splines stay where faster
+  path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
+  finer grid                     up to FINE_POINTS points                  1                 finer solve   the faster one
+  tighter limits in places       excess above 1e-5 between points          3                 solve         stretches slower by the rest
+  less feed in places            filters leave the tolerance               10                solve         waiting, slower stretches
+  the whole slower               excess below 0.5 % in the verdict         3                 verdict       the verdict stands
+  another plan                   "auto", a bound on its time is lower      3                 a plan        the fastest that passes
+
+Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
+certificate fails are tightened (smoothing/relax.py). Around the loop, a job is planned again with less tolerance where chords between
+samples leave it, and with shares of the tolerance on machines with filters (job/job.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.names import AUTO, SPLINE
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import CornerShape, SmoothPath, round_corners
+from planner.job.job import Delivered, Job
+from planner.job.plan import Plan
+from planner.methods.kinematic import KinematicMethod
+from planner.methods.stop import StopMethod
+from planner.motion.timing import Motion
+from planner.optimal.behind_filters import within_filters
+from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
+from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
+from planner.optimal.geometry import corner_shape, splined_with_stops
+from planner.optimal.notes import no_spline_note, not_compared_note
+from planner.optimal.on_path import OnPath
+from planner.optimal.order import Order
+from planner.optimal.reshape import FIRST_FORCE, chosen, price_bands, reshape, run_times
+from planner.optimal.result import plan_of_solution, prices_of
+from planner.optimal.tighten import within_limits, without_seen_excess
+from planner.smoothing.spline_path import SplineShape, with_spline
+
+# Rounds of reshaping: all of them together take about as long as this many grid points once, ...
+WORK = 150_000
+# ... there are no more than this, and none after so many that together gained less than this [-].
+ROUNDS_MAX = 40
+ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
+LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
+SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 1e-4 to 1e-3 slower (pentagon, zig-zag, spiral)
+# Without jerk limits a failed round teaches what holds its shape; so more of them may fail, with less pull each. With the numbers
+# above, 4 of 40 random polylines stayed where they began, up to 4.5 % behind the motion with jerk limits.
+PATIENCE, MORE_PATIENT = 10, 1.5
+# A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
+FINE_POINTS, FINER = 20_000, 0.1
+# Of 40 random polylines one exceeded an acceleration by 4e-4 between the places looked at; each time with ten times the margin.
+SEEN_ROUNDS = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a job is planned on a smooth path.
+
+    method : what the plan is called
+    corner : "auto", "spline", the name of a corner shape, or a shape
+    order  : which limits are kept, and the solver for them
+    bezier : the corner of "bezier", and where there is no spline
+    rounds : of reshaping; None for as many as the size of the job lets pay
+    """
+
+    method: str
+    corner: str | CornerShape
+    order: Order
+    bezier: CornerShape = field(default_factory=BezierCorner)
+    rounds: int | None = None
+
+
+def fastest_plan(job: Job, settings: Settings) -> Plan:
+    """The plan on a smooth path, or with "auto" another one that passes its verdict in less time, or while that does not; its sentence
+    says which."""
+    smooth = best = plan_on_path(job, settings)
+    if settings.corner != AUTO or not settings.order.jerk_limited:
+        return smooth
+    if job.stop_time < counted_time(best):
+        stopped = StopMethod().plan_job(job.afresh())
+        best = better(best, stopped, "full stops at all blocks take less time", job.tell)
+    if smooth.grid_points <= RIVAL_POINTS:
+        for name in chances(best, job, settings.order):
+            if name == "kinematic":
+                kinematic = KinematicMethod().plan_job(job.afresh())
+                best = better(best, kinematic, "method kinematic takes less time", job.tell)
+            else:
+                cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
+                best = better(best, cornered, f"{name} corners take less time", job.tell)
+    if counted_time(best) == np.inf:
+        kinematic = KinematicMethod().plan_job(job.afresh())
+        best = better(best, kinematic, "method kinematic keeps all limits in less time", job.tell)
+    if best is smooth:
+        return smooth
+    best = dataclasses.replace(best, method=smooth.method, corner=smooth.corner, timings=job.stages.timings)
+    if counted_time(smooth) < (1.0 + SAME_MOTION) * counted_time(best):
+        best = dataclasses.replace(best, prices=smooth.prices, grid=smooth.grid)
+    return best
+
+
+def plan_on_path(job: Job, settings: Settings) -> Plan:
+    """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered."""
+    best, made, prices = time_optimal(job, settings), None, None
+    if best.solution.solved:
+        with job.stage("solve"):
+            best, motion = within_limits(best, settings.order, job.toolpath, job.machine, job.tell)
+        with job.stage("filters"):
+            best, motion = within_filters(best, motion, settings.order, job)
+        made = _delivered(job, motion, () if settings.order.jerk_limited else ("jerk",))
+        if settings.order.jerk_limited:
+            with job.stage("report"):
+                prices = prices_of(best, job.machine)
+    return plan_of_solution(job, best, made, method=settings.method, corner=settings.corner, prices=prices)
+
+
+def time_optimal(job: Job, settings: Settings) -> OnPath:
+    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines shaped for it."""
+    order, machine = settings.order, job.machine
+
+    # Geometry: corners rounded each by itself, or splines in their place; a full stop where a run gets none.
+    with job.stage("geometry"):
+        shape = corner_shape(settings.corner, machine, job.toolpath, settings.bezier)
+        given = round_corners(job.toolpath, machine, shape, blend_tangents=order.jerk_limited)
+    if settings.corner not in (AUTO, SPLINE):
+        return order.solve(given, job)
+    with job.stage("geometry"):
+        rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
+    if not splines.laid.fits.any():
+        return dataclasses.replace(order.solve(given, job), notes=no_spline_note(rounded, splines))
+
+    # Solve and reshape in turns.
+    best = reshaped(rounded, splines, job, settings)
+    notes: tuple[str, ...] = ()
+
+    # Single corners where they are faster: between full stops, and everywhere, without the stops that were added for the splines.
+    if settings.corner == AUTO:
+        with job.stage("solve"):
+            bounds = corner_bounds(rounded, machine)
+            of_given = bounds if rounded is given else corner_bounds(given, machine)
+        best, left = with_corners(rounded, best, bounds, job, order)
+        notes = not_compared_note(rounded, left, bounds.points)
+        small = of_given.points.sum() <= COMPARED_POINTS
+        if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
+            without = order.solve(given, job)
+            _tell_of(job, "no added stops", without, best)
+            if without.faster_than(best):
+                return without
+
+    # Once more on a finer grid.
+    if best.solution.solved and len(best.samples) <= FINE_POINTS:
+        fine = order.solve(best.path, job, FINER)
+        _tell_of(job, "finer grid", fine, best)
+        if fine.faster_than(best):
+            best = dataclasses.replace(fine, shape=best.shape)
+    return dataclasses.replace(best, notes=notes)
+
+
+def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> OnPath:
+    """The motion on splines after the best of some rounds of reshaping (reshape.py).
+
+    rounded : the path with the corners that the splines replace
+    """
+
+    def solve(shape: SplineShape) -> OnPath:
+        planned = settings.order.solve(with_spline(rounded, shape), job)
+        return dataclasses.replace(planned, shape=shape)
+
+    best = solve(shape)
+    if not best.solution.solved or best.solution.multipliers is None or not len(best.path.spline):
+        return best
+    jerk_limited, rounds = settings.order.jerk_limited, settings.rounds
+    if rounds is None:
+        rounds = min(WORK // len(best.samples), ROUNDS_MAX)
+    seen, more = (ROUNDS_SEEN, MORE) if jerk_limited else (PATIENCE, MORE_PATIENT)
+    force = np.full(len(shape.laid.fits), FIRST_FORCE)
+    paid: FloatArray | None = None  # what limits cost, mean over the rounds
+    reached = [best.solution.cycle_time]
+    for n in range(1, rounds + 1):
+        if len(reached) > seen and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - seen]:
+            break
+        with job.stage("geometry"):
+            newest, pull = price_bands(best)
+            paid = newest if paid is None else paid + SHARE * (newest - paid)
+            shape, _ = reshape(best, force, paid, pull)
+        before, tried = best, solve(shape)
+        _tell_of(job, f"reshape {n}", tried, best)
+        if not tried.solution.solved:
+            break
+        faster = run_times(tried) < run_times(before)
+        if tried.faster_than(best):
+            best = tried
+        if faster.any() and not (faster | ~shape.laid.fits).all():
+            mixed = solve(chosen(before, shape, faster))
+            _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
+            if mixed.faster_than(best):
+                best = mixed
+        if not jerk_limited and not faster.all():
+            paid = paid + SHARE * (price_bands(tried)[0] - paid)
+        force = np.where(faster, LESS * force, more * force)
+        reached.append(best.solution.cycle_time)
+    return best
+
+
+def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> None:
+    """Tell of a motion that was tried, and competes with the best."""
+    before = best.solution.cycle_time
+    job.tell(name, found=tried.solution.cycle_time, before=before, kept=tried.faster_than(best), **facts)
+
+
+def _delivered(job: Job, motion: Motion, not_limited: tuple[str, ...]) -> Delivered:
+    """Set points and verdict of a motion, which is a little slower where the verdict finds next to nothing too much; every verdict is
+    at times from which nothing was fed back."""
+    made = job.deliver(motion, not_limited)
+    for again in range(SEEN_ROUNDS):
+        gentler = without_seen_excess(motion, made[1], again)
+        if gentler is None:
+            break
+        job.tell("slower for verdict", found=gentler.end, before=motion.end, round=again + 1)
+        motion = gentler
+        made = job.deliver(motion, not_limited, seed=again + 1)
+    return made

@@ -1,0 +1,63 @@
+"""The plan of a solution: what holds it and what its limits cost."""
+
+from __future__ import annotations
+
+from planner.corners.smooth import CornerShape
+from planner.job.job import Delivered, Job
+from planner.job.plan import Plan
+from planner.job.records import PriceList
+from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion
+from planner.motion.timing import Motion
+from planner.optimal.notes import path_notes
+from planner.optimal.on_path import OnPath
+from planner.optimal.reshape import tube_prices
+from planner.sensitivity.activity import history
+from planner.sensitivity.closed_form import corner_table
+from planner.sensitivity.prices import MORE_TOLERANCE, SitePrices, price_list
+
+
+def plan_of_solution(
+    job: Job,
+    best: OnPath,
+    made: Delivered | None,
+    *,
+    method: str,
+    corner: str | CornerShape,
+    prices: PriceList | None = None,
+) -> Plan:
+    """The plan of a solution and what was delivered of it, None unless solved."""
+    rounded = grid = None
+    if made is not None:
+        delivered = job.motion_of[made[0]]  # with the standstills that its samples need
+        if isinstance(delivered, ShapedMotion):
+            delivered = delivered.motion  # what the solution is of
+        assert isinstance(delivered, Motion)
+        with job.stage("report"):
+            rounded = corner_table(best.samples, best.problem, best.solution)
+            grid = history(best.problem, best.solution, delivered.law)
+        job.note(*path_notes(job.toolpath, best), *best.notes)
+    return job.plan(
+        made,
+        method=method,
+        corner=corner if isinstance(corner, str) else corner.name,
+        solver=best.solution.solver,
+        status=best.solution.status,
+        sentence=best.solution.sentence,
+        grid_points=len(best.samples),
+        rounded=rounded,
+        grid=grid,
+        prices=prices,
+    )
+
+
+def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
+    """What the limits of a jerk-limited motion cost; None where the solver does not tell, behind filters, of which the problem knows
+    only a part, and with limits of one's own."""
+    if not best.solution.multipliers or machine.fir is not None or machine.own:
+        return None
+    by_site = None
+    if best.shape is not None and len(best.path.spline):  # what the tube of the splines costs
+        now, wider = (tube_prices(best, more) for more in (0.0, MORE_TOLERANCE))
+        by_site = SitePrices(place=best.shape.laid.sites.place, now=now, wider=wider)
+    return price_list(best.samples, best.problem, best.solution, machine, by_site)

@@ -53,7 +53,7 @@ def test_options_that_are_shown_exist_and_the_others_are_shown(
     assert shown
     assert not missing
     long = set(re.findall(r"^. (?:\*\s+)?(--[a-z][a-z-]*)", help_text, re.MULTILINE))
-    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--help": "-h"}
+    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--verbose": "-v", "--help": "-h"}
     assert long
     assert not {short.get(option, option) for option in long} - shown - {"-h"}
 

@@ -1,11 +1,11 @@
-"""Corners taken slowly enough for the filters behind: what `optimal` and `second-order` do before `behind.kept` has the last word.
+"""Corners taken slowly enough for the filters behind the setpoints, before delivery/filters.py slows down whole runs.
 
-A filtered motion passes a vertex by the mean of where the motion was within Td: the longer the motion takes for the corner itself, the
-less its way in and out counts. So it is the feed close to a place where the filtered motion leaves the tolerance that is limited, and
-nothing else: braking and speeding up stay as steep as the axes allow. The feedrate problem is solved again with that bound, its square
-smaller than the feed was by as much as the error has to be, until nothing is left.
+A filtered motion passes a vertex at the mean of its positions within Td: the longer the motion takes for the corner itself, the less
+the way in and out counts. Therefore only the feed close to a place where the filtered motion leaves the tolerance is limited; the
+motion brakes and speeds up as steeply as the axes allow. The feedrate problem is solved again with that bound, feed squared reduced in
+proportion to the error, until no such place is left.
 
-Along arcs, where curvature and feed are constant, the closed form says it beforehand (constraints/assemble.py).
+Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand (constraints/assemble.py).
 """
 
 from __future__ import annotations

@@ -62,9 +62,9 @@ from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# Rounds of reshaping: all of them together take about as long as this many grid points once, ...
+# Budget of reshaping: rounds x grid points <= WORK, ...
 WORK = 150_000
-# ... there are no more than this, and none after so many that together gained less than this [-].
+# ... at most ROUNDS_MAX rounds, and none after ROUNDS_SEEN rounds that together gained less than GAIN_MIN of the time [-].
 ROUNDS_MAX = 40
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
@@ -86,7 +86,7 @@ class Settings:
     corner : "auto", "spline", the name of a corner shape, or a shape
     order  : which limits are kept, and the solver for them
     bezier : the corner of "bezier", and where there is no spline
-    rounds : of reshaping; None for as many as the size of the job lets pay
+    rounds : of reshaping; None for as many as the size of the job allows
     """
 
     method: str
@@ -97,8 +97,8 @@ class Settings:
 
 
 def fastest_plan(job: Job, settings: Settings) -> Plan:
-    """The plan on a smooth path, or with "auto" another one that passes its verdict in less time, or while that does not; its sentence
-    says which."""
+    """The plan on a smooth path; with "auto" another plan if that takes less time or passes while the smooth one fails. The sentence of
+    the plan says which."""
     smooth = best = plan_on_path(job, settings)
     if settings.corner != AUTO or not settings.order.jerk_limited:
         return smooth
@@ -234,8 +234,8 @@ def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> 
 
 
 def _delivered(job: Job, motion: Motion, not_limited: tuple[str, ...]) -> Delivered:
-    """Set points and verdict of a motion, which is a little slower where the verdict finds next to nothing too much; every verdict is
-    at times from which nothing was fed back."""
+    """Setpoints and verdict of a motion. If the verdict finds a tiny excess the motion is slowed down, and judged at other times, from
+    which nothing was fed back."""
     made = job.deliver(motion, not_limited)
     for again in range(SEEN_ROUNDS):
         gentler = without_seen_excess(motion, made[1], again)

@@ -1,21 +1,22 @@
-"""A round of reshaping: splines that give way, within the tolerance, where their time-optimal motion pays most for its limits.
+"""A round of reshaping: splines give way, within the tolerance, where limits cost their time-optimal motion most.
 
-Let x(t) be the time-optimal motion along a spline and lambda its multipliers, those of the axis jerks for instance. With the spline's
-parameter as a function of time held fixed, a small change of the control points changes the optimal time by
+Let x(t) be the time-optimal motion along a spline and lambda its multipliers, those of the axis jerks for instance. If the parameter of
+the spline is kept as a function of time, a small change of the control points changes the optimal time by
 
     dT = sum over grid points and axes of  |lambda| d(|jerk| / limit)  +  the same of accelerations, velocities and feed,
 
-which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape, a convex quadratic in the control points because the
-motion is linear in them. A round minimises it, with a pull towards the present shape,
+which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape. This sum is a convex quadratic in the control points,
+because the motion is linear in them. A round minimises it, with a pull towards the present shape,
 
     sum |lambda|/2 (jerk/limit)^2 + ...  +  force/2 integral ((jerk - jerk_now)/limit)^2 dt,
 
-inside the tube (smoothing/). The feedrate problem is solved on the new path; the runs that got faster keep their new shape and are
-pulled less in the next round, the others keep the old one and are pulled more (optimal/loop.py). Where nothing can be gained to first
-order any more, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance. The
-multipliers jump from round to round, as limits take turns; their running mean over the rounds serves better. Without jerk limits the
-profile has corners, at which another limit takes over as soon as the shape gives way: there the mean takes in what holds the shapes
-that failed, too.
+inside the corridor (smoothing/). The feedrate problem is then solved on the new path. Runs that got faster keep their new shape and are
+pulled less in the next round; the others keep their old shape and are pulled more (optimal/loop.py). When nothing can be gained to
+first order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+
+The multipliers jump from round to round, because limits take turns; their running mean over the rounds works better. Without jerk
+limits the profile has corners, at which another limit takes over as soon as the shape gives way; there the mean also includes the
+multipliers of the shapes that failed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The plan of a solution: what holds it and what its limits cost."""
+"""The plan of a solution: its active limits and what they cost."""
 
 from __future__ import annotations
 

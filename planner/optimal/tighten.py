@@ -1,10 +1,10 @@
-"""What a motion exceeds a limit by between grid points, and two ways to make up for it: tighter limits there, or less speed.
+"""Limits that a motion exceeds between grid points, and two ways to keep them: tighter limits there, or less speed.
 
-A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
-divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
+A solver keeps the limits at the grid points. Between them the motion may exceed a limit, usually by less than 0.5 %. Slowing down by
+lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so an excess says by which lam the motion has to be slower there.
 
-`tightened` asks for it where it is needed, by the problem's `limit_scale` around every excess: the solution is slower in these places
-only. What is left, whole runs between full stops are slowed down by; that always ends.
+`tightened` scales the limits around every excess (`limit_scale` of the problem) and solves again: the new motion is slower in these
+places only. Each run between full stops is then slowed down uniformly by the excess that remains, which always ends.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints import normal_limit
 from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import paced, runs_of
@@ -40,7 +41,7 @@ SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
-ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, "jerk": 3}
+ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, normal_limit.NAME: 2, "jerk": 3}
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:

@@ -16,13 +16,14 @@ from planner.verify.dense import Comparison
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.given import DERIVATIVES, Given
+from planner.verify.limits import NORMAL_NAME, normal_limit
 from planner.verify.pieces import ProgramPieces, program_pieces, widened
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
 from planner.verify.times import AnyMotion, cells_per_period, look
 from planner.verify.verdict import Verdict
 
-NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
+NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
 WHOLE = Given()
 
 
@@ -39,17 +40,17 @@ def verify(
 ) -> Verdict:
     """Judge a delivered motion against the programmed path and the machine.
 
-    trajectory  : the delivered samples at dt; only its times, positions and their derivatives are looked at
-    toolpath    : the programmed path (lines, arcs, helices) with feeds, budgets and stops
-    motion      : what the samples were taken from, to be looked at between them, at times that are chosen here (times.py); None
-                  to judge the samples alone
-    seed        : of those times; a motion that was changed by what one verdict saw needs a verdict with another seed
-    given       : which columns of the trajectory were delivered, and to how many digits
-    not_limited : quantities that are reported but not part of passing, of `NOT_LIMITED_NAMES`
-    progress    : called now and then with the share that is done, 0 to 1
+    trajectory  : the delivered samples at dt; only its times, positions and their derivatives are used
+    toolpath    : the programmed path (lines, arcs, helices) with feeds, tolerances and stops
+    motion      : what the samples were taken from, to be judged between them too, at times chosen here (times.py); None to judge the
+                  samples alone
+    seed        : of those times; a motion that was changed because of a verdict needs a verdict with another seed
+    given       : which columns of the trajectory were delivered, and with how many digits
+    not_limited : quantities of `NOT_LIMITED_NAMES` that are reported and not judged
+    progress    : called now and then with the fraction done (0 to 1)
 
-    Raises InputError if the axes differ, the trajectory has no samples or its times can only be milliseconds, ValueError for an
-    unknown name in `not_limited` and for a toolpath that contradicts itself.
+    Raises InputError if the axes differ, if the trajectory has no samples, or if its times can only be milliseconds. Raises ValueError
+    for an unknown name in `not_limited`, and for a toolpath that contradicts itself.
     """
     _check_input(trajectory, toolpath, not_limited)
     if motion is None:
@@ -160,7 +161,7 @@ def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited:
         judged=np.array([name in given.columns for name in DERIVATIVES]),
         rounding=_rounding(trajectory, given, per_axis[1]),
         time_rounding=given.time_rounding,
-        normal_acceleration=machine.normal_acceleration or np.inf,
+        normal=normal_limit(machine),
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         axes=trajectory.axes,

@@ -189,8 +189,7 @@ def test_where_nothing_converges_the_start_stays_and_says_why():
     assert made.status is Status.ACCEPTABLE
     assert made.trajectory.cycle_time == SHORT[0].plan(job, MACHINE).trajectory.cycle_time
     assert (
-        "stays on 1 of 1 stretches between full stops, the first on lines 2 to 3: not converged"
-        in made.sentence
+        "stays on 1 of 1 runs between full stops, the first on lines 2 to 3: not converged" in made.sentence
     )
 
 
@@ -210,7 +209,7 @@ def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     rest = SHORT[0].plan(parse_program("G21 G90 F6000\nG1 X4\nM2\n"), MACHINE)
     both = first.trajectory.cycle_time + rest.trajectory.cycle_time + 0.35
     assert made.trajectory.cycle_time == pytest.approx(both, rel=1e-6)
-    assert "stays on 1 of 2 stretches between full stops, the first on lines 5 to 5" in made.sentence
+    assert "stays on 1 of 2 runs between full stops, the first on lines 5 to 5" in made.sentence
 
 
 @pytest.mark.slow

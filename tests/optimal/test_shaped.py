@@ -38,7 +38,7 @@ def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
 def test_without_shaping_it_rings(pentagon):
     made = plan(pentagon, SHAKEN, method="bezier")
     assert left(made) > 0.1
-    assert any("does not shape its set points" in note for note in made.notes)
+    assert any("does not shape its setpoints" in note for note in made.notes)
 
 
 PROGRAM = b"""G21 G90 G17 G94 G64 P0.04 F3000

@@ -9,12 +9,11 @@ One window's problem is in window.py, its second-order model in rows.py, the ste
 the Lagrangian at the current profile, minimises the barrier problem's linear-quadratic model exactly and goes as far as slacks,
 multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever the size.
 
-**Windows.** A long piece is solved in windows of about `window` intervals, or more where the way to brake is long beside that. Each
-window ends in a full stop, which is only a way to end it: its first part is kept as far as the stop cannot be felt, three ways to
-brake before it, and the next window starts from the state reached there. It starts where more speed would help, by the costate of
-the kinematics, not where the motion brakes into a bend with all its jerk: a state that can hardly be continued leaves a problem
-without room, and multipliers that mean nothing. What is kept agrees with the one-piece solution (tested). Memory is that of one
-window.
+**Windows.** A long piece is solved in windows of about `window` intervals, or more if the braking distance is long beside that. Each
+window ends in a full stop, which is only there to end it. The part of the window that the stop cannot influence is kept, up to three
+braking distances before it, and the next window starts from the state reached there, at a point where the costate of the kinematics
+says that more speed would help. A start during hard braking into a bend would leave a problem with hardly any feasible points, and
+multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window.
 
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into smaller ones if it starts
 at rest; else, or where even that fails, the profile stops: at the end of the window before, if the motion comes from there, or after

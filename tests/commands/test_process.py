@@ -135,6 +135,7 @@ def test_broken_pipe_is_quiet(job: Path) -> None:
     assert done.returncode == 141
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_output_that_cannot_be_written_or_is_closed() -> None:
     with open("/dev/full", "w") as full:

@@ -47,6 +47,7 @@ def test_it_is_one_where_nothing_is_said_and_the_limits_are_those_of_the_machine
     np.testing.assert_array_equal(problem.jerk_limit[3], problem.jerk)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("solver", "make", "rel"),
     [
@@ -88,6 +89,7 @@ def test_at_second_order_it_is_a_stretched_path(seed):
     assert found.cycle_time > Reachability().solve(problem).require().cycle_time * (1.0 + 1e-3)
 
 
+@pytest.mark.slow
 def test_the_jerk_limited_solvers_agree_and_keep_the_scaled_limits():
     problem = small_problem(4)
     local = scaled(problem, some_scale(problem))

@@ -117,11 +117,13 @@ def test_loose_jerk_gives_the_second_order_time():
     assert third.cycle_time == pytest.approx(second.cycle_time, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_tighter_jerk_is_never_faster(bend):
     times = [JerkLimitedNLP().solve(replace(bend, jerk=bend.jerk * f)).cycle_time for f in (0.5, 1.0, 2.0)]
     assert times == sorted(times, reverse=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", [1 / 25.4, 1e-3])
 def test_inches_and_metres_give_the_same_plan(bend, unit):
     """The iterates are the same but for rounding."""

@@ -126,6 +126,7 @@ def test_the_optimum_converges_to_that_of_the_other_formulation() -> None:
     assert gap[2] < 0.6 * gap[1]
 
 
+@pytest.mark.slow
 def test_a_line_converges_to_the_closed_form() -> None:
     """Where all of the motion is limited by jerk, at first order; with constant w next to the first and the last interval it
     is 3 % above on all of these grids."""
@@ -149,6 +150,7 @@ def test_a_motion_leaves_rest_with_all_the_jerk_there_is() -> None:
     np.testing.assert_allclose(solution.jerk_s[[0, 1, 2, -4, -3, -2]], 2e4, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_one_row_at_rest_is_enough_to_slow_the_start(trident: FeedrateProblem) -> None:
     """The jerk rows next to rest are bounds on x there; without them a start on a coarse grid would break the jerk limits."""
     tight = replace(trident, jerk=trident.jerk * 1e-3)
@@ -188,6 +190,7 @@ def test_the_delivered_jerk_is_the_mean_of_the_interval(trident: FeedrateProblem
     assert solution.jerk_limited
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length", "time"), [(1 / 25.4, 1.0), (1e-3, 60.0)])
 def test_other_units_give_the_same_plan(trident: FeedrateProblem, length: float, time: float) -> None:
     here = SequentialConvex().solve(trident)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick import slow_but
 from random_problems import circle, line, random_problem
 from whole_plans import solve
 
@@ -53,7 +54,7 @@ def keeps_limits(problem: FeedrateProblem, solution: FeedrateSolution) -> None:
     assert not (free[:-1] & free[1:]).any()
 
 
-@pytest.mark.parametrize("seed", range(0, 40, 3))
+@pytest.mark.parametrize("seed", slow_but([0, 3, 6, 9], range(0, 40, 3)))
 def test_controllable_sets(seed: int) -> None:
     """Their upper ends; from rest to rest the lower ones are 0."""
     problem = random_problem(seed)
@@ -64,13 +65,13 @@ def test_controllable_sets(seed: int) -> None:
         assert other[:, 0].max() <= 1e-9 * own.max()
 
 
-@pytest.mark.parametrize("part", range(10))
+@pytest.mark.parametrize("part", slow_but([0, 1], range(10)))
 def test_random_problems(part: int) -> None:
     solved = [both(random_problem(seed))[0].solved for seed in SEEDS if seed % 10 == part]
     assert sum(solved) >= 18  # the others ask for speeds at their ends that cannot be joined
 
 
-@pytest.mark.parametrize("job", problems.all_jobs())
+@pytest.mark.parametrize("job", slow_but(("pentagon", "arcs"), problems.all_jobs()))
 def test_jobs(job: str) -> None:
     both(solve(problems.all_jobs()[job], problems.machine()).problem)
 
@@ -84,6 +85,7 @@ def test_programs_of_the_peers(name: str, shared_dir: Path) -> None:
     both(solve(read_program(file, problems.machine()), problems.machine(), resolution=2e-2).problem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REAL)
 def test_real_programs(name: str, shared_dir: Path) -> None:
     file = shared_dir / "nc" / name

@@ -101,6 +101,7 @@ def test_tube_too():
     assert_kept(TubeMethod().plan(CORNER, machine((0.02, 0.013))), (0.02, 0.013))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [FirMethod, FirSplineMethod])
 def test_filters_that_make_the_profile_are_not_those_behind_it(method):
     made = method(profile_filters=(0.03, 0.01)).plan(CORNER, machine((0.02, 0.013)))
@@ -126,6 +127,7 @@ def test_a_stop_rests_no_longer_than_the_filters_need():
     assert plan(CORNER, machine((0.01, 0.004)), method="stop").trajectory.cycle_time == plain
 
 
+@pytest.mark.slow
 def test_a_shorter_filter_costs_less():
     for method in ("stop", "bezier"):
         times = [plan(CORNER, machine(lengths), method=method).trajectory.cycle_time for lengths in LENGTHS]

@@ -51,6 +51,7 @@ def test_all_multipliers_together_are_half_of_the_time(name):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(JOBS) - {"pentagon"}))
 def test_fewer_limits_take_less_time(name):
     """Reshaped by its own multipliers, it is faster than as laid, and than with jerk limits as well."""

@@ -91,6 +91,7 @@ def test_less_than_one_pulse_off_at_every_instant(seed, steps, other):
         np.testing.assert_array_equal(np.cumsum(train.per_period), counter(train, samples.t[1:]))
 
 
+@pytest.mark.slow
 def test_a_million_periods_do_not_drift():
     """An hour of steps with random speeds: no remainder is ever added up."""
     rng = np.random.default_rng(1)

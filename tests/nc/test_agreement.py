@@ -238,6 +238,7 @@ def random_program(rng: np.random.Generator) -> str:
     return "\n".join(lines) + "\nM2\n"
 
 
+@pytest.mark.slow
 @needs_oracle
 def test_random_programs_agree(tmp_path: Path) -> None:
     rng = np.random.default_rng(2024)

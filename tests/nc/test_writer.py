@@ -205,6 +205,7 @@ def test_any_program(seed: int) -> None:
     check(source, random_feeds(parse_program(source, MACHINE), rng), MACHINE)
 
 
+@pytest.mark.slow
 @needs_oracle
 def test_the_control_reads_random_programs_as_we_do(tmp_path: Path) -> None:
     rng = np.random.default_rng(77)

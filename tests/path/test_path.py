@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from quick import slow_but
 from scipy.special import ellipe, ellipk
 from whole_plans import CORNERS, smooth_path, solve
 
@@ -101,7 +102,7 @@ def test_derivatives_against_differences(job, kind):
 
 
 @pytest.mark.parametrize("job", list(JOBS))
-@pytest.mark.parametrize("kind", CORNERS)
+@pytest.mark.parametrize("kind", slow_but("bezier", CORNERS))
 def test_arc_length_against_quadrature(job, kind):
     samples = sample_path(smooth_path(JOBS[job], MACHINE, kind), MACHINE)
     inner = samples.intervals[:: max(1, len(samples) // 300)]
@@ -147,7 +148,7 @@ def test_curvature_jumps_where_a_line_meets_an_arc():
 
 
 @pytest.mark.parametrize("job", list(EVERY))
-@pytest.mark.parametrize("kind", CORNERS)
+@pytest.mark.parametrize("kind", slow_but("bezier", CORNERS))
 def test_the_path_is_continuous_and_in_order(job, kind):
     samples = sample_path(smooth_path(EVERY[job], MACHINE, kind), MACHINE)
     inner = samples.intervals
@@ -165,7 +166,7 @@ def test_the_path_is_continuous_and_in_order(job, kind):
 
 
 @pytest.mark.parametrize("job", list(EVERY))
-@pytest.mark.parametrize("kind", CORNERS)
+@pytest.mark.parametrize("kind", slow_but("bezier", CORNERS))
 def test_limits_hold_between_grid_points(job, kind):
     """The solved profile evaluated densely: axis velocity and acceleration, and feed."""
     machine = MACHINE

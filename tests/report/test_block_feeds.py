@@ -128,6 +128,7 @@ def circle(radius: float, chords: int) -> str:
     return "".join(f"G1 X{radius * np.cos(a) - radius:.5f} Y{radius * np.sin(a):.5f}\n" for a in angle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [(pentagon(), 6), (circle(5.0, 90), 20), (circle(0.2, 600), 8)],

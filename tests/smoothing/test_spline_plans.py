@@ -34,6 +34,7 @@ def test_refining_collinear_points_changes_nothing():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_turned_and_mirrored_jobs_take_the_same_time(seed):
     points = random_polyline(np.random.default_rng(seed), 8)
@@ -43,6 +44,7 @@ def test_turned_and_mirrored_jobs_take_the_same_time(seed):
         assert time_of(problems.polyline(points @ matrix.T)) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_scaled_jobs_take_the_same_time(seed):
     """Inches or metres: lengths and limits by k keep the time."""

@@ -29,7 +29,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.timing import MotionInTime
 from planner.verify.filtered import look_behind, motion_asked
-from planner.verify.pieces import pieces_of, widened
+from planner.verify.pieces import program_pieces, widened
 
 # Of the tolerance, what measuring at other times may find more [-].
 SPARE = 2e-3
@@ -78,7 +78,7 @@ class Behind:
     def __init__(self, toolpath: Toolpath, machine: Machine):
         self.toolpath, self.machine = toolpath, machine
         self.tolerance = float(toolpath.tolerance.min())
-        self.pieces = pieces_of(toolpath)
+        self.pieces = program_pieces(toolpath)
         self._wide = widened(self.pieces, WIDER)
         if machine.fir is None:
             return  # `errors` of the motion itself can be asked for

@@ -41,7 +41,7 @@ def steps_of(course: Course, guess: Guess, solution: TubeSolution) -> Steps:
     assert solution.h is not None
     assert solution.jerk is not None
     h, jerk = solution.h, solution.jerk
-    steps = _integrated(course, h, jerk - _closing(course, h, jerk))
+    steps = integrated(course, h, jerk - closing_jerks(course, h, jerk))
     by = max(_excess(course, guess, steps), 1.0)
     return Steps(
         h=h * by,
@@ -52,7 +52,8 @@ def steps_of(course: Course, guess: Guess, solution: TubeSolution) -> Steps:
     )
 
 
-def _integrated(course: Course, h: FloatArray, jerk: FloatArray) -> Steps:
+def integrated(course: Course, h: FloatArray, jerk: FloatArray) -> Steps:
+    """The motion from rest at the first vertex with jerks (N, A) [mm/s3], constant over steps of h (N,) [s]."""
     h = h[:, None]
     acceleration = _before(h * jerk)
     velocity = _before(h * (acceleration + h * jerk / 2))
@@ -65,7 +66,7 @@ def _before(change: FloatArray) -> FloatArray:
     return np.vstack([np.zeros((1, change.shape[1])), np.cumsum(change, axis=0)[:-1]])
 
 
-def _closing(course: Course, h: FloatArray, jerk: FloatArray) -> FloatArray:
+def closing_jerks(course: Course, h: FloatArray, jerk: FloatArray) -> FloatArray:
     """(N, A) the smallest part of the jerks that carries the motion beyond its end."""
     rest = (h.sum() - np.cumsum(h)) / h.sum()  # after each step, in units of the whole time
     own = h / h.sum()
@@ -91,11 +92,11 @@ def _excess(course: Course, guess: Guess, steps: Steps) -> float:
         np.sqrt((np.abs(a) / course.acceleration).max()),
         np.cbrt((np.abs(j) / course.jerk).max()),
     ]
-    for share in MEASURED_AT if np.isfinite(course.normal_max).any() else ():
+    for share in MEASURED_AT if np.isfinite(course.across_max).any() else ():
         tau = share * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
         speed_sq = (along**2).sum(axis=1)
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2
         normal_sq = np.divide(across_sq, speed_sq, out=np.zeros(len(h)), where=speed_sq > 0)
-        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / course.normal_max[leg]).max())
+        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / course.across_max[leg]).max())
     return float(max(ratios))

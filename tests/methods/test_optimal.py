@@ -17,6 +17,10 @@ from planner.methods.optimal import SIGMA2, OptimalMethod
 
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
+# Cycle time on single corners, over the bound without jerk limits [-]: where corners follow closely, jerk is what holds them.
+OVER_BOUND = {
+    "pentagon": 1.016, "zigzag": 1.049, "circle": 2.65, "spiral": 2.06, "five points": 1.22, "arcs": 1.010,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("corner", ["bezier", "fir"])
@@ -26,7 +30,9 @@ def test_jobs_are_verified_with_their_jerk_limited(name, corner):
     assert plan.verdict.passed, plan.verdict.faults
     assert all(check.limited for check in plan.verdict.limits.values())
     bound = planner.plan(JOBS[name], MACHINE, method="second-order", corner=corner)
-    assert bound.trajectory.cycle_time * (1 - 2e-3) <= plan.trajectory.cycle_time <= plan.stop_time
+    over = plan.trajectory.cycle_time / bound.trajectory.cycle_time
+    assert 1 - 2e-3 <= over <= OVER_BOUND[name] * (1 + 5e-3)
+    assert plan.trajectory.cycle_time <= plan.stop_time
     assert plan.rounded.worst_ratio() <= 1 + 1e-9
     assert plan.corners.held == len(plan.corners) > 0
 

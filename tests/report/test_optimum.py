@@ -126,6 +126,7 @@ def test_the_summary() -> None:
     assert nothing["prices"] is None
 
 
+@pytest.mark.slow
 def test_a_real_plan() -> None:
     machine = load_machine("mill")
     program = parse_program("G21 G90\nG1 X20 F6000\nY10\nX0\nY0\n", machine)

@@ -158,9 +158,9 @@ def test_legs_that_a_wider_tolerance_opens_count(solved):
     path = samples.path
     free = path.legs.length - path.d_out[:-1] - path.d_in[1:]
     closed = np.flatnonzero(free < 1e-9)
-    assert part._opened(path) == pytest.approx(0.0, abs=1e-9)
+    assert part.opened(path) == pytest.approx(0.0, abs=1e-9)
     smaller = dataclasses.replace(path, d=0.9 * path.d)
-    opened = part._opened(smaller)
+    opened = part.opened(smaller)
     if not len(closed):
         assert opened == 0.0
         return
@@ -173,7 +173,7 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
     """400 pieces of 10 points, then one of 5000: windows of the first hold whole pieces, none has a part that is too short."""
     piece = np.append(np.arange(0, 4001, 10), 9000)
     kept = np.arange(9000)
-    edges, points, sampled = savings._windows(piece, kept, 3_000)
+    edges, points, sampled = savings.windows_of_grid(piece, kept, 3_000)
     assert sampled
     assert 2_500 <= len(points) <= 3_000
     for a, b in pairwise(edges):
@@ -184,4 +184,4 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
         whole = part[0] == piece[inside] and part[-1] + 1 == piece[inside + 1]
         assert whole or len(part) > savings.CELLS_MIN
     assert (points < 4000).any()
-    assert savings._windows(piece, kept, 9_000)[2] is False
+    assert savings.windows_of_grid(piece, kept, 9_000)[2] is False

@@ -228,8 +228,8 @@ def test_half_of_the_closed_form_would_fail_motions_that_use_it(monkeypatch):
     feed = 0.9 * np.sqrt((BOX @ inward).max() * arc_of(theta, 0.04))
     before = judged(rounded(points, 0.04, feed), points)
     assert not laws_broken(before)
-    support = error_allocation._support
-    monkeypatch.setattr(error_allocation, "_support", lambda *given: 0.5 * support(*given))
+    support = error_allocation.allowed_across
+    monkeypatch.setattr(error_allocation, "allowed_across", lambda *given: 0.5 * support(*given))
     after = judged(rounded(points, 0.04, feed), points)
     assert laws_broken(after)
     assert after.corners.worst_speed_ratio == pytest.approx(np.sqrt(2) * before.corners.worst_speed_ratio)

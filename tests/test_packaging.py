@@ -14,10 +14,10 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 # Where all packages but these have wheels (asked of the package index for Python 3.11 and 3.13).
 WITHOUT_WHEELS = {
     ("linux", "x86_64"): set(),
-    ("linux", "aarch64"): {"toppra", "ruckig"},
+    ("linux", "aarch64"): {"toppra"},
     ("win32", "AMD64"): {"toppra"},
     ("darwin", "arm64"): {"toppra"},
-    ("darwin", "x86_64"): {"toppra", "ruckig"},
+    ("darwin", "x86_64"): {"toppra"},
 }
 
 
@@ -30,15 +30,14 @@ def test_an_installation_asks_for_what_there_are_wheels_of(machine: tuple[str, s
 
 
 def test_what_may_be_missing_can_be_asked_for() -> None:
-    for name in ("toppra", "ruckig"):
-        (extra,) = PROJECT["optional-dependencies"][name]
-        assert Requirement(extra).name == name
-        (wanted,) = (one for one in map(Requirement, PROJECT["dependencies"]) if one.name == name)
-        assert wanted.specifier == Requirement(extra).specifier
+    (extra,) = PROJECT["optional-dependencies"]["toppra"]
+    (wanted,) = (one for one in map(Requirement, PROJECT["dependencies"]) if one.name == "toppra")
+    assert Requirement(extra).name == "toppra"
+    assert wanted.specifier == Requirement(extra).specifier
 
 
 def test_packages_that_may_be_missing_are_imported_with_a_sentence() -> None:
     """Never by a plain import, which would end in a traceback."""
-    plain = re.compile(r"^\s*(import|from) (toppra|ruckig|casadi)\b", re.MULTILINE)
+    plain = re.compile(r"^\s*(import|from) (toppra|casadi)\b", re.MULTILINE)
     for file in (ROOT / "planner").rglob("*.py"):
         assert not plain.search(file.read_text(encoding="utf-8")), file

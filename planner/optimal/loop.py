@@ -8,7 +8,7 @@
   tighten   where the motion exceeds a limit between grid points, allow less and solve again      tighten.py
   filters   the same where it leaves the tolerance behind the machine's own filters               behind_filters.py
   deliver   setpoints at the interpolation period, judged by the verifier                         job/job.py, verify/
-  compare   full stops, other corner shapes, method kinematic, where they may be faster           compare_plans.py
+  compare   full stops, fir corners, method kinematic, where they may be faster                   compare_plans.py
 
 Methods `optimal` (third order: with jerk limits) and `second-order` (second order: without) run the same loop with another `Order`.
 
@@ -24,10 +24,10 @@ What is tried more than once:
   corners between full stops     "auto", a bound on their time is lower    2                 solve         splines stay where faster
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
   finer grid                     up to FINE_POINTS points                  1                 finer solve   the faster one
-  tighter limits in places       excess above 1e-5 between points          6                 solve         stretches slower by the rest
+  tighter limits in places       excess above 1e-5 between points          3                 solve         stretches slower by the rest
   less feed in places            filters leave the tolerance               10                solve         waiting, slower stretches
   the whole slower               excess below 0.5 % in the verdict         3                 verdict       the verdict stands
-  another plan                   "auto", a bound on its time is lower      5                 a plan        the fastest that passes
+  another plan                   "auto", a bound on its time is lower      3                 a plan        the fastest that passes
 
 Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
 certificate fails are tightened (smoothing/relax.py). Around the loop, a job is planned again with less tolerance where chords between
@@ -107,11 +107,12 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
         best = better(best, stopped, "full stops at all blocks take less time", job.tell)
     if smooth.grid_points <= RIVAL_POINTS:
         for name in chances(best, job, settings.order):
-            cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
-            best = better(best, cornered, f"{name} corners take less time", job.tell)
             if name == "kinematic":
                 kinematic = KinematicMethod().plan_job(job.afresh())
                 best = better(best, kinematic, "method kinematic takes less time", job.tell)
+            else:
+                cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
+                best = better(best, cornered, f"{name} corners take less time", job.tell)
     if counted_time(best) == np.inf:
         kinematic = KinematicMethod().plan_job(job.afresh())
         best = better(best, kinematic, "method kinematic keeps all limits in less time", job.tell)

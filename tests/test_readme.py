@@ -52,8 +52,8 @@ def test_options_that_are_shown_exist_and_the_others_are_shown(
     missing = {option for option in shown if not re.search(rf"(?<![\w-]){option}(?![\w-])", help_text)}
     assert shown
     assert not missing
-    long = set(re.findall(r"^. (?:\*\s+)?(--[a-z][a-z-]*)", help_text, re.MULTILINE))
-    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--verbose": "-v", "--help": "-h"}
+    long = set(re.findall(r"^. (?:-\w, )?(--[a-z][a-z-]*)", help_text, re.MULTILINE))
+    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--help": "-h", "--verbose": "-v"}
     assert long
     assert not {short.get(option, option) for option in long} - shown - {"-h"}
 

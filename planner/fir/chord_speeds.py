@@ -29,17 +29,16 @@ from planner.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slow
 from planner.fir.spline_speeds import filter_lengths, first_speeds
 from planner.machine import Machine
 
-# Rounds until the filters are no longer shortened again, and until everything gets slower.
-RATCHET, PATIENCE = 10, 40
-# Chords that are commanded within this fraction of Td of the one to blame get slower with it; in every round a little more [-].
-AROUND, WIDER = 0.1, 0.01
+# Rounds until everything gets slower with the filters at their longest, so that it ends.
+PATIENCE = 40
+# Chords that are commanded within this fraction of Td of the one to blame get slower with it [-]: 0.03 saves 0.4 % of the time of ten
+# jobs in 1.2 times the planning time, 0.3 costs 0.8 %.
+AROUND = 0.1
 # T1, and the product T1 T2, get longer at most by these factors, beyond which no command exceeds the limits [-].
 MARGINS_MAX = np.array([2.0, 4.0])
-# So many largest speeds are tried, from the feed down to this fraction of it, or to what legs of the mean length reach from rest to
-# rest.
+# So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean length reach from rest to
+# rest: half as many are 1.4 % slower on one of ten jobs, 0.4 and 0.08 cost 0.2 and 0.1 % in mean.
 SPEEDS, LOWEST = 18, 0.17
-# So many of them, the most promising, are settled.
-SETTLED_MAX = 4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,12 +69,10 @@ class ChordSpeeds(SpeedPlan):
         over = np.stack([made.largest(made.seen.acceleration), made.largest(made.seen.jerk)], axis=1)
         everything = (over > 1.0).any(axis=1) if given else np.full(guide.stretches, n >= PATIENCE)
         as_a_whole = np.where(everything, BEYOND / np.sqrt(made.largest(made.seen.worst)), 1.0)
-        v = self.v * np.minimum(self._by_error(made, n), as_a_whole[guide.stretch])
+        v = self.v * np.minimum(self._by_error(made), as_a_whole[guide.stretch])
         if given:
             return ChordSpeeds(course=guide, v=v, T1=self.T1, T2=self.T2, margin=self.margin)
         margin = np.clip(self.margin * over / BEYOND, 1.0, MARGINS_MAX)
-        if n >= RATCHET:
-            margin = np.maximum(margin, self.margin)
         if n >= PATIENCE:
             margin = np.broadcast_to(MARGINS_MAX, margin.shape)
         T1, T2 = filter_lengths(guide, v, machine, margin)
@@ -83,11 +80,11 @@ class ChordSpeeds(SpeedPlan):
             course=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin
         )
 
-    def _by_error(self, made: Made, n: int) -> FloatArray:
+    def _by_error(self, made: Made) -> FloatArray:
         """(R,) by how much to slow down each chord for the error, or the normal acceleration [-]."""
         guide, command, seen = self.course, made.command, made.seen
         delay = (self.T1 + self.T2)[guide.stretch]
-        around = np.minimum(AROUND + WIDER * n, 0.5) * delay
+        around = AROUND * delay
         duration = guide.length / self.v
         rests = guide.stretch  # in the command a rest follows each stretch
         begin = command.begin[guide.stretch] + command.t[np.arange(len(guide)) + rests] + delay / 2
@@ -108,7 +105,7 @@ def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], Fl
 
 def fastest_speeds(guide: ChordGuide, machine: Machine) -> ChordSpeeds:
     """The fastest of a few plans that keep tolerance and limits, for each stretch by itself. `guide` has no dwells."""
-    return settled_fastest(*promised(guide, machine), machine, SETTLED_MAX)
+    return settled_fastest(*promised(guide, machine), machine)
 
 
 def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSpeeds:

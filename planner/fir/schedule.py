@@ -21,14 +21,14 @@ from planner.fir.measure import slowest
 from planner.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine
 
-# Legs are cut where a speed limit ends on them only if they take longer than this fraction of Td at their own speed [-].
+# Legs are cut where a speed limit ends on them only if they take longer than this fraction of Td at their own speed [-]: 0.1 saves
+# 0.07 % of the time of ten jobs, with many more cells on fine paths; 0.5 costs 0.3 %, up to 3.
 CUT_LEGS = 0.25
 # After so many rounds what still exceeds something stops at every joint.
 ROUNDS = 40
-# Each round slows down by so much more than the round before at least [-], for what hardly falls with the speed.
+# Each round slows down by so much more than the round before at least [-], for what hardly falls with the speed: without, ten jobs take
+# 0.03 % less in 1.2 times the planning time; with 0.05 0.2 % more.
 HASTE = 0.02
-# An overlap shorter than this fraction of T2 is none: it would save no more than that of the wait.
-LEAST_OVERLAP = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -129,7 +129,6 @@ def _slower(plan: Schedule, made: Made, factor: FloatArray) -> Schedule:
     actual = np.minimum(cells.speed[last[flow - 1]], cells.speed[first[flow]])
     passing[flow] = np.minimum(passing[flow], actual * by_joint[flows & (by_joint < 1)])
     overlap[wait] *= by_joint[~flows]
-    overlap[wait[overlap[wait] < LEAST_OVERLAP * plan.T2[course.stretch[wait]]]] = 0.0
     return dataclasses.replace(plan, speed=speed, passing=passing, overlap=overlap)
 
 

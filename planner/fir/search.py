@@ -23,30 +23,32 @@ from planner.lookahead.rest_to_rest import rest_to_rest_times
 from planner.machine import Machine
 
 # Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others
-# between them, to this natural logarithm of their ratio.
+# between them, to this natural logarithm of their ratio. Ten jobs take 0.06 % longer with 0.1, and 0.18 % less with 0.01 and 1.2 times
+# the planning time; with 6 or 16 speeds 0.2 and 0.4 % less, but single ones 0.5 % longer.
 SPEEDS = 10
 FINEST = 0.03
-# Margins that are tried; from the second on with speeds near the best of the one before.
+# Margins that are tried; from the second on with speeds near the best of the one before. Without any but 1 ten jobs take 2.3 % longer
+# (up to 11), with 1 and 2 alone 0.2 %.
 MARGINS = np.array([1.0, 2.0, 1.8, 1.6, 1.4, 1.2])
 NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
-MUCH = 1.05  # slower by this factor is much
-# Full stops are tried where the command waits for this share of the filters' delay or longer [-].
+# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]: ten jobs take 8.5 % longer without
+# any, 7.6 % with the first alone and 0.04 % (up to 0.4) with the second alone.
 STOPS = (1.0, 0.0)
-WAIT_ROUNDING = 1e-9  # of that share
+WAIT_ROUNDING = 1e-9  # of that fraction
 
 
 def fastest_schedule(course: StraightCourse, machine: Machine) -> Schedule:
     """The fastest schedule found that keeps tolerance and limits, along the course with the full stops that it has."""
     plan = _settled(course, machine)
-    for share in STOPS:
-        plan = _stopping_at_waits(plan, machine, share)
+    for fraction in STOPS:
+        plan = _stopping_at_waits(plan, machine, fraction)
     return plan
 
 
-def _stopping_at_waits(plan: Schedule, machine: Machine, share: float) -> Schedule:
+def _stopping_at_waits(plan: Schedule, machine: Machine, fraction: float) -> Schedule:
     """Full stops instead of waits, in the stretches that gain by it."""
     course, gap, (T1, T2) = plan.course, plan.gap(), plan.at_joints()
-    waits = (gap > 0) & (gap >= share * (T1 + T2) * (1 - WAIT_ROUNDING))
+    waits = (gap > 0) & (gap >= fraction * (T1 + T2) * (1 - WAIT_ROUNDING))
     time = plan.time()
     tried = np.logical_or.reduceat(waits[:-1], course.first[:-1]) & (
         _least_time(course, waits) < time * (1 - WORTH)
@@ -83,14 +85,14 @@ def _settled(course: StraightCourse, machine: Machine) -> Schedule:
         plan_for(course, machine, speed, np.full(course.stretches, margin))
         for speed, margin in zip(speeds, margins, strict=True)
     ]
-    return settled_fastest(plans, times, machine, len(plans))
+    return settled_fastest(plans, times, machine)
 
 
 def _search(course: StraightCourse, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
     """For each margin (K,) the best speed of each stretch [mm/s] and its time [s], both (K, S), by the times of schedules.
 
     Where nothing waits at the first margin, the others would make filters longer for nothing; and where the second, the largest, is
-    much slower, those between them are not tried.
+    slower, those between them are not tried.
     """
     high = course.largest(course.feed)
     low = -course.largest(-np.minimum(np.cbrt(course.j_max * course.length**2 / 4), course.feed))
@@ -102,7 +104,7 @@ def _search(course: StraightCourse, machine: Machine, margins: FloatArray) -> tu
     hopeful: Array = np.logical_or.reduceat((plan.gap() > 0)[:-1], course.first[:-1])
     for k in range(1, len(margins)):
         if k == 2:
-            hopeful = hopeful & (times[1] <= times[0] * MUCH)
+            hopeful = hopeful & (times[1] <= times[0])
         if not hopeful.any():
             break
         part = course.pick(hopeful)

@@ -24,16 +24,15 @@ from planner.fir.polyline import Polyline
 from planner.fir.superpose import Filtered, superpose
 from planner.machine import Machine
 
-# More rounds than any plan takes until it is done; both papers' plans come to an end by themselves.
+# More rounds than any plan takes until it is done: from their 40th on both papers' plans keep to what must end.
 ROUNDS = 120
 # What rounding may add to a ratio [-]; the verifier allows twice as much.
 RATIO_ROUNDING = 5e-7
 # One round slows down by the root of what is exceeded, since most of it falls with the square of the speed, and a little more, but not
-# to less than half [-].
+# to less than half [-]. Ten jobs by `fir`: 0.98 and 0.999 cost 0.03 and 0.17 % of the time; 0.3 or 0.7 instead of half change nothing.
 BEYOND, SLOWEST = 0.995, 0.5
-# A choice is settled if it promises to save this fraction of the time, although it will lose as much by that as the one before did,
-# which is at most by this factor [-].
-WORTH, LOSS = 2e-3, 1.03
+# A plan is settled if it promises to save this fraction of the time [-].
+WORTH = 2e-3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -115,16 +114,15 @@ def slow_down(plan: P, machine: Machine) -> P:
     return plan
 
 
-def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine, tries: int) -> P:
+def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine) -> P:
     """The fastest of a few plans of one course once they are slowed down, each stretch with what is most promising for it.
 
-    times : (K, S) what the K plans promise [s]
-    tries : so many of them are slowed down
+    times : (K, S) what the K plans promise [s]; slowed down they take longer
     """
     best, time = plans[0], np.full(times.shape[1], np.inf)
-    for rank in np.argsort(times, axis=0, kind="stable")[:tries]:
+    for rank in np.argsort(times, axis=0, kind="stable"):
         promised = np.take_along_axis(times, rank[None], axis=0)[0]
-        tried = promised * np.minimum(time / times.min(axis=0), LOSS) < time * (1 - WORTH)
+        tried = promised < time * (1 - WORTH)
         if not tried.any():
             break
         new = slow_down(_mixed(plans, rank).pick(tried), machine)

@@ -32,7 +32,8 @@ from planner.machine import Machine
 
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
-# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured afterwards.
+# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured
+# afterwards, and ten jobs hardly care (0.2: 0.01 % faster).
 MEAN_OVER = 0.02
 
 

@@ -37,14 +37,16 @@ from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.path.samples import sample_path
 
-# Share of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
+# Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
 # zig-zag 2.93, 2.66, 2.65 s with 0.5, 0.1, 0.05; circle and spiral of chords do not care.
 ROUNDING_SHARE = 0.1
-# Interpolation error of the grid that the chords start from, as of path/samples.py: they are refined by the angle they turn.
+# Interpolation error of the grid that the chords start from, as of path/samples.py: they are refined by the
+# angle they turn. Ten jobs take 0.08 % longer with 0.2.
 RESOLUTION = 0.05
-# Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
+# Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them. With 80 and 25
+# degrees alone ten jobs take 0.6 % longer, one 3.9.
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
-# Share of the tolerance that the chords of a curve's program may use [-].
+# Fraction of the tolerance that the chords of a curve's program may use [-]: costs half of it in feed.
 CHORD_SHARE = 0.05
 # Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (docs/papers.md).
 PHASE_LAG = 0.5

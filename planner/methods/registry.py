@@ -55,7 +55,8 @@ def plan(
                 corner by itself) or "auto" (splines, or corners where they take less time); None for "auto", or for "corners" where
                 `corner` is given
     corner    : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
-    solver    : "reachability" or "toppra", for "second-order" only; None for "reachability"
+    solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
+                the first of them
     rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for as many
                 as the size of the job allows
     shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
@@ -141,7 +142,9 @@ def _check_used(
                 f"{setting} = {value}: method {method} does not use it; it is for {' and '.join(users_of(setting))}"
             )
         if setting == "solver" and value not in METHODS[method].solvers:
-            raise InputError(f"solver = {value}: method {method} has {', '.join(METHODS[method].solvers)}")
+            raise InputError(
+                f"solver = {value}: method {method} does not use it; it has {', '.join(METHODS[method].solvers)}"
+            )
     if rounds is not None:
         kind, shape = _smoothing(geometry, corner)
         if kind == SINGLE_CORNERS:

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.constraints import normal_limit
 from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
@@ -134,8 +135,7 @@ def sample_path(
         delay = float((acceleration / jerk).min())
         longest = ARC_PERIOD * delay
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
-    if machine.normal_acceleration is not None:
-        acceleration = np.minimum(acceleration, machine.normal_acceleration)
+    acceleration = np.minimum(acceleration, normal_limit.largest(machine))
     where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
     if third_order:
         where_calm = calm(path, table, (velocity, acceleration, jerk))

@@ -39,6 +39,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.packages import needed
 from planner.feedrate.solution import Status
 from planner.tube.guess import Guess
 from planner.tube.numbers import acceleration_along, step_numbers
@@ -136,7 +137,7 @@ class TubeNLP:
 
     def _solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
         """Transcribe and solve; the whole formulation, from top to bottom."""
-        import casadi as ca
+        ca = needed("casadi", "method tube")
 
         began = time.perf_counter()
         steps, axes, leg = len(guess), len(run.axis), guess.leg
@@ -147,7 +148,7 @@ class TubeNLP:
         speed, acc, jerk = length / second, length / second**2, length / second**3
         v_max, a_max, j_max = run.velocity / speed, run.acceleration / acc, run.jerk / jerk
 
-        watched = len(WATCHED) if np.isfinite(run.normal_max).any() else 0
+        watched = len(WATCHED) if np.isfinite(run.across_max).any() else 0
 
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.

@@ -38,7 +38,7 @@ def step_numbers(
             np.minimum(run.step_max[leg], run.offset[-1]) / length,
             np.minimum(feed, fastest) / speed,
             np.minimum(feed_end, fastest) / speed,
-            np.minimum(run.normal_max[leg], strongest) / acc,
+            np.minimum(run.across_max[leg], strongest) / acc,
             part / length,
             _pace(guess) / speed,
         ]

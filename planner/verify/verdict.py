@@ -69,7 +69,7 @@ class Verdict:
     """The findings of `verify`.
 
     passed           : True if every check holds, apart from quantities that are "not limited"
-    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
+    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration (if the machine limits it)
     contour          : the largest distance of the motion from the path, as far as it could be followed, against the tolerance there
     vertex           : the largest distance of a programmed vertex from the motion, of those that are known, against the tolerance there
     corners          : eq. 18-20 at the programmed corners

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from quick import slow_but
 
 import planner
 from benchmarks import problems
@@ -24,7 +25,7 @@ OVER_BOUND = {
 
 
 @pytest.mark.parametrize("corner", ["bezier", "fir"])
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", slow_but(("pentagon", "five points"), JOBS))
 def test_jobs_are_verified_with_their_jerk_limited(name, corner):
     plan = OptimalMethod(corner=corner).plan(JOBS[name], MACHINE)
     assert plan.verdict.passed, plan.verdict.faults

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from quick import slow_but
 
 import planner
 from benchmarks import problems
@@ -50,7 +51,7 @@ def verified(program, machine=MACHINE) -> Plan:
     return made
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", slow_but("corner of 90 degrees", JOBS))
 def test_jobs_are_verified_and_faster_than_what_they_start_from(name):
     made = tube(name).require()
     assert made.verdict.passed, made.verdict.faults
@@ -68,6 +69,7 @@ def test_jobs_are_verified_and_faster_than_what_they_start_from(name):
     assert set(made.trajectory.block) == set(made.toolpath.block)
 
 
+@pytest.mark.slow
 def test_the_pentagon_takes_what_free_motion_is_known_to_take():
     """DESIGN 8: 0.957 s by another transcription."""
     assert tube("pentagon").trajectory.cycle_time == pytest.approx(0.9577, rel=SAME)
@@ -88,6 +90,7 @@ def test_something_is_at_its_limit_all_the_time():
     assert np.mean(ratio > 0.98) > 0.9
 
 
+@pytest.mark.slow
 def test_scaled_lengths_and_limits_take_the_same_time():
     k = 7.0
     large = problems.machine(velocity=100 * k, acceleration=2000 * k, jerk=2e5 * k, tolerance=0.05 * k)
@@ -97,6 +100,7 @@ def test_scaled_lengths_and_limits_take_the_same_time():
     )
 
 
+@pytest.mark.slow
 def test_turned_by_a_right_angle_takes_the_same_time():
     made = verified(corner(90, first=90.0))
     assert made.trajectory.cycle_time == pytest.approx(
@@ -104,12 +108,14 @@ def test_turned_by_a_right_angle_takes_the_same_time():
     )
 
 
+@pytest.mark.slow
 def test_more_tolerance_takes_less_time():
     wide = verified(corner(90), problems.machine(tolerance=0.2)).trajectory.cycle_time
     fine = verified(corner(90), problems.machine(tolerance=0.01)).trajectory.cycle_time
     assert wide < tube("corner of 90 degrees").trajectory.cycle_time * (1 - 5e-3) < fine * (1 - 5e-3)
 
 
+@pytest.mark.slow
 def test_stops_and_dwells_add_up():
     """Exact stops make courses of their own; a dwell stands between two of them."""
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nY0\nM2\n")
@@ -123,6 +129,7 @@ def test_stops_and_dwells_add_up():
     )
 
 
+@pytest.mark.slow
 def test_normal_acceleration_is_kept_and_used():
     limit = 1000.0
     check = verified(corner(60), problems.machine(normal_acceleration=limit)).verdict.limits[
@@ -131,6 +138,7 @@ def test_normal_acceleration_is_kept_and_used():
     assert 0.9 * limit < check.value <= limit * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_filters_that_follow_get_their_share_of_the_tolerance():
     plain = tube("corner of 90 degrees").trajectory.cycle_time
     made = verified(corner(90), problems.machine(fir=Fir(time_constants=(0.02,))))
@@ -141,6 +149,7 @@ def test_filters_that_follow_get_their_share_of_the_tolerance():
     assert made.verdict.after_filters.vertex_error_mm <= 0.05
 
 
+@pytest.mark.slow
 def test_a_lower_feed_holds_on_its_block():
     job = problems.polyline([[0, 0], [4, 0], [8, 0], [8, 4]], feed=np.array([100.0, 20.0, 100.0]))
     made = verified(job)
@@ -172,6 +181,7 @@ def test_a_job_that_is_too_long_is_refused_before_any_work():
 HASTY = TubeNLP(max_iterations=2)
 
 
+@pytest.mark.slow
 def test_where_nothing_converges_the_start_stays_and_says_why():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n")
     made = TubeMethod(starts=SHORT, solver=HASTY).plan(job, MACHINE)
@@ -190,6 +200,7 @@ class SecondFails(TubeNLP):
         return TubeNLP(max_iterations=2 if len(course) == 1 else 300).solve(course, guess)
 
 
+@pytest.mark.slow
 def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nG4 P0.1\nM2\n")
     made = TubeMethod(starts=SHORT, solver=SecondFails()).plan(job, MACHINE).require()
@@ -201,6 +212,7 @@ def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     assert "stays on 1 of 2 runs between full stops, the first on lines 5 to 5" in made.sentence
 
 
+@pytest.mark.slow
 def test_the_next_start_is_tried_where_the_first_leads_to_nothing():
     asked = []
 
@@ -231,6 +243,7 @@ def test_a_start_without_a_motion_is_a_status():
         made.require()
 
 
+@pytest.mark.slow
 def test_it_has_a_name():
     made = planner.plan(dataclasses.replace(corner(90)), MACHINE, method="tube")
     assert made.method == "tube"

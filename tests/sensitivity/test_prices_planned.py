@@ -32,6 +32,7 @@ def on_splines():
     return compared("pentagon", problems.pentagon(), MACHINE, "auto", among)
 
 
+@pytest.mark.slow
 def test_on_rounded_corners_all_that_stands_in_the_table_is_a_number_and_right(on_corners):
     for row in on_corners["rows"]:
         assert row["right"], row
@@ -40,6 +41,7 @@ def test_on_rounded_corners_all_that_stands_in_the_table_is_a_number_and_right(o
     assert len(on_corners["rows"]) >= 5
 
 
+@pytest.mark.slow
 def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_splines):
     cycle_time = on_splines["cycle_time_s"]
     for row in on_splines["rows"]:
@@ -52,6 +54,7 @@ def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_s
     assert rows["tolerance"]["found_s"] > 1e-3 * cycle_time
 
 
+@pytest.mark.slow
 def test_where_the_period_may_take_its_share_of_more_everything_is_a_hint_and_right():
     """Chords between samples 4 ms apart use 40 % of the tolerance: a faster motion has to leave them more."""
     among = ("feed", "tolerance")
@@ -66,6 +69,7 @@ def test_where_the_period_may_take_its_share_of_more_everything_is_a_hint_and_ri
     assert not set(among) & set(plan.prices.hints)
 
 
+@pytest.mark.slow
 def test_a_tenth_more_of_anything_saves_no_more_than_everything_a_tenth_faster(on_corners, on_splines):
     for result in (on_corners, on_splines):
         for row in result["rows"]:

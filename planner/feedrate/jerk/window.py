@@ -130,6 +130,18 @@ class ScaledWindow:
         n = len(profile.p)
         return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
 
+    def near(self, x: FloatArray, u: FloatArray) -> Window | None:
+        """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
+        none. It may exceed its limits a little, and has no multipliers."""
+        rate = u * self.time / self.feed
+        profile, defect = self._track(
+            Profile(x / self.feed**2, rate, np.diff(rate)), 0.0, TRACKING_ROUNDS, POLISHED
+        )
+        if defect > self.settings.defect:
+            return None
+        n = len(profile.p)
+        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+
     def _starts(self, behind: Window | None) -> Iterator[Profile]:
         """Profiles to start from, the best first."""
         for start in self._from_rest():

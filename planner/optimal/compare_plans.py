@@ -5,9 +5,9 @@ no grid. Other corner shapes use the tolerance in another way. And if a plan fai
 plan may pass.
 
 stop         its time is known before it is planned, as the sum of closed forms over the blocks
-fir corners  their time without jerk limits on a coarse grid is a lower bound (compare_corners.py); if that is short enough, their time
-             with jerk limits on a coarse grid is an upper bound, to the share `CHANCE`
-kinematic    uses the corners of its own shape with less freedom; the same two bounds tell whether it is tried. Time-optimal motions on
+fir corners  their time without jerk limits on a coarse grid is a lower bound; if that is short enough, their time with jerk limits on a
+             coarse grid is an upper bound, to the share `CHANCE`
+kinematic    uses the corners of its own shape with less freedom, so it is tried where these have a chance. Time-optimal motions on
              these corners are not planned: of 300 random jobs they were the fastest on none, at 7 % of the computing time
              (benchmarks/ablation.py)
 

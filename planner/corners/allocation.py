@@ -25,7 +25,7 @@ from planner.machine import Machine
 
 
 def error_rate(machine: Machine) -> float:
-    """c [s2]: chord and filter error per unit of normal acceleration."""
+    """c = dt^2/8 + sum T^2/24 [s2]: chord and filter error per unit of normal acceleration."""
     return machine.dt**2 / 8.0 + filter_rate(machine)
 
 
@@ -35,5 +35,12 @@ def filter_rate(machine: Machine) -> float:
 
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
-    """eps_ap [mm]: the share of the budget `tol` (n,) that the rounding may use, eq. (20)."""
+    """The part of the tolerance that the rounding may use, eq. (20).
+
+    tol          : (n,) tolerance eps [mm]
+    acceleration : (n,) largest normal acceleration A [mm/s2]
+    rate         : c, from `error_rate` [s2]
+
+    Returns eps_ap (n,) [mm].
+    """
     return tol - rate * np.minimum(acceleration, tol / (2.0 * rate))

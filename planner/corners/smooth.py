@@ -1,7 +1,7 @@
-"""The smooth path: the legs of a toolpath with a corner blended at each joint, within the error budget.
+"""The smooth path: the legs of a toolpath with each corner rounded within its tolerance.
 
-Corners are data, not objects: the record holds, for each of the R+1 joints between legs, how far the corner reaches back (d),
-the shape's parameters, the part of the budget it uses and the normal acceleration that is left for the motion.
+Corners are data, not objects. For each of the R+1 joints between legs the record holds how far the corner reaches back (d), the
+parameters of its shape, the part of the tolerance it uses, and the normal acceleration that is left for the motion.
 """
 
 from __future__ import annotations
@@ -25,24 +25,34 @@ from planner.machine import Machine
 
 
 class CornerFamily(Protocol):
-    """Corners at n given joints: how tangent length d and middle value m belong together (see corners/blend.py)."""
+    """Corners at n given joints: how tangent length d and middle value m depend on each other (corners/blend.py)."""
 
-    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray: ...
+    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
+        """Tangent lengths d (n,) [mm] for middle values m (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        ...
 
-    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Middle values m (n,) [mm] for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        ...
 
-    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Parameters of the shape (n, 4) for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        ...
 
 
 class CornerShape(Protocol):
-    """A shape of corners; `at` tells it by how much the direction of each axis changes at the joints, (n, A)."""
+    """A shape of corners. To add one: docs/algorithm.md."""
 
     name: str
     shape: Shape
 
-    def at(self, change: FloatArray) -> CornerFamily: ...
+    def at(self, change: FloatArray) -> CornerFamily:
+        """The corners at n joints where the directions of the axes change by `change` (n, A)."""
+        ...
 
-    def breaks(self, params: FloatArray) -> tuple[float, ...]: ...
+    def breaks(self, params: FloatArray) -> tuple[float, ...]:
+        """Parameters w in (0, 1) of a corner with these `params` (4,) at which two of its pieces meet."""
+        ...
 
 
 # A leg whose free part is shorter than this share of it is closed by stretching one of its corners [-]; grid intervals of the

@@ -83,9 +83,7 @@ class Nurbs:
             )
         inner = self.knots[(self.knots > self.knots[p]) & (self.knots < self.knots[count])]
         if np.unique(inner, return_counts=True)[1].max(initial=0) > p:
-            raise InputError(
-                f"NURBS: an inner knot is there more than {p} times, the curve would be torn there"
-            )
+            raise InputError(f"NURBS: an inner knot occurs more than {p} times, which breaks the curve")
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -31,8 +31,8 @@ class OptimalMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : a solver of third order
-    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job lets pay
-    shaped : deliver set points that leave the machine's vibration modes at rest (optimal/shaped.py)
+    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job allows
+    shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO

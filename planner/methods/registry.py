@@ -145,7 +145,7 @@ def _check_used(
     if rounds is not None:
         kind, shape = _smoothing(geometry, corner)
         if kind == SINGLE_CORNERS:
-            raise InputError(f"rounds = {rounds}: they reshape splines, and corner {shape} has none")
+            raise InputError(f"rounds = {rounds}: they reshape splines; {shape} corners have none")
 
 
 def _smoothing(

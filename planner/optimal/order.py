@@ -1,7 +1,7 @@
-"""The feedrate problem on one path, of third order (with jerk limits) or of second order (without), solved on a grid of its own.
+"""The feedrate problem on one path, of third order (with jerk limits) or second order (without), solved on a grid of its own.
 
-The grid is made for the motion: with jerk limits the second-order problem is solved first, since it says where straight stretches
-need points (feedrate/grid.py); without, the points where the profile switches on straight stretches are added and the problem is
+The grid is made for the motion. With jerk limits the second-order problem is solved first, because it says where straight legs need
+points (feedrate/grid.py). Without jerk limits the points where the profile switches on straight legs are added and the problem is
 solved once more, so that every switch falls on a point.
 """
 

@@ -92,6 +92,7 @@ def test_a_limit_is_reached_and_not_exceeded(job, method, limit):
     assert any(name.endswith(limit.name) for name, _ in made.grid.ranked())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [Soft(), Turntable()], ids=lambda limit: limit.name)
 def test_splines_keep_it_too(job, limit):
     made = planner.plan(job, method="second-order", corner="spline", rounds=1, limits=[limit])

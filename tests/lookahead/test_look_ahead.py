@@ -130,6 +130,7 @@ def test_a_leg_takes_the_time_that_ruckig_finds(seed):
         assert time[i + 1] - time[i] - T2 == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [1.0, 0.5])
 @pytest.mark.parametrize("family", [0, 1])
 def test_no_leg_is_too_short_on_thousands(k, family):

@@ -1,6 +1,6 @@
-"""What the free optimum has to follow: the legs of the programmed path between two full stops, with their budgets and limits.
+"""What the free optimum has to follow: a run, the legs of the programmed path between two full stops, with their budgets and limits.
 
-A leg is a run of collinear lines with one feed and one budget, or an arc. Over the place x in [0, length] on it both are
+A leg consists of collinear lines with one feed and one budget, or is an arc. Over the place x in [0, length] on it both are
 
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
@@ -29,7 +29,7 @@ ARC_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Course:
+class TubeRun:
     """R legs from rest to rest over the A axes that move on them, and the R+1 vertices around them.
 
     axis                         : (A,) their indices among the axes of the toolpath
@@ -95,7 +95,7 @@ class Course:
 
     @property
     def offset(self) -> FloatArray:
-        """(R+1,) place of the vertices along the course [mm]."""
+        """(R+1,) place of the vertices along the run [mm]."""
         return np.append(0.0, np.cumsum(self.length))
 
     def points(self, leg: Array, x: FloatArray) -> FloatArray:
@@ -111,8 +111,8 @@ class Course:
         return self.drift[leg] + (self.radius * self.rate)[leg, None] * across
 
 
-def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
-    """The courses between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
+def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
+    """The runs between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
     limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
     reachable = normal_limit.anywhere(machine, toolpath.axes)
     rate = error_rate(machine)
@@ -138,7 +138,7 @@ def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
         held = left < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
-        yield Course(
+        yield TubeRun(
             axis=np.flatnonzero(moves),
             first=first,
             curvature=toolpath.curvature[row],

@@ -11,6 +11,7 @@ from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.blend import CORNER_DTYPE, corner_point
 from planner.corners.elements import to_arc_length
+from planner.corners.own import PolynomialCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
@@ -108,6 +109,8 @@ def evaluate_corner(
     corners = np.zeros(len(legs) + 1, CORNER_DTYPE)
     corners["shape"], corners["params"][joint] = int(shape.shape), params
     corners["stretch"][joint] = stretch
+    if isinstance(shape, PolynomialCorner):
+        corners["own"][joint] = shape.coefficients
     axes = len(toolpath.axes)
     by_w, by_s = np.empty((len(w), 4, axes)), np.empty((len(w), 4, axes))
     one, two = np.empty((4, axes)), np.empty((4, axes))

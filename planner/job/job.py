@@ -24,7 +24,7 @@ from planner.geometry.passing import segments_at
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.notes import job_notes
 from planner.job.plan import Plan
-from planner.job.records import CornerTable, GridHistory, PriceList
+from planner.job.records import NO_TABLES, GridHistory, Tables
 from planner.job.stages import Progress, Stages
 from planner.job.trace import Log, Tell
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
@@ -181,9 +181,7 @@ class Job:
         status: Status,
         sentence: str,
         grid_points: int,
-        rounded: CornerTable | None = None,
-        grid: GridHistory | None = None,
-        prices: PriceList | None = None,
+        tables: Tables = NO_TABLES,
     ) -> Plan:
         """The plan of the job.
 
@@ -192,7 +190,7 @@ class Job:
         The other arguments are fields of `Plan`.
         """
         trajectory, verdict = made or (None, None)
-        held: dict[str, Any] = {} if grid is None else {"held_by": _largest_shares(grid)}
+        held: dict[str, Any] = {} if tables.grid is None else {"held_by": _largest_shares(tables.grid)}
         self.tell(
             "plan",
             found=np.nan if trajectory is None else trajectory.cycle_time,
@@ -214,11 +212,11 @@ class Job:
             sentence=sentence,
             trajectory=trajectory,
             verdict=verdict,
-            rounded=rounded,
-            grid=grid,
+            rounded=tables.rounded,
+            grid=tables.grid,
             stop_time=self.stop_time,
             grid_points=grid_points,
-            prices=prices,
+            prices=tables.prices,
             notes=(*job_notes(self.program, *self.real), *self.noted),
             timings=self.stages.timings,
         )

@@ -129,3 +129,15 @@ class PriceList:
         """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""
         worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
         return sorted(worth, key=lambda entry: -entry[1])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tables:
+    """What a method can say of its plan besides the motion, as far as it can: fields of `Plan`."""
+
+    rounded: CornerTable | None = None
+    grid: GridHistory | None = None
+    prices: PriceList | None = None
+
+
+NO_TABLES = Tables()

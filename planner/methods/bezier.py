@@ -23,7 +23,7 @@ from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
-from planner.job.records import CornerTable
+from planner.job.records import CornerTable, Tables
 from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, corner_chain
 from planner.lookahead.look_ahead import look_ahead, moves, swept
 from planner.lookahead.ramps import JointKind
@@ -87,7 +87,7 @@ class BezierMethod(Method):
             status=Status.OPTIMAL,
             sentence=f"{len(rounded)} corners are run through, {len(stops)} are faster as full stops",
             grid_points=len(samples),
-            rounded=rounded,
+            tables=Tables(rounded=rounded),
         )
 
 

@@ -30,7 +30,7 @@ from planner.geometry.legs import Legs, legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
-from planner.job.records import CornerTable
+from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces
 from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
 from planner.lookahead.look_ahead import LegLimits, Passage, look_ahead
@@ -82,7 +82,7 @@ class KinematicMethod(Method):
             status=Status.OPTIMAL,
             sentence=_sentence(course),
             grid_points=len(course.path) + 1,
-            rounded=rounded,
+            tables=Tables(rounded=rounded),
         )
 
     def _course(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Course:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from planner.corners.smooth import CornerShape
 from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
-from planner.job.records import PriceList
+from planner.job.records import PriceList, Tables
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import Motion
@@ -45,9 +45,7 @@ def plan_of_solution(
         status=best.solution.status,
         sentence=best.solution.sentence,
         grid_points=len(best.samples),
-        rounded=rounded,
-        grid=grid,
-        prices=prices,
+        tables=Tables(rounded=rounded, grid=grid, prices=prices),
     )
 
 

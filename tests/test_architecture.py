@@ -27,6 +27,7 @@ LAYERS = (
     "planner.constraints.own",
     "planner.fir.filters",
     "planner.machine",
+    "planner.constraints.normal_limit",
     "planner.nc",
     "planner.geometry",
     "planner.corners",

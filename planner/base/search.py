@@ -27,3 +27,16 @@ def last_not_after(values, limit, first, last):
         else:
             last = middle - 1
     return first
+
+
+@njit(cache=True, error_model="numpy")
+def first_not_before(values, limit):
+    """Index of the first of the ascending values (m,) that is >= limit; m if there is none."""
+    first, last = 0, len(values)
+    while first < last:
+        middle = (first + last) // 2
+        if values[middle] < limit:
+            first = middle + 1
+        else:
+            last = middle
+    return first

@@ -9,7 +9,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import NotSolvedError
 from planner.base.units import RAD_PER_DEG
-from planner.constraints import bounds
+from planner.constraints import bounds, normal_limit
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.allocation import error_rate
 from planner.machine import Machine
@@ -170,8 +170,9 @@ def _curvature_bounds(
     elsewhere the chord has the whole of it."""
     rate = error_rate(machine)
     found = []
-    if machine.normal_acceleration is not None:
-        found.append(("normal_acceleration", bounds.normal_acceleration(kappa, machine.normal_acceleration)))
+    across = normal_limit.feed_sq_max(kappa, machine)
+    if across is not None:
+        found.append((normal_limit.NAME, across))
     tol_chord = np.where(closed, budget * (machine.dt**2 / 8.0 / rate), budget)
     found.append(("chord_error", bounds.chord_error(kappa, tol_chord, machine.dt)))
     if machine.fir is not None:

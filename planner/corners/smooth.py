@@ -13,12 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.allocation import (
-    allocate,
-    error_rate,
-    normal_acceleration_max,
-    normal_acceleration_of_axes,
-)
+from planner.constraints import normal_limit
+from planner.corners.allocation import allocate, error_rate
 from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_from_tolerance
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
@@ -158,14 +154,8 @@ def round_corners(
     curvature = toolpath.curvature[before] + toolpath.curvature[after]
     feed = np.minimum(_finite_feed(toolpath, machine, before), _finite_feed(toolpath, machine, after))
 
-    limits = machine.limits("acceleration", toolpath.axes)
-    reachable = normal_acceleration_of_axes(
-        limits, toolpath.tangent_end[before], toolpath.tangent_start[after]
-    )
-    # Between arcs the normal at the apex is not the bisector at the vertex: the largest over all directions bounds it.
-    reachable = np.where(curvature > 0, np.linalg.norm(limits), reachable)
-    if machine.normal_acceleration is not None:
-        reachable = np.minimum(reachable, machine.normal_acceleration)
+    u1, u2 = toolpath.tangent_end[before], toolpath.tangent_start[after]
+    reachable = normal_limit.at_corners(machine, toolpath.axes, u1, u2, curvature)
     rate = error_rate(machine)
 
     usable = (1.0 - free) * legs.length
@@ -199,7 +189,7 @@ def round_corners(
         stretch=stretch,
         tol=tol,
         tol_ap=tol_ap,
-        normal_max=normal_acceleration_max(tol, tol_ap, reachable, rate),
+        normal_max=normal_limit.within_budget(tol, tol_ap, reachable, rate),
         spline=no_spline(len(toolpath.axes)),
     )
 

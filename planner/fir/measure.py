@@ -24,6 +24,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
+from planner.constraints import normal_limit
 from planner.fir.polyline import Polyline
 from planner.fir.superpose import Filtered
 from planner.machine import LINEAR_AXES, Machine
@@ -97,7 +98,7 @@ def measure(course: Polyline, motion: Filtered, machine: Machine) -> Measured:
     limits = _Limits(
         machine.limits("acceleration", course.axes),
         machine.limits("jerk", course.axes),
-        machine.normal_acceleration * NORMAL_SPARE if machine.normal_acceleration else np.inf,
+        normal_limit.largest(machine) * NORMAL_SPARE,
         np.array([axis in LINEAR_AXES for axis in course.axes]),
         machine.dt**2 / 8,
     )

@@ -31,6 +31,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import last_not_after
+from planner.constraints import normal_limit
 from planner.fir.course import StraightCourse
 from planner.fir.overlap import overlap_beside, overlap_within, overlap_within_limits
 from planner.fir.schedule import Schedule
@@ -122,7 +123,7 @@ def _flowing(
         course.tol[joint]
         / (1 + 3 * machine.dt**2 / (T1**2 + T2**2)),  # the rest is the chord error of samples
         machine.limits("acceleration", course.axes),
-        machine.normal_acceleration or np.inf,
+        normal_limit.largest(machine),
     )
     fastest = np.maximum(speed[joint - 1], speed[joint])
     return _flow_speeds(joint, np.flatnonzero(tied), fastest, line, allowed, T1, T2)

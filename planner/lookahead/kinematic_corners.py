@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import error_rate, filter_rate
 from planner.corners.sharing import share_legs
@@ -96,7 +97,7 @@ def _zero_entry(
     twice = np.linalg.norm(across, axis=1)  # 2 s
     eta = corner.ratio_min(machine.limits("jerk", axes), across)
     alpha = corner.ratio_min(machine.limits("acceleration", axes), across)
-    alpha = np.minimum(alpha, np.minimum(machine.normal_acceleration or np.inf, tol / (2.0 * rate)) / twice)
+    alpha = np.minimum(alpha, np.minimum(normal_limit.largest(machine), tol / (2.0 * rate)) / twice)
     bow = rate * twice * np.minimum(alpha, np.cbrt(6.0 * tol * eta**2 / twice))
     return corner.speed_from_middle((tol - bow) / twice, alpha, eta), alpha, eta
 
@@ -118,5 +119,5 @@ def _entry(
     rate = error_rate(machine)
     twice = np.linalg.norm(u2 - u1, axis=1)
     a, J = corner.entry_limits(u1, u2, machine.limits("acceleration", axes), machine.limits("jerk", axes))
-    a = np.minimum(a, np.minimum(2.0 * (machine.normal_acceleration or np.inf) / twice, tol / (2.0 * rate)))
+    a = np.minimum(a, np.minimum(2.0 * normal_limit.largest(machine) / twice, tol / (2.0 * rate)))
     return corner.entry_speed_from_middle((tol - rate * a) / twice, a, J), a, J

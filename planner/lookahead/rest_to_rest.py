@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints import normal_limit
 from planner.corners.allocation import error_rate
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -68,11 +69,11 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     v_all, a_all, j_all = (machine.limits(q, axes).min() for q in ("velocity", "acceleration", "jerk"))
     half = np.sqrt(0.5)
     budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
-    normal = np.minimum(half * a_all, np.minimum(budget, machine.normal_acceleration or np.inf))
+    across = np.minimum(half * a_all, np.minimum(budget, normal_limit.largest(machine)))
     v[curved] = np.min(
         [
             np.full(len(kappa), v_all),
-            np.sqrt(normal / kappa),
+            np.sqrt(across / kappa),
             np.cbrt(half * j_all / (2 * kappa**2)),
             j_all / (3 * kappa * a_all),
         ],

@@ -18,11 +18,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
+from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import (
     error_rate,
-    normal_acceleration_max,
-    normal_acceleration_of_axes,
 )
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
@@ -190,9 +189,8 @@ def _corner_table(course: _Course, machine: Machine) -> CornerTable:
     middle = np.where(zero, corner.middle(V, p, q), length / 8)
     normal = np.where(zero, 2 * s * V / T1, s * corner.entry_acceleration(V, p, q))
     speed = c * V * np.where(zero, 1.0, 0.5)
-    reachable = normal_acceleration_of_axes(machine.limits("acceleration", lines.axes), u[k - 1], u[k])
-    reachable = np.minimum(reachable, machine.normal_acceleration or np.inf)
-    largest = normal_acceleration_max(tol, 2 * s * middle, reachable, error_rate(machine))
+    reachable = normal_limit.at_corners(machine, lines.axes, u[k - 1], u[k])
+    largest = normal_limit.within_budget(tol, 2 * s * middle, reachable, error_rate(machine))
     return CornerTable(
         line=lines.line[at - 1],
         theta=theta,

@@ -28,9 +28,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
-from planner.smoothing.basis import DEGREE, ORDER
-from planner.smoothing.forms import motion_forms
-from planner.smoothing.relax import relax
+from planner.smoothing.basis import DEGREE
+from planner.smoothing.forms import SplineMotion, motion_bands
+from planner.smoothing.relax import Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
 FIRST_FORCE = 0.5  # of the pull; 0.3 and 1 gain the same within 1e-3 in eight rounds
@@ -67,27 +67,22 @@ def reshape(
     planned: OnPath, force: FloatArray, H: FloatArray, Q: FloatArray
 ) -> tuple[SplineShape, FloatArray]:
     """The shape after one round with the bands H of what is paid and Q of the pull (`price_bands`), the latter times `force` (Q,) of
-    each run; also what the sites' tubes cost (J,) [s per mm of radius]. A run without a certificate keeps its shape."""
+    each run; also what the sites' radii cost (J,) [s/mm]. A run without a certificate keeps its shape."""
     shape = _shape(planned)
-    laid, runs, chain = shape.laid, shape.runs, shape.guide
-    control, used, left = laid.control.copy(), shape.used.copy(), shape.left.copy()
-    multiplier, good = np.zeros(len(used)), np.zeros(len(force), np.bool_)
-    relax(
-        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, control,
-        laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
-        runs.fixed_first, runs.fixed_last, left, H, Q, force, np.ones(len(H)), GAP * run_times(planned), 0.0,
-        good, multiplier,
-    )  # fmt: skip
-    new = dataclasses.replace(shape, laid=laid._replace(control=control), used=used, left=left)
-    return chosen(planned, new, good & ~cusps(new.laid)), -multiplier / used
+    goal = Goal(H, Q, force, GAP * run_times(planned), 0.0, np.ones(len(H)))
+    relaxed = relax(shape.corridor, shape.laid, shape.runs, shape.used, shape.left, goal)
+    laid = shape.laid._replace(control=relaxed.control)
+    new = dataclasses.replace(shape, laid=laid, used=relaxed.used, left=relaxed.left)
+    return chosen(planned, new, relaxed.certified & ~cusps(laid)), -relaxed.multiplier / relaxed.used
 
 
 def tube_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
     """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a tube wider by `more` [mm], in a round from the present shape."""
     shape = _shape(planned)
     H, Q = price_bands(planned)
-    guide = shape.guide._replace(tol=shape.guide.tol + more, tol_chord=shape.guide.tol_chord + more)
-    wider = dataclasses.replace(shape, guide=guide, used=shape.used + more, left=shape.left + more)
+    corridor = shape.corridor
+    corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
+    wider = dataclasses.replace(shape, corridor=corridor, used=shape.used + more, left=shape.left + more)
     force = np.full(len(shape.laid.fits), FIRST_FORCE)
     _, prices = reshape(dataclasses.replace(planned, shape=wider), force, H, Q)
     return prices
@@ -108,12 +103,17 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     duration, jerk = solution.duration[on], solution.jerk_s[on]
     acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
     axes = problem.machine_axes
-    H, Q = np.zeros((2, axes, len(laid.control), ORDER))
-    motion_forms(
-        laid.span_first, laid.breaks, laid.control, laid.fits, interval, within,
-        np.stack([samples.w0[on], samples.w1[on]], axis=1), np.stack([v[on], v[on + 1]], axis=1), acc, jerk, duration,
-        _prices(problem, solution, on), np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]]), H, Q,
-    )  # fmt: skip
+    motion = SplineMotion(
+        interval=interval,
+        span=within,
+        tau=np.stack([samples.w0[on], samples.w1[on]], axis=1),
+        feed=np.stack([v[on], v[on + 1]], axis=1),
+        acc=acc,
+        jerk=jerk,
+        duration=duration,
+        price=_prices(problem, solution, on),
+    )
+    H, Q = motion_bands(laid, motion, np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]]))
     return H, Q
 
 

@@ -59,5 +59,5 @@ def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
     by_site = None
     if best.shape is not None and len(best.path.spline):  # what the tube of the splines costs
         now, wider = (tube_prices(best, more) for more in (0.0, MORE_TOLERANCE))
-        by_site = SitePrices(place=best.shape.laid.place, now=now, wider=wider)
+        by_site = SitePrices(place=best.shape.laid.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

@@ -7,8 +7,11 @@ number of points.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
 from planner.path.rows import grown, set_row
@@ -28,6 +31,31 @@ STEEPEST, SLOPE = 4.0, 1.0
 FINEST = 1e-4
 
 
+class Intervals(NamedTuple):
+    """Where the P points of a grid are: the interval to the right of each; of the last one at the end of a piece (`PathSamples`)."""
+
+    element: Array
+    w0: FloatArray
+    w1: FloatArray
+    segment: Array
+    last: Array  # True at the ends of pieces
+
+
+class Columns(NamedTuple):
+    """What the path is at the P points of a grid; see `PathSamples`."""
+
+    s: FloatArray
+    position: FloatArray
+    d1: FloatArray
+    d2_left: FloatArray
+    d2_right: FloatArray
+    d3_left: FloatArray
+    d3_right: FloatArray
+    margin: FloatArray
+    kappa_left: FloatArray
+    kappa_right: FloatArray
+
+
 @njit(cache=True, error_model="numpy")
 def _interval_error(points, x, u, h, acceleration, jerk):
     """max_k e_k / a_k of the module's text, from arc-length derivatives (3, 4, A) at left end, middle and right end."""
@@ -43,9 +71,9 @@ def _interval_error(points, x, u, h, acceleration, jerk):
 
 
 @njit(cache=True, error_model="numpy")
-def _fastest(point, feed, velocity, acceleration, jerk):
+def _fastest(point, feed_max, limits):
     """Bounds (x, u) of feed^2 and of the acceleration along the path that the limits allow at a point (4, A)."""
-    feed_max = feed
+    _, velocity, acceleration, jerk = limits
     u = 0.0
     normal = 0.0
     kappa_sq, slope_sq, a_sq, j_sq = 0.0, 0.0, 0.0, 0.0
@@ -70,8 +98,11 @@ def _fastest(point, feed, velocity, acceleration, jerk):
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(legs, corners, spans, element, wa, wb, feed, velocity, acceleration, jerk, work, points):
-    """Evaluate an interval at left end, middle and right end into points (3, 4, A); returns its interpolation error."""
+def _measure(table, element, segment, ends, limits, work, points):
+    """Evaluate the interval with the ends (wa, wb) at left end, middle and right end into points (3, 4, A), with `work` (2, 4, A) for
+    what is in between; returns its interpolation error."""
+    legs, corners, spans = table
+    wa, wb = ends
     w_ref = 0.5 * (wa + wb)
     x_ends = 0.0
     x, u, speed = 0.0, 0.0, 0.0
@@ -79,38 +110,24 @@ def _measure(legs, corners, spans, element, wa, wb, feed, velocity, acceleration
         w = wa if j == 0 else (w_ref if j == 1 else wb)
         element_point(legs, corners, spans, element, w, w_ref, work, points[j])
         speed_here = to_arc_length(points[j])
-        x_here, u_here = _fastest(points[j], feed, velocity, acceleration, jerk)
+        x_here, u_here = _fastest(points[j], limits.feed[segment], limits)
         if j == 1:
             x, u, speed = x_here, u_here, speed_here
         else:
             x_ends = max(x_ends, x_here)
-    return _interval_error(points, min(x, x_ends), u, speed * (wb - wa), acceleration, jerk)
+    return _interval_error(points, min(x, x_ends), u, speed * (wb - wa), limits.acceleration, limits.jerk)
 
 
 @njit(cache=True, error_model="numpy")
-def _subdivide(
-    legs,
-    corners,
-    spans,
-    element,
-    wa,
-    wb,
-    feed,
-    velocity,
-    acceleration,
-    jerk,
-    resolution,
-    rest,
-    work,
-    points,
-    out,
-):
-    """Halve [wa, wb] until every part's error is below `resolution`; right ends into out, returns their number.
+def _subdivide(table, row, limits, resolution, rest, work, out):
+    """Halve a row until every part's error is below `resolution`; right ends into out, returns their number.
 
-    rest : distances from the last full stop of wa and wb, of the next stop from the last, and the length of the first interval
+    rest : distances from the last full stop of the row's ends, of the next stop from the last, and the length of the first interval
            after a stop; intervals grow in proportion to their distance from the nearer stop
+    work : (5, 4, A)
     """
     from_a, from_b, to_next, shortest = rest
+    wa, wb = row.w0, row.w1
     stack = np.empty(HALVINGS_MAX + 1)
     stack[0] = wb
     depth = 1
@@ -118,9 +135,7 @@ def _subdivide(
     left = wa
     while depth > 0:
         right = stack[depth - 1]
-        error = _measure(
-            legs, corners, spans, element, left, right, feed, velocity, acceleration, jerk, work, points
-        )
+        error = _measure(table, row.curve, row.segment, (left, right), limits, work[:2], work[2:])
         middle = 0.5 * (left + right)
         share = (middle - wa) / (wb - wa)
         away = from_a + (from_b - from_a) * share
@@ -140,14 +155,13 @@ def _subdivide(
 
 
 @njit(cache=True, error_model="numpy")
-def divide(legs, corners, spans, rows, feed, velocity, acceleration, jerk, resolution, shortest):
+def divide(table, rows, limits, resolution, shortest):
     """The rows of path/rows.py with those on curves divided into the intervals of the grid.
 
+    table    : `ElementTable` (corners/elements.py); limits : `PathLimits` (path/rows.py)
     shortest : length of the first interval after a full stop [mm]; inf for second-order solvers
     """
-    axes = len(velocity)
-    work = np.empty((2, 4, axes))
-    points = np.empty((3, 4, axes))
+    work = np.empty((5, 4, len(limits.velocity)))
     ends = np.empty(1 << 14)
     out = np.empty(2 * len(rows) + 64, rows.dtype)
     n = 0
@@ -163,12 +177,9 @@ def divide(legs, corners, spans, rows, feed, velocity, acceleration, jerk, resol
         fresh = row.last
         count = 1
         ends[0] = row.w1
-        if not row.last and not is_straight(legs, row.curve):
+        if not row.last and not is_straight(table.legs, row.curve):
             rest = (row.begin - since, row.end - since, beyond - since, shortest)
-            count = _subdivide(
-                legs, corners, spans, row.curve, row.w0, row.w1, feed[row.segment], velocity, acceleration, jerk, resolution,
-                rest, work, points, ends,
-            )  # fmt: skip
+            count = _subdivide(table, row, limits, resolution, rest, work, ends)
         out = grown(out, n + count)
         left = row.w0
         for c in range(count):
@@ -262,9 +273,11 @@ def _effective_curvature(points):
 
 
 @njit(cache=True, error_model="numpy")
-def evaluate(legs, corners, spans, element, w0, w1, segment, last, feed, velocity, acceleration, jerk):
-    """Arc length, position, derivatives and margins at all points; see `PathSamples`."""
-    points, axes = len(w0), len(velocity)
+def evaluate(table, grid, limits):
+    """The `Columns` of a grid, from an `ElementTable` (corners/elements.py), `Intervals`, and `PathLimits` (path/rows.py)."""
+    legs, corners, spans = table
+    element, w0, w1, segment, last = grid
+    points, axes = len(w0), len(limits.velocity)
     s = np.zeros(points)
     position, d1 = np.empty((points, axes)), np.empty((points, axes))
     d2_left, d2_right = np.empty((points, axes)), np.empty((points, axes))
@@ -283,20 +296,7 @@ def evaluate(legs, corners, spans, element, w0, w1, segment, last, feed, velocit
                 s[i + 1] = s[i]
             fresh = True
             continue
-        error = _measure(
-            legs,
-            corners,
-            spans,
-            element[i],
-            w0[i],
-            w1[i],
-            feed[segment[i]],
-            velocity,
-            acceleration,
-            jerk,
-            work,
-            ends,
-        )
+        error = _measure(table, element[i], segment[i], (w0[i], w1[i]), limits, work, ends)
         margin[i] = MARGIN_SAFETY * error
         kappa_right[i], kappa_left[i + 1] = _effective_curvature(ends)
         if fresh:
@@ -314,4 +314,4 @@ def evaluate(legs, corners, spans, element, w0, w1, segment, last, feed, velocit
         s[i + 1] = max(
             s[i] + h, np.nextafter(s[i], np.inf)
         )  # metres into a job h may be below the last digit of s
-    return s, position, d1, d2_left, d2_right, d3_left, d3_right, margin, kappa_left, kappa_right
+    return Columns(s, position, d1, d2_left, d2_right, d3_left, d3_right, margin, kappa_left, kappa_right)

@@ -7,8 +7,11 @@ closing row.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import last_not_after
 from planner.corners.blend import shape_at
@@ -34,6 +37,41 @@ ROW = np.dtype(
         ("last", np.bool_),
     ]
 )
+
+
+class PathLimits(NamedTuple):
+    """What bounds a motion along the path: programmed feed of each segment, and limits of each axis; inf for none."""
+
+    feed: FloatArray  # (M,) [mm/s]
+    velocity: FloatArray  # (A,) [mm/s]
+    acceleration: FloatArray  # (A,) [mm/s2]
+    jerk: FloatArray  # (A,) [mm/s3]
+
+
+class Joints(NamedTuple):
+    """What the path does at its R+1 joints between legs, and where its M segments are."""
+
+    first: Array  # (R+1,) the first segment of each leg, then M (geometry/legs.py)
+    place: FloatArray  # (M+1,) where each segment starts, counted along the legs [mm]
+    passed: FloatArray  # (M+1,) where the path passes that start; the same but on spans (geometry/spline_passing.py) [mm]
+    d_in: FloatArray  # (R+1,) what its corner or run takes from the leg before [mm]
+    d_out: FloatArray  # (R+1,) and from the leg after [mm]
+    blended: Array  # (R+1,) True where there is a corner
+    is_stop: Array  # (R+1,) True at full stops
+    breaks: (
+        FloatArray  # (R+1, B) parameters where a corner starts with a grid point, ascending, padded with 1
+    )
+    run: Array  # (R+1,) run of spans that begins before each joint, or -1
+    run_first: Array  # (Q+1,) its first span
+
+
+class Longest(NamedTuple):
+    """How long the intervals on curves may be (path/calm.py)."""
+
+    duration: float  # at the fastest feed [s]; inf for second-order solvers, where the rest is not looked at
+    busy: FloatArray  # (B, 2) stretches of the path that are not calm [mm]
+    feed_sq: FloatArray  # (R+S,) bound of feed^2 by the curvature of each leg and span [mm2/s2]
+    quiet: FloatArray  # (M,) `quiet_way` at each segment's feed [mm]
 
 
 @njit(cache=True, error_model="numpy")
@@ -69,12 +107,12 @@ def _corner_parameter(corners, k, z):
 
 
 @njit(cache=True, error_model="numpy")
-def _arc_feed(leg, feed, velocity, acceleration):
+def _arc_feed(leg, feed, limits):
     """A bound of the feed on an arc: programmed, what all axes reach together, and what they can turn with."""
     v_sq, a_sq = 0.0, 0.0
-    for k in range(len(velocity)):
-        v_sq += velocity[k] * velocity[k]
-        a_sq += acceleration[k] * acceleration[k]
+    for k in range(len(limits.velocity)):
+        v_sq += limits.velocity[k] * limits.velocity[k]
+        a_sq += limits.acceleration[k] * limits.acceleration[k]
     return min(feed, np.sqrt(v_sq), np.sqrt(np.sqrt(a_sq) / (leg.radius * leg.rate * leg.rate)))
 
 
@@ -90,8 +128,9 @@ def _cut_leg(rows, n, leg, seg, start, ends):
 
 
 @njit(cache=True, error_model="numpy")
-def _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks):
-    """Rows of corner k from wa to wb, cut at its breaks; returns the rows and their number."""
+def _cut_corner(rows, n, corners, k, seg, part, vertex, breaks):
+    """Rows of a part (wa, wb) of corner k whose vertex is at `vertex` [mm], cut at its breaks; returns the rows and their number."""
+    wa, wb = part
     rows = grown(rows, n + len(breaks) + 1)
     cut = 0
     left = wa
@@ -115,15 +154,32 @@ def _base(longest, feed, feed_sq, acceleration):
     return max(longest * feed, SWITCHING_WAY * min(feed * feed, feed_sq) / acceleration)
 
 
-@njit(cache=True, error_model="numpy")
-def _cut_span(
-    rows, n, span, curve, seg, passed, feed, changes, longest, speed, feed_sq, acceleration, quiet, busy
-):  # fmt: skip
-    """Rows of a span that begins in segment `seg`, cut where the feed changes; returns the rows, their number and the segment in
-    which the span ends.
+class _Pace(NamedTuple):
+    feed: FloatArray  # (M,) programmed [mm/s]
+    changes: Array  # segments at whose start it changes, ascending
+    speed: float  # of all axes together [mm/s]
+    acceleration: float  # of all axes together [mm/s2]
 
-    changes : segments at whose start the feed changes, ascending
+
+@njit(cache=True, error_model="numpy")
+def _pace(limits):
+    """What `_cut_span` needs of the limits."""
+    speed_sq = 0.0
+    for k in range(len(limits.velocity)):
+        speed_sq += limits.velocity[k] * limits.velocity[k]
+    changes = np.flatnonzero(limits.feed[1:] != limits.feed[:-1]) + 1
+    return _Pace(limits.feed, changes, np.sqrt(speed_sq), float(np.linalg.norm(limits.acceleration)))
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_span(rows, n, span, curve, seg, passed, limits, longest):
+    """Rows of the span that is element `curve` and begins in segment `seg`, cut where the feed changes; returns the rows, their number
+    and the segment in which the span ends.
+
+    passed  : (M+1,) as in `Joints`
+    limits  : `_Pace`
     """
+    feed, changes = limits.feed, limits.changes
     begin, end = span.begin, span.begin + span.width
     least = FREE_PART_MIN * span.width
     c = last_not_after(changes, seg, 0, len(changes) - 1) if len(changes) else 0
@@ -134,8 +190,9 @@ def _cut_span(
         right = passed[changes[c]] if c < len(changes) and passed[changes[c]] < end - least else end
         while seg + 1 < len(feed) and passed[seg + 1] <= 0.5 * (left + right):
             seg += 1
-        base = _base(longest, min(feed[seg], speed), feed_sq, acceleration)
-        ends = interval_ends(0.0, left, right, base, np.inf, quiet[seg], busy)
+        fastest = min(feed[seg], limits.speed)
+        base = _base(longest.duration, fastest, longest.feed_sq[curve], limits.acceleration)
+        ends = interval_ends(0.0, left, right, base, np.inf, longest.quiet[seg], longest.busy)
         rows = grown(rows, n + len(ends) - 1)
         for part in range(len(ends) - 1):
             a, b = ends[part], ends[part + 1]
@@ -150,69 +207,52 @@ def _cut_span(
 
 
 @njit(cache=True, error_model="numpy")
-def cut_path(
-    legs, corners, spans, first, place, passed, d_in, d_out, blended, is_stop, breaks, run, run_first, feed, velocity, acceleration,
-    longest, busy, feed_sq, quiet,
-):  # fmt: skip
-    """Rows (n,) of the whole path in order (module text).
-
-    place   : (M+1,) where each segment starts (geometry/legs.py) [mm]
-    passed  : (M+1,) where the path passes that start; the same but on spans (geometry/spline_passing.py) [mm]
-    blended : (R+1,) True where there is a corner
-    run     : (R+1,) run of spans that begins before each joint, or -1; run_first (Q+1,) its first span
-    longest : duration of an interval on arcs and spans at the fastest feed [s]; inf for second-order solvers, where the rest is not
-              looked at
-    busy, feed_sq : of path/calm.py, where intervals may last longer; quiet (M,) `quiet_way` at each segment's feed
-    """
+def cut_path(table, joints, limits, longest):
+    """Rows (n,) of the whole path in order (module text); table: `ElementTable` (corners/elements.py)."""
+    legs, corners, spans = table
     rows = np.empty(8 * len(legs) + 4 * len(spans) + 64, ROW)
     n = 0
-    speed_sq = 0.0
-    for k in range(len(velocity)):
-        speed_sq += velocity[k] * velocity[k]
-    speed = np.sqrt(speed_sq)
-    strong = np.linalg.norm(acceleration)
-    changes = np.flatnonzero(feed[1:] != feed[:-1]) + 1
+    first, place, feed, pace = joints.first, joints.place, limits.feed, _pace(limits)
     for leg in range(len(legs)):
         length = legs[leg].length
         start = place[first[leg]]
         k = leg + 1
-        if length - d_out[leg] - d_in[k] > FREE_PART_MIN * length:
+        d_in, d_out = joints.d_in[k], joints.d_out[k]
+        if length - joints.d_out[leg] - d_in > FREE_PART_MIN * length:
             for seg in range(first[leg], first[k]):
                 end = place[seg + 1] - start if seg + 1 < first[k] else length
-                wa, wb = max(place[seg] - start, d_out[leg]), min(end, length - d_in[k])
+                wa, wb = max(place[seg] - start, joints.d_out[leg]), min(end, length - d_in)
                 if wb - wa <= FREE_PART_MIN * length:
                     continue
                 ends = np.array([wa, wb])
                 if legs[leg].round:
-                    fastest = _arc_feed(legs[leg], feed[seg], velocity, acceleration)
-                    base = _base(longest, fastest, feed_sq[leg], strong)
+                    fastest = _arc_feed(legs[leg], feed[seg], limits)
+                    base = _base(longest.duration, fastest, longest.feed_sq[leg], pace.acceleration)
                     most = min(ARC_STEP / abs(legs[leg].rate), (wb - wa) / ARC_PARTS_MIN)
-                    ends = interval_ends(start, wa, wb, base, most, quiet[seg], busy)
+                    ends = interval_ends(start, wa, wb, base, most, longest.quiet[seg], longest.busy)
                 rows, n = _cut_leg(rows, n, leg, seg, start, ends)
-        if run[k] >= 0:
+        run = joints.run[k]
+        if run >= 0:
             seg = first[leg]
-            for i in range(run_first[run[k]], run_first[run[k] + 1]):
-                rows, n, seg = _cut_span(
-                    rows, n, spans[i], len(legs) + i, seg, passed, feed, changes, longest, speed, feed_sq[len(legs) + i],
-                    strong, quiet, busy,
-                )  # fmt: skip
-        elif blended[k]:
-            vertex = start + length
+            for i in range(joints.run_first[run], joints.run_first[run + 1]):
+                rows, n, seg = _cut_span(rows, n, spans[i], len(legs) + i, seg, joints.passed, pace, longest)
+        elif joints.blended[k]:
+            vertex, breaks = start + length, joints.breaks[k]
             for seg in range(first[leg], first[k]):
                 begin, end = place[seg] - start, place[seg + 1] - start if seg + 1 < first[k] else length
-                if end > length - d_in[k]:
-                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d_in[k] else 0.0
+                if end > length - d_in:
+                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d_in else 0.0
                     wb = _corner_parameter(corners, k, end - length) if seg + 1 < first[k] else 0.5
-                    rows, n = _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks[k])
+                    rows, n = _cut_corner(rows, n, corners, k, seg, (wa, wb), vertex, breaks)
             for seg in range(first[k], first[k + 1]):
                 begin = place[seg] - place[first[k]]
                 end = place[seg + 1] - place[first[k]] if seg + 1 < first[k + 1] else legs[k].length
-                if begin >= d_out[k]:
+                if begin >= d_out:
                     break
                 wa = _corner_parameter(corners, k, begin) if seg > first[k] else 0.5
-                wb = _corner_parameter(corners, k, end) if end < d_out[k] else 1.0
-                rows, n = _cut_corner(rows, n, corners, k, seg, wa, wb, vertex, breaks[k])
-        if is_stop[k]:
+                wb = _corner_parameter(corners, k, end) if end < d_out else 1.0
+                rows, n = _cut_corner(rows, n, corners, k, seg, (wa, wb), vertex, breaks)
+        if joints.is_stop[k]:
             rows = grown(rows, n + 1)
             before = rows[n - 1]
             end = place[first[k]]

@@ -12,7 +12,7 @@ times as large, and x is bounded by the jerk limits as well. What remains is kep
 tightened by it, so that they hold between
 grid points and not only at them. Straight stretches need one interval: there g is exactly linear.
 
-Limits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
+PathLimits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
 is convex there, so a line through two caps would cut the corner; the end with the larger curvature keeps its cap and the other
 end gets a slightly larger *effective* curvature, such that the line meets X/kappa_mid in the middle:
 
@@ -26,14 +26,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.constraints import normal_limit
 from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.path.calm import Calm, calm, quiet_way
-from planner.path.grid import divide, evaluate, grade
+from planner.path.grid import Intervals, divide, evaluate, grade
 from planner.path.own_rows import own_rows
-from planner.path.rows import cut_path
+from planner.path.rows import Joints, Longest, PathLimits, cut_path
 
 # Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is then 0.6e-3 to 3e-3
 # above that of an infinitely fine grid on the shared jobs (tests/path): first order in the step, because u is constant on it.
@@ -134,48 +135,27 @@ def sample_path(
         delay = float((acceleration / jerk).min())
         longest = ARC_PERIOD * delay
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
-    if machine.normal_acceleration is not None:
-        acceleration = np.minimum(acceleration, machine.normal_acceleration)
+    acceleration = np.minimum(acceleration, normal_limit.largest(machine))
     where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
     if third_order:
         where_calm = calm(path, table, (velocity, acceleration, jerk))
-    rows = cut_path(
-        *table,
-        path.legs.first,
-        path.legs.place,
-        path.passed,
-        path.d_in,
-        path.d_out,
-        path.d > 0.0,
-        path.joint == Joint.STOP,
-        _corner_breaks(path),
-        path.run,
-        path.spline.first,
-        path.toolpath.feed,
-        velocity,
-        acceleration,
-        longest,
-        *where_calm,
-        quiet_way(path.toolpath.feed, acceleration, jerk),
-    )
-    rows = divide(*table, rows, path.toolpath.feed, velocity, acceleration, jerk, resolution, shortest)
+    limits = PathLimits(path.toolpath.feed, velocity, acceleration, jerk)
+    quiet = quiet_way(path.toolpath.feed, acceleration, jerk)
+    rows = cut_path(table, _joints(path), limits, Longest(longest, *where_calm, quiet))
+    rows = divide(table, rows, limits, resolution, shortest)
     if third_order:
         rows = grade(table.legs, rows)
-    element, w0, w1, segment, last = (rows[name] for name in ("curve", "w0", "w1", "segment", "last"))
-    ends = np.flatnonzero(last)  # the points that close a piece
-    piece = np.concatenate([[0], ends + 1])
-    stop = np.flatnonzero(path.joint == Joint.STOP)
-    limits = (path.toolpath.feed, velocity, acceleration, jerk)
+    grid = Intervals(*(rows[name].copy() for name in ("curve", "w0", "w1", "segment", "last")))
     samples = PathSamples(
         path=path,
         table=table,
-        piece=piece,
-        stop=stop,
-        element=element,
-        w0=w0,
-        w1=w1,
-        segment=segment,
-        **_evaluated(table, element, w0, w1, segment, last, limits),
+        piece=np.concatenate([[0], np.flatnonzero(grid.last) + 1]),
+        stop=np.flatnonzero(path.joint == Joint.STOP),
+        element=grid.element,
+        w0=grid.w0,
+        w1=grid.w1,
+        segment=grid.segment,
+        **evaluate(table, grid, limits)._asdict(),
     )
     if machine.own:
         for _ in range(HALVINGS_OF_OWN):
@@ -186,8 +166,8 @@ def sample_path(
     return samples
 
 
-def _halved(samples: PathSamples, interval: Array, limits: tuple[FloatArray, ...]) -> PathSamples:
-    """The grid with the intervals (n,) halved in their parameter; `limits` (feed, then axis limits) matter to the margin."""
+def _halved(samples: PathSamples, interval: Array, limits: PathLimits) -> PathSamples:
+    """The grid with the intervals (n,) halved in their parameter; the limits matter to the margin."""
     after = interval + 1
     middle = 0.5 * (samples.w0[interval] + samples.w1[interval])
 
@@ -201,7 +181,7 @@ def _halved(samples: PathSamples, interval: Array, limits: tuple[FloatArray, ...
     piece = samples.piece + np.searchsorted(interval, samples.piece, side="left")
     last = np.zeros(len(w0), dtype=bool)
     last[piece[1:] - 1] = True
-    columns = _evaluated(samples.table, element, w0, w1, segment, last, limits)
+    grid = Intervals(element, w0, w1, segment, last)
     return replace(
         samples,
         path=samples.path,
@@ -211,34 +191,24 @@ def _halved(samples: PathSamples, interval: Array, limits: tuple[FloatArray, ...
         w0=w0,
         w1=w1,
         segment=segment,
-        **columns,
+        **evaluate(samples.table, grid, limits)._asdict(),
     )
 
 
-def _evaluated(
-    table: ElementTable,
-    element: Array,
-    w0: FloatArray,
-    w1: FloatArray,
-    segment: Array,
-    last: Array,
-    limits: tuple[FloatArray, ...],
-) -> dict[str, FloatArray]:
-    """The columns of `PathSamples` that follow from the grid; `limits` (feed, then axis limits) matter to the margin."""
-    names = (
-        "s",
-        "position",
-        "d1",
-        "d2_left",
-        "d2_right",
-        "d3_left",
-        "d3_right",
-        "margin",
-        "kappa_left",
-        "kappa_right",
+def _joints(path: SmoothPath) -> Joints:
+    """The kernels' view of what the path does between its legs."""
+    return Joints(
+        first=path.legs.first,
+        place=path.legs.place,
+        passed=path.passed,
+        d_in=path.d_in,
+        d_out=path.d_out,
+        blended=path.d > 0.0,
+        is_stop=path.joint == Joint.STOP,
+        breaks=_corner_breaks(path),
+        run=path.run,
+        run_first=path.spline.first,
     )
-    columns = evaluate(*table, element, w0, w1, segment, last, *limits)
-    return dict(zip(names, columns, strict=True))
 
 
 def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
@@ -261,9 +231,12 @@ def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
     last[samples.piece[1:] - 1] = True
     table = element_table(path)
     axes = np.full(samples.d1.shape[1], np.inf)  # for the margins, which are not asked for
-    limits = (path.toolpath.feed, axes, axes, axes)
-    columns = _evaluated(table, element, w0, w1, segment, last, limits) | {"margin": samples.margin}
-    return replace(samples, path=path, table=table, w0=w0, w1=w1, **columns)
+    limits = PathLimits(path.toolpath.feed, axes, axes, axes)
+    grid = Intervals(
+        element.copy(), w0, w1, segment.copy(), last
+    )  # read-only arrays would compile a second kernel
+    columns = evaluate(table, grid, limits)._replace(margin=samples.margin)
+    return replace(samples, path=path, table=table, w0=w0, w1=w1, **columns._asdict())
 
 
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:

@@ -20,9 +20,10 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.base.errors import InputError, NotSolvedError
+from planner.base.names import METHODS
 from planner.base.units import MICROMETRE
+from planner.constraints import normal_limit
 from planner.machine import LINEAR_AXES, Machine, load_machine
-from planner.methods.registry import DEFAULT_MACHINE, METHODS, plan
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.report.export import summary, verdict_summary, versions
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".json", ".csv")
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
 AFTER_PLANNING = ("read", "sample", "verify")
-QUANTITIES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
+QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +98,8 @@ def compare(
 
     Raises InputError for a program or a machine that cannot be read; what a method cannot do is its row.
     """
+    from planner.methods.registry import DEFAULT_MACHINE
+
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if limits:
@@ -115,6 +118,8 @@ def row_of(
     progress: Progress | None = None,
 ) -> Row:
     """The row of a method, whatever comes of it."""
+    from planner import plan
+
     label = method if isinstance(method, str) else _label(method)
     try:
         return row_of_plan(

@@ -10,12 +10,22 @@ The polynomials come from the recursion of Cox and de Boor, carried out on polyn
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 
-DEGREE = 5
-ORDER = DEGREE + 1
+DEGREE = 5  # the least with four continuous derivatives: the jerk along the path is then differentiable
+ORDER = DEGREE + 1  # control points that a span depends on
+
+
+class Knots(NamedTuple):
+    """The knots of one spline with S spans."""
+
+    breaks: FloatArray  # (S+1,) ends of the spans, ascending
+    basis: FloatArray  # (S, 6, 6) their polynomials (module text)
 
 
 @njit(cache=True, error_model="numpy")
@@ -59,6 +69,12 @@ def span_basis(knots):
                         out[b, m] += lower[b, m] * (last - knots[i]) / width
                         out[b, m + 1] -= lower[b, m] * h / width
     return basis
+
+
+@njit(cache=True, error_model="numpy")
+def knots_at(breaks):
+    """Clamped knots at the spans' ends (S + 1,)."""
+    return Knots(breaks, span_basis(clamped(breaks)))
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,17 +8,29 @@ on it because neighbouring pieces share their ends.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER
 
-PARTS = 8  # into which a piece is cut if its bound is too large
+PARTS = 8  # into which a piece is cut if its bound is too large: their Bezier points are 64 times as near to the curve
+
+
+class Certificate(NamedTuple):
+    """Bounds of the deviation of a run with S spans and J sites."""
+
+    site: FloatArray  # (J,) around each site, over the tolerance
+    span: FloatArray  # (S,) on each span, over the tolerance: at most 1 everywhere is the proof
+    left: FloatArray  # (S,) what the bound leaves of the tolerance [mm]
 
 
 @njit(cache=True, error_model="numpy")
-def _piece_error(basis, control, i, a, b, chord_start, along, length, bezier):
-    """Largest distance of the Bezier points of span i between tau = a and b from a chord."""
+def _piece_error(basis, control, i, a, b, chord, bezier):
+    """Largest distance of the Bezier points of span i between tau = a and b from a chord (start, direction, length)."""
+    chord_start, along, length = chord
     axes = control.shape[1]
     step = b - a
     for k in range(axes):
@@ -57,29 +69,15 @@ def _piece_error(basis, control, i, a, b, chord_start, along, length, bezier):
 
 
 @njit(cache=True, error_model="numpy")
-def certify(
-    place,
-    point,
-    along,
-    tol,
-    tol_chord,
-    breaks,
-    basis,
-    control,
-    span,
-    weights_place,
-    ratio_site,
-    ratio_span,
-    left,
-):
-    """Bounds of the deviation over the tolerance: of each span into ratio_span (S,), and around each site into ratio_site (J,);
-    into left (S,) what the bound leaves of the tolerance [mm]. weights_place (J,) is the place of each site."""
+def certify(corridor, knots, site_place, control):
+    """The certificate of one run; site_place (J,) is the place of each site."""
+    place, point, along, tol, tol_chord = (
+        corridor.place, corridor.point, corridor.along, corridor.tol, corridor.tol_chord
+    )  # fmt: skip
+    breaks, basis = knots
     bezier = np.empty((ORDER, control.shape[1]))
-    spans, sites = len(breaks) - 1, len(span)
-    for i in range(spans):
-        ratio_span[i], left[i] = 0.0, np.inf
-    for j in range(sites):
-        ratio_site[j] = 0.0
+    spans, sites = len(breaks) - 1, len(site_place)
+    ratio_span, ratio_site, left = np.zeros(spans), np.zeros(sites), np.full(spans, np.inf)
     v, i, j = 0, 0, 0
     u = breaks[0]
     end = breaks[spans]
@@ -88,11 +86,11 @@ def certify(
             v += 1
         while i + 1 < spans and breaks[i + 1] <= u:
             i += 1
-        while j < sites and weights_place[j] <= u:
+        while j < sites and site_place[j] <= u:
             j += 1
         following = min(breaks[i + 1], place[v + 1])
         if j < sites:
-            following = min(following, weights_place[j])
+            following = min(following, site_place[j])
         if not following > u:  # the last piece, by rounding
             break
         h = breaks[i + 1] - breaks[i]
@@ -100,14 +98,15 @@ def certify(
         for k in range(point.shape[1]):
             length += (point[v + 1, k] - point[v, k]) * along[v, k]
         tau, step = (u - breaks[i]) / h, (following - u) / h
-        error = _piece_error(basis, control, i, tau, tau + step, point[v], along[v], length, bezier)
+        chord = point[v], along[v], length
+        error = _piece_error(basis, control, i, tau, tau + step, chord, bezier)
         if (
             error > tol_chord[v]
         ):  # the points of smaller pieces are nearer to the curve, by the square of their size
             error = 0.0
             for part in range(PARTS):
                 a, b = tau + step * part / PARTS, tau + step * (part + 1) / PARTS
-                error = max(error, _piece_error(basis, control, i, a, b, point[v], along[v], length, bezier))
+                error = max(error, _piece_error(basis, control, i, a, b, chord, bezier))
         ratio = error / tol_chord[v]
         if following == place[v + 1]:
             square = 0.0
@@ -128,3 +127,4 @@ def certify(
         if j > 0:
             ratio_site[j - 1] = max(ratio_site[j - 1], ratio)
         u = following
+    return Certificate(ratio_site, ratio_span, left)

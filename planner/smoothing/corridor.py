@@ -1,4 +1,4 @@
-"""The programmed path of each run as a chain of chords, along which a spline is laid.
+"""The corridor of each run: the programmed path as a chain of chords, each with its tolerance, inside of which a spline is laid.
 
 A straight leg is one chord, or one for each of its programmed feeds: a spline may slide along a chord, but has to pass the place
 where the feed changes. An arc becomes chords whose sagitta is at most `SAGITTA` of the tolerance. The chain stands for the path only
@@ -15,15 +15,16 @@ from planner.base.arrays import Array
 from planner.base.kernels import njit
 from planner.corners.smooth import SmoothPath
 from planner.geometry.legs import leg_point
-from planner.smoothing.runs import Runs
+from planner.smoothing.runs import SplineRuns
 
-SAGITTA = 0.01  # of chords on arcs [share of the tolerance]
-APART = 1e-3  # a change of the feed so near to a run's end is there [share of the tolerance]
+SAGITTA = 0.01  # of chords on arcs [share of the tolerance], which the corridor is narrower there
+APART = (
+    1e-3  # a change of the feed so near to a run's end is there [share of the tolerance]: no chord is shorter
+)
 
 
-class Guide(NamedTuple):
-    """V vertices of all runs one after the other, run q holds first[q] : first[q+1]; place, point, tolerance, and for the chord that
-    follows a vertex its direction, its sagitta and its tolerance."""
+class Corridor(NamedTuple):
+    """V vertices of all runs one after the other, run q holds first[q] : first[q+1]; or those of one run (`run_corridor`)."""
 
     first: Array  # (Q+1,)
     place: Array  # (V,) along the legs from the start of the job [mm]
@@ -34,22 +35,42 @@ class Guide(NamedTuple):
     tol_chord: Array  # (V,) tolerance of the chord that follows, less its sagitta [mm]
 
 
-def guide(path: SmoothPath, runs: Runs, tol: Array) -> Guide:
-    """The chains of all runs; `tol` (M+1,) at the toolpath's joints [mm]."""
+class FeedChanges(NamedTuple):
+    """Places on legs where the programmed feed changes, in order; leg r has first[r] : first[r+1]."""
+
+    first: Array  # (R+1,)
+    place: Array  # along their leg [mm]
+
+
+def find_corridor(path: SmoothPath, runs: SplineRuns, tol: Array) -> Corridor:
+    """The corridors of all runs; `tol` (M+1,) at the toolpath's joints [mm]."""
     at = path.legs.first
     of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
     place = np.concatenate([[0.0], np.cumsum(path.legs.length)])
-    ends = runs.joint_first, runs.joint_last, runs.x_first, runs.x_last
-    return Guide(*_guide(path.legs.table, place, of_leg, *_feed_changes(path), *ends))
+    return Corridor(*_corridor(path.legs.table, place, of_leg, _feed_changes(path), runs))
 
 
-def _feed_changes(path: SmoothPath) -> tuple[Array, Array]:
-    """Places on legs [mm] where the programmed feed changes, and which of them (R+1,) are each leg's."""
+def _feed_changes(path: SmoothPath) -> FeedChanges:
     legs, feed = path.legs, path.toolpath.feed
     inside = np.ones(len(feed), dtype=bool)
     inside[legs.first[:-1]] = False
     at = np.flatnonzero(inside & np.append(False, feed[1:] != feed[:-1]))
-    return legs.offset[at], np.searchsorted(at, legs.first)
+    return FeedChanges(np.searchsorted(at, legs.first), legs.offset[at])
+
+
+@njit(cache=True, error_model="numpy")
+def run_corridor(whole, q):
+    """The corridor of run q."""
+    a, b = whole.first[q], whole.first[q + 1]
+    return Corridor(
+        whole.first[q : q + 2],
+        whole.place[a:b],
+        whole.point[a:b],
+        whole.turn[a:b],
+        whole.along[a:b],
+        whole.tol[a:b],
+        whole.tol_chord[a:b],
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,58 +89,68 @@ def _chords(leg, tol, begin, end, changes):
 
 
 @njit(cache=True, error_model="numpy")
-def _guide(legs, starts, tol, feed_changes, change_first, joint_first, joint_last, x_first, x_last):
-    runs, axes = len(joint_first), legs[0].start.shape[0]
-    first = np.zeros(runs + 1, np.int64)
-    for sweep in range(2):
-        if sweep == 1:
-            total = first[runs]
-            place, turn = np.empty(total), np.zeros(total)
-            point, along = np.empty((total, axes)), np.zeros((total, axes))
-            tol_here, tol_chord = np.empty(total), np.empty(total)
-            out = np.empty((4, axes))
-        for q in range(runs):
-            n = first[q]
-            for leg in range(joint_first[q] - 1, joint_last[q] + 1):
-                begin = x_first[q] if leg == joint_first[q] - 1 else 0.0
-                end = x_last[q] if leg == joint_last[q] else legs[leg].length
-                changes = feed_changes[change_first[leg] : change_first[leg + 1]]
-                chords, change = _chords(legs[leg], tol[leg], begin, end, changes)
-                if sweep == 1:
-                    for c in range(chords + (1 if leg == joint_last[q] else 0)):
-                        x = begin + (end - begin) * c / chords
-                        if not legs[leg].round and 0 < c < chords:
-                            x = changes[change + c - 1]
-                        leg_point(legs, leg, x, out)
-                        place[n + c] = starts[leg] + x
-                        for k in range(axes):
-                            point[n + c, k] = out[0, k]
-                        tol_here[n + c] = tol[leg]
-                        if c == 0 and leg >= joint_first[q]:
-                            tol_here[n] = min(tol[leg - 1], tol[leg])
-                        bend = (
-                            abs(legs[leg].radius * legs[leg].rate * legs[leg].rate)
-                            if legs[leg].round
-                            else 0.0
-                        )
-                        sagitta = bend * ((end - begin) / chords) ** 2 / 8.0
-                        tol_chord[n + c] = tol[leg] - sagitta
-                n += chords
-            n += 1
-            if sweep == 0:
-                first[q + 1] = n
-            else:
-                for v in range(first[q], first[q + 1] - 1):
-                    size = 0.0
-                    for k in range(axes):
-                        along[v, k] = point[v + 1, k] - point[v, k]
-                        size += along[v, k] * along[v, k]
-                    size = np.sqrt(size)
-                    for k in range(axes):
-                        along[v, k] /= size
-                    if v > first[q]:
-                        across = 0.0
-                        for k in range(axes):
-                            across += (along[v, k] - along[v - 1, k]) ** 2
-                        turn[v] = 2.0 * np.arcsin(min(0.5 * np.sqrt(across), 1.0))
+def _vertices(runs, legs, tol, changes):
+    """(Q+1,) where the vertices of each run begin."""
+    first = np.zeros(len(runs.joint_first) + 1, np.int64)
+    for q in range(len(runs.joint_first)):
+        n = first[q] + 1
+        for leg in range(runs.joint_first[q] - 1, runs.joint_last[q] + 1):
+            begin, end = _extent(runs, q, leg, legs[leg].length)
+            own = changes.place[changes.first[leg] : changes.first[leg + 1]]
+            n += _chords(legs[leg], tol[leg], begin, end, own)[0]
+        first[q + 1] = n
+    return first
+
+
+@njit(cache=True, error_model="numpy")
+def _extent(runs, q, leg, length):
+    """Which part of a leg belongs to run q [mm]."""
+    begin = runs.x_first[q] if leg == runs.joint_first[q] - 1 else 0.0
+    end = runs.x_last[q] if leg == runs.joint_last[q] else length
+    return begin, end
+
+
+@njit(cache=True, error_model="numpy")
+def _corridor(legs, starts, tol, changes, runs):
+    """Columns of `Corridor`; starts, tol (R,) place along the legs and tolerance of each leg [mm]."""
+    first, axes = _vertices(runs, legs, tol, changes), legs[0].start.shape[0]
+    total = first[-1]
+    place, turn = np.empty(total), np.zeros(total)
+    point, along = np.empty((total, axes)), np.zeros((total, axes))
+    tol_here, tol_chord = np.empty(total), np.empty(total)
+    out = np.empty((4, axes))
+    for q in range(len(runs.joint_first)):
+        n = first[q]
+        for leg in range(runs.joint_first[q] - 1, runs.joint_last[q] + 1):
+            begin, end = _extent(runs, q, leg, legs[leg].length)
+            own = changes.place[changes.first[leg] : changes.first[leg + 1]]
+            chords, change = _chords(legs[leg], tol[leg], begin, end, own)
+            bend = abs(legs[leg].radius * legs[leg].rate * legs[leg].rate) if legs[leg].round else 0.0
+            sagitta = bend * ((end - begin) / chords) ** 2 / 8.0
+            for c in range(chords + (1 if leg == runs.joint_last[q] else 0)):
+                x = begin + (end - begin) * c / chords
+                if not legs[leg].round and 0 < c < chords:
+                    x = own[change + c - 1]
+                leg_point(legs, leg, x, out)
+                place[n + c] = starts[leg] + x
+                for k in range(axes):
+                    point[n + c, k] = out[0, k]
+                tol_here[n + c] = tol[leg]
+                if c == 0 and leg >= runs.joint_first[q]:
+                    tol_here[n] = min(tol[leg - 1], tol[leg])
+                tol_chord[n + c] = tol[leg] - sagitta
+            n += chords
+        for v in range(first[q], first[q + 1] - 1):
+            size = 0.0
+            for k in range(axes):
+                along[v, k] = point[v + 1, k] - point[v, k]
+                size += along[v, k] * along[v, k]
+            size = np.sqrt(size)
+            for k in range(axes):
+                along[v, k] /= size
+            if v > first[q]:
+                across = 0.0
+                for k in range(axes):
+                    across += (along[v, k] - along[v - 1, k]) ** 2
+                turn[v] = 2.0 * np.arcsin(min(0.5 * np.sqrt(across), 1.0))
     return first, place, point, turn, along, tol_here, tol_chord

@@ -12,34 +12,60 @@ g = |p_u|:  u' = v/g,  u'' = (a - g_u u'^2)/g,  u''' = (j - g_uu u'^3 - 3 g_u u'
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
+from planner.smoothing.basis import ORDER, derivatives
+from planner.smoothing.splines import control_first, run_control, run_knots
 
+# Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, which are of degree 4.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-NODES, NODE_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0  # exact for squares of third derivatives
+NODES, NODE_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
+
+
+class SplineMotion(NamedTuple):
+    """A motion along the splines of Q runs: its grid intervals (I,) on them, run q holds interval[q] : interval[q+1], and what it pays
+    for squared velocity, acceleration and jerk of each axis at the two ends of each."""
+
+    interval: Array  # (Q+1,)
+    span: Array  # (I,) counted within the run
+    tau: FloatArray  # (I, 2) place on the span
+    feed: FloatArray  # (I, 2) along the path [mm/s], like the next two
+    acc: FloatArray  # (I, 2) [mm/s2]
+    jerk: FloatArray  # (I,) [mm/s3]
+    duration: FloatArray  # (I,) [s]
+    price: FloatArray  # (I, 2, A, 3) weights, the last two over the squares of their limits
 
 
 @njit(cache=True, error_model="numpy")
-def third_derivative_forms(span_first, breaks, weights, H):
-    """Add the integrals of the squared third derivatives times weights (A,) along all runs to the bands H (A, n, 6)."""
+def third_derivative_bands(splines, weights):
+    """(A, n, 6) bands of the integrals of the squared third derivatives times weights (A,) along all runs."""
+    H = np.zeros((len(weights), len(splines.control), ORDER))
+    for q in range(len(splines.fits)):
+        knots, begin = run_knots(splines, q), control_first(splines, q)
+        add_third_derivatives(knots, weights, H[:, begin:])
+    return H
+
+
+@njit(cache=True, error_model="numpy")
+def add_third_derivatives(knots, weights, H):
+    """Add the integral of the squared third derivatives times weights (A,) along one run to its bands H (A, n, 6)."""
     rows = np.empty((4, ORDER))
-    for q in range(len(span_first) - 1):
-        cut = breaks[span_first[q] + q : span_first[q + 1] + q + 1]
-        basis = span_basis(clamped(cut))
-        begin = span_first[q] + DEGREE * q
-        for i in range(len(cut) - 1):
-            h = cut[i + 1] - cut[i]
-            for node in range(len(NODES)):
-                derivatives(basis[i], NODES[node], h, rows)
-                for k in range(len(weights)):
-                    add_square(H[k, begin:], i, rows[3], weights[k] * NODE_WEIGHTS[node] * h)
+    for i in range(len(knots.breaks) - 1):
+        h = knots.breaks[i + 1] - knots.breaks[i]
+        for node in range(len(NODES)):
+            derivatives(knots.basis[i], NODES[node], h, rows)
+            for k in range(len(weights)):
+                add_square(H[k], i, rows[3], weights[k] * NODE_WEIGHTS[node] * h)
 
 
 @njit(cache=True, error_model="numpy")
-def third_derivative_energy(cut, basis, weights, c, first, last):
+def third_derivative_energy(knots, weights, c, first, last):
     """Integral of the squared third derivatives times weights (A,) over the spans first .. last - 1."""
+    cut, basis = knots
     total = 0.0
     rows = np.empty((4, ORDER))
     for i in range(first, last):
@@ -64,14 +90,15 @@ def add_square(band, i, row, weight):
 
 
 @njit(cache=True, error_model="numpy")
-def _add_prices(basis, control, cut, i, tau, v, a, jerk, weight, limits, own, H, Q):
-    """Add what one end of a grid interval pays to H, and its own weight to Q (optimal/reshape.py).
-
-    v, a, jerk : along the path; weight (A, 3) of squared velocity, acceleration and jerk over their `limits` (2, A); own: of Q [s]
-    """
+def _add_prices(knots, control, motion, at, limits, H, Q):
+    """Add what a motion pays at one end of a grid interval, at = (interval, end), to H, and its squared jerks to Q (`motion_bands`)."""
+    interval, end = at
+    i, weight = motion.span[interval], motion.price[interval, end]
+    v, a, jerk = motion.feed[interval, end], motion.acc[interval, end], motion.jerk[interval]
+    own = 0.5 * motion.duration[interval]
     axes = control.shape[1]
     rows = np.empty((4, ORDER))
-    derivatives(basis[i], tau, cut[i + 1] - cut[i], rows)
+    derivatives(knots.basis[i], motion.tau[interval, end], knots.breaks[i + 1] - knots.breaks[i], rows)
     jet = np.zeros((3, axes))
     for k in range(axes):
         for m in range(3):
@@ -106,27 +133,19 @@ def _add_prices(basis, control, cut, i, tau, v, a, jerk, weight, limits, own, H,
 
 
 @njit(cache=True, error_model="numpy")
-def motion_forms(
-    span_first, breaks, control, fits, interval, of_span, tau, v, a, jerk, duration, price, limits, H, Q
-):  # fmt: skip
-    """Add what a motion along the splines pays to the bands H, and its squared jerks over their limits, times dt, to Q (A, n, 6).
-
-    interval    : (Q+1,) the grid intervals of each run; of_span (I,) their span, counted within the run; tau (I, 2) its part
-    v, a        : (I, 2) feed and acceleration along the path at both ends; jerk, duration (I,)
-    price       : (I, 2, A, 3) weights of squared velocity, acceleration and jerk, the last two over their limits
-    limits      : (2, A) of acceleration and jerk
-    """
-    for q in range(len(fits)):
-        if not fits[q]:
+def motion_bands(splines, motion, limits):
+    """Two bands (A, n, 6) over the control points of all runs that fit: of what the motion pays, and of its squared jerks over their
+    limits, times dt (optimal/reshape.py). `limits` (2, A) of acceleration and jerk."""
+    axes, n = splines.control.shape[1], len(splines.control)
+    H, Q = np.zeros((axes, n, ORDER)), np.zeros((axes, n, ORDER))
+    for q in range(len(splines.fits)):
+        if not splines.fits[q]:
             continue
-        s0, s1 = span_first[q], span_first[q + 1]
-        cut = breaks[s0 + q : s1 + q + 1]
-        basis = span_basis(clamped(cut))
-        c = control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
-        begin, end = s0 + DEGREE * q, s1 + DEGREE * (q + 1)
-        for i in range(interval[q], interval[q + 1]):
-            for e in range(2):
+        knots, control = run_knots(splines, q), run_control(splines, q)
+        begin, end = control_first(splines, q), control_first(splines, q + 1)
+        for interval in range(motion.interval[q], motion.interval[q + 1]):
+            for side in range(2):
                 _add_prices(
-                    basis, c, cut, of_span[i], tau[i, e], v[i, e], a[i, e], jerk[i], price[i, e], limits, 0.5 * duration[i],
-                    H[:, begin:end], Q[:, begin:end],
-                )  # fmt: skip
+                    knots, control, motion, (interval, side), limits, H[:, begin:end], Q[:, begin:end]
+                )
+    return H, Q

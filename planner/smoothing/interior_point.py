@@ -1,63 +1,78 @@
-"""The convex problem of a spline in a tube, by a primal-dual interior-point method that never leaves the tube.
+"""The convex problem of a spline in a corridor, by a primal-dual interior-point method that never leaves the corridor.
 
 Over the control points c (n, A), minimise a quadratic form, one banded matrix H_k per axis, with every site j inside its ball:
 
     minimise    1/2 sum_k c_k' H_k c_k
     subject to  g_j = (|e_j|^2 / r_j^2 - 1)/2 <= 0,     e_j = d_j - (1 - slide_j) t_j (t_j . d_j),     d_j = p(u_j) - q_j
 
-t_j is a direction (of the path) along which the site may leave q_j by r_j/slide_j; slide = 1 is a ball. With z_j >= 0 for g_j, a
-Newton step of z_j g_j = -mu and stationarity solves
+(sites.py). With z_j >= 0 for g_j, a Newton step of z_j g_j = -mu and stationarity solves
 
     (H + sum z_j G_j + sum z_j/(-g_j) grad g_j grad g_j') dc = -(H c + sum mu/(-g_j) grad g_j),
 
-block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the tube; where the
+block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the corridor; where the
 method ends early, the path is less smooth than it could be and no less inside.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.banded import factorise, solve
 from planner.smoothing.basis import ORDER
+from planner.smoothing.sites import Sites, site_distance
 
-TO_BOUNDARY = 0.95  # of the way to the nearest bound that a step may go [-]
+TO_BOUNDARY = 0.95  # of the way to the nearest bound that a step may go [-]: usual are 0.9 to 0.995
 CENTRING = 3.0  # a short step is followed by one towards the middle, with up to so much of the gap [-]; 0 takes twice the iterations
-STALLED = 1e-6  # a step shorter than this ends the search [-]
+STALLED = 1e-6  # a step shorter than this ends the search [-]: rounding of the Newton matrix, no way forward
+AIM = 0.1  # of the gap that is asked for: multipliers are not driven below what that needs, which keeps the matrix well conditioned
+
+
+class Problem(NamedTuple):
+    """A convex problem over n control points and m sites (module text), linear . c added to its objective."""
+
+    H: FloatArray  # (A, n, 6) lower bands
+    linear: FloatArray  # (n, A)
+    free: Array  # (n,) False for control points that stay
+    sites: Sites  # (m, ..), their spans counted from the first of these control points
+
+
+class Accuracy(NamedTuple):
+    """Where the search ends, gap <= last + relative * objective, and where it begins."""
+
+    value: float  # of the objective at the start, in as far as it matters
+    first: float  # guess of the gap there, for the first multipliers
+    last: float
+    relative: float
+
+
+class Optimum(NamedTuple):
+    """What the search found: control points (n, A), multipliers (m,) of g, the gap, and the iterations."""
+
+    control: FloatArray
+    multiplier: FloatArray
+    gap: float
+    iterations: int
 
 
 @njit(cache=True, error_model="numpy")
-def site_distance(site, c, first, values, place, along, slide, e):
-    """e_j of a site (module text) into e (A,); returns |e_j| [mm]."""
-    axes = len(e)
-    dot = 0.0
-    for k in range(axes):
-        d = -place[site, k]
-        for b in range(ORDER):
-            d += values[site, b] * c[first[site] + b, k]
-        e[k] = d
-        dot += d * along[site, k]
-    square = 0.0
-    for k in range(axes):
-        e[k] -= (1.0 - slide[site]) * dot * along[site, k]
-        square += e[k] * e[k]
-    return np.sqrt(square)
-
-
-@njit(cache=True, error_model="numpy")
-def _constraint(c, first, values, place, along, slide, radius, g, e):
+def _constraint(sites, c, g, e):
     """g (m,) and the weighted distances e (m, A) over their radii."""
-    for site in range(len(first)):
-        ratio = site_distance(site, c, first, values, place, along, slide, e[site]) / radius[site]
+    for site in range(len(g)):
+        radius = sites.radius[site]
+        ratio = site_distance(sites, site, c, 0, e[site]) / radius
         for k in range(e.shape[1]):
-            e[site, k] /= radius[site]
+            e[site, k] /= radius
         g[site] = 0.5 * (ratio * ratio - 1.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _objective(H, linear, c, gradient):
+def _objective(problem, c, gradient):
     """1/2 c'Hc + linear.c, and its gradient (n, A)."""
+    H, linear = problem.H, problem.linear
     axes, n, width = H.shape
     total = 0.0
     for k in range(axes):
@@ -76,8 +91,10 @@ def _objective(H, linear, c, gradient):
 
 
 @njit(cache=True, error_model="numpy")
-def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
+def _assemble(problem, z, g, e, band):
     """The Newton matrix (banded.py), with unit rows for control points that stay."""
+    H, free = problem.H, problem.free
+    first, _, values, _, along, slide, radius = problem.sites
     axes, n, width = H.shape
     full = band.shape[1]
     band[:] = 0.0
@@ -124,8 +141,9 @@ def _assemble(H, free, first, values, along, slide, radius, z, g, e, band):
 
 
 @njit(cache=True, error_model="numpy")
-def _add_gradient(first, values, along, slide, radius, e, factor, out):
+def _add_gradient(sites, e, factor, out):
     """out (n, A) += sum_j factor_j grad g_j."""
+    first, _, values, _, along, slide, radius = sites
     axes = out.shape[1]
     for site in range(len(first)):
         dot = 0.0
@@ -138,8 +156,9 @@ def _add_gradient(first, values, along, slide, radius, e, factor, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _step_length(step, first, values, along, slide, radius, g, e, slope):
+def _step_length(sites, step, g, e, slope):
     """Largest step <= 1/TO_BOUNDARY that keeps every g <= 0; also slope (m,) = grad g . dc."""
+    first, _, values, _, along, slide, radius = sites
     axes = step.shape[1]
     longest = 1.0 / TO_BOUNDARY
     move = np.empty(axes)
@@ -166,49 +185,28 @@ def _step_length(step, first, values, along, slide, radius, g, e, slope):
 
 
 @njit(cache=True, error_model="numpy")
-def minimise(
-    H,
-    linear,
-    free,
-    first,
-    values,
-    place,
-    along,
-    slide,
-    radius,
-    c,
-    z,
-    value,
-    gap_first,
-    gap_last,
-    relative,
-    iterations,
-):
-    """Move the control points c (n, A), strictly inside the tube, to the optimum; returns the gap and the iterations.
-
-    z         : (m,) becomes the multipliers of g
-    value     : of the objective at the start, in as far as it matters
-    gap_first : guess of the gap there, for the first multipliers
-    gap_last, relative : where to end, gap <= gap_last + relative * value
-    H (A, n, 6) lower bands, linear (n, A); free (n,) False for control points that stay; first (m,) first of the six
-    control points of each site, values (m, 6) of their basis functions there.
-    """
-    axes, n, _ = H.shape
-    m = len(first)
+def minimise_in_corridor(problem, start, accuracy, iterations):
+    """The optimum of a `Problem` from control points (n, A) strictly inside the corridor, to an `Accuracy`; the last iterate, which is
+    inside, where `iterations` are too few or rounding stops the search."""
+    sites, free = problem.sites, problem.free
+    axes, n, _ = problem.H.shape
+    m = len(sites.span)
+    c, z = start.copy(), np.empty(m)
     g, e = np.empty(m), np.empty((m, axes))
     gradient = np.empty((n, axes))
     band = np.empty((n * axes, ORDER * axes))
     slope, slope_1, factor = np.empty(m), np.empty(m), np.empty(m)
     step, step_1 = np.empty((n, axes)), np.empty((n, axes))
-    _constraint(c, first, values, place, along, slide, radius, g, e)
+    _constraint(sites, c, g, e)
     for site in range(m):
-        z[site] = gap_first / m / -g[site]
-    reach = np.max(radius) if m else 0.0  # what a control point may be from its optimum, about
-    start = _objective(H, linear, c, gradient)
+        z[site] = accuracy.first / m / -g[site]
+    reach = np.max(sites.radius) if m else 0.0  # what a control point may be from its optimum, about
+    at_start = _objective(problem, c, gradient)
     gap = np.inf
     went = 1.0
     for iteration in range(iterations):
-        small = gap_last + relative * max(value + _objective(H, linear, c, gradient) - start, 0.0)
+        value = accuracy.value + _objective(problem, c, gradient) - at_start
+        small = accuracy.last + accuracy.relative * max(value, 0.0)
         complementarity = 0.0
         for site in range(m):
             complementarity += z[site] * -g[site]
@@ -216,23 +214,23 @@ def minimise(
         for i in range(n):
             for k in range(axes):
                 step_1[i, k] = gradient[i, k]
-        _add_gradient(first, values, along, slide, radius, e, z, step_1)
+        _add_gradient(sites, e, z, step_1)
         for i in range(n):
             if free[i]:
                 for k in range(axes):
                     residual += abs(step_1[i, k])
         gap = complementarity + residual * reach
         if gap <= small:
-            return gap, iteration
-        _assemble(H, free, first, values, along, slide, radius, z, g, e, band)
+            return Optimum(c, z, gap, iteration)
+        _assemble(problem, z, g, e, band)
         if not factorise(band):
-            return gap, iteration
+            return Optimum(c, z, gap, iteration)
         # predictor: mu = 0
         for i in range(n):
             for k in range(axes):
                 step_1[i, k] = -gradient[i, k] if free[i] else 0.0
         solve(band, step_1.reshape(-1))
-        longest = min(1.0, _step_length(step_1, first, values, along, slide, radius, g, e, slope_1))
+        longest = min(1.0, _step_length(sites, step_1, g, e, slope_1))
         dual = 1.0
         for site in range(m):
             dz = -z[site] + z[site] / -g[site] * slope_1[site]
@@ -242,8 +240,9 @@ def minimise(
         for site in range(m):
             dz = -z[site] + z[site] / -g[site] * slope_1[site]
             after += (z[site] + dual * dz) * max(-(g[site] + longest * slope_1[site]), 0.0)
+        # the cube of what the predictor leaves of the gap (Mehrotra 1992)
         mu = max((after / complementarity) ** 3, CENTRING * (1.0 - went)) * complementarity / m
-        mu = max(mu, 0.1 * small / m)
+        mu = max(mu, AIM * small / m)
         for i in range(n):
             for k in range(axes):
                 step[i, k] = -gradient[i, k]
@@ -251,13 +250,13 @@ def minimise(
             # second order: z (g + slope + curvature) with the predictor's products
             dz = -z[site] + z[site] / -g[site] * slope_1[site]
             factor[site] = -(mu + dz * slope_1[site] * dual * longest) / -g[site]
-        _add_gradient(first, values, along, slide, radius, e, factor, step)
+        _add_gradient(sites, e, factor, step)
         for i in range(n):
             if not free[i]:
                 for k in range(axes):
                     step[i, k] = 0.0
         solve(band, step.reshape(-1))
-        longest = _step_length(step, first, values, along, slide, radius, g, e, slope)
+        longest = _step_length(sites, step, g, e, slope)
         longest = min(1.0, TO_BOUNDARY * longest)
         went = longest
         dual = 1.0
@@ -271,7 +270,7 @@ def minimise(
                 c[i, k] += longest * step[i, k]
         for site in range(m):
             z[site] += dual * slope_1[site]
-        _constraint(c, first, values, place, along, slide, radius, g, e)
+        _constraint(sites, c, g, e)
         if longest < STALLED:
-            return gap, iteration
-    return gap, iterations
+            return Optimum(c, z, gap, iteration)
+    return Optimum(c, z, gap, iterations)

@@ -19,6 +19,8 @@ from planner.base.kernels import njit
 FITTING = 2.0
 # Neighbouring spans then differ by a third at most.
 GROWTH = 0.3
+STEP = 0.1  # of the distance between knots, to integrate its inverse in [-]: over a step it changes by GROWTH STEP = 3 %
+BEYOND = 1e-3  # ... or up to so little beyond a place, so that the next step begins after the kink there [-]
 TURN_MIN = 1e-12  # [rad]: a tangent joint, for which knots may stand as far apart as they like
 
 
@@ -82,9 +84,9 @@ def spread(place, h, begin, end, longest, least):
                 ahead = min(ahead, place[k])
             if k > 0:
                 here = min(here, h[k - 1] + GROWTH * (u - place[k - 1]))
-            du = min(0.1 * here, end - u)
+            du = min(STEP * here, end - u)
             if ahead > u:
-                du = min(du, ahead - u + 1e-3 * here)
+                du = min(du, ahead - u + BEYOND * here)
             part = du / here
             if sweep == 1:
                 while filled < spans and done + part >= target * filled:

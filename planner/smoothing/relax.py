@@ -1,4 +1,4 @@
-"""Smooth curves inside the tube: each run relaxed to the least integral of its squared third derivative, and proved to be inside.
+"""Smooth curves inside the corridor: each run relaxed to the least integral of its squared third derivative, and proved to be inside.
 
 Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed is known yet;
 optimal/reshape.py weights them by what the time-optimal motion pays for.
@@ -9,37 +9,76 @@ is too large, and relaxed again.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
+from planner.base.search import first_not_before
+from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
+from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import third_derivative_energy
-from planner.smoothing.initial import follow
-from planner.smoothing.interior_point import minimise, site_distance
+from planner.smoothing.initial import greville_control
+from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor
+from planner.smoothing.runs import SplineRuns
+from planner.smoothing.sites import Sites, site_distance, with_radius
+from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
-TUBE = 0.9995  # of the tolerance that sites may use at first [-]
+USED = 0.9995  # of the tolerance that sites may use at first [-]
 TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]
 ROUNDS = 20  # of tightening, in windows around the sites that need it; 2 are the rule
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
-INSIDE = 1.002  # ... with tubes at least so much wider than it needs [-]
+WIDER = 1.002  # ... with tubes at least so much wider than it needs [-]
 WINDOW = 240  # control points relaxed at a time ...
 OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
 
 
-@njit(cache=True, error_model="numpy")
-def _first_site(span, value):
-    """Index of the first site whose span is not before `value`."""
-    lo, hi = 0, len(span)
-    while lo < hi:
-        mid = (lo + hi) // 2
-        if span[mid] < value:
-            lo = mid + 1
-        else:
-            hi = mid
-    return lo
+class Goal(NamedTuple):
+    """What the control points c of all runs are moved to: the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now), to a gap for each run
+    plus the share `relative` of the integral of its squared third derivatives, if H is its form."""
+
+    H: FloatArray  # (A, n, 6) lower bands of all runs
+    Q: FloatArray  # (A, n, 6)
+    force: FloatArray  # (Q,)
+    gap: FloatArray  # (Q,) in the units of H
+    relative: float
+    axis_weights: FloatArray  # (A,) of the squared third derivatives
+
+
+class Relaxed(NamedTuple):
+    """All runs relaxed. A run without a certificate, or that did not fit, has its control points and radii from before."""
+
+    certified: Array  # (Q,)
+    control: FloatArray  # (n, A)
+    used: FloatArray  # (J,) radius that each site may use, smaller than before where the certificate asked for it [mm]
+    left: FloatArray  # (S,) what the certificate leaves of the tolerance, of the last try: negative where it fails [mm]
+    multiplier: FloatArray  # (J,) of the sites' constraints (interior_point.py)
+
+
+class Run(NamedTuple):
+    """One run that is relaxed: n control points, of which the first and last ones are fixed."""
+
+    corridor: Corridor
+    knots: Knots
+    sites: Sites
+    H: FloatArray  # (A, n, 6) lower bands
+    linear: FloatArray  # (n, A)
+    middle: FloatArray  # (n, A) a spline well inside the corridor
+    fixed_first: int
+    fixed_last: int
+
+
+class ControlWindow(NamedTuple):
+    """The control points lo .. hi - 1 of a run and the sites site .. site_end - 1 that they move."""
+
+    lo: int
+    hi: int
+    site: int
+    site_end: int
 
 
 @njit(cache=True, error_model="numpy")
@@ -67,145 +106,163 @@ def _next_window(attempt, done, site, fixed_first, end, span, ratio_site):
 
 
 @njit(cache=True, error_model="numpy")
-def _tighten(lo, hi, j0, j1, c, c0, span, weights, target, direction, slide, used, ratio_site):
-    """Smaller tubes for the sites j0 .. j1 - 1 whose bound is too large, and the control points lo .. hi - 1 a little closer to the
-    path c0, which is well inside, so that they are inside again."""
-    axes = c.shape[1]
-    e = np.empty(axes)
+def _window(run, lo, hi):
+    span, spans = run.sites.span, len(run.knots.breaks) - 1
+    return ControlWindow(
+        lo, hi, first_not_before(span, max(lo - DEGREE, 0)), first_not_before(span, min(hi, spans))
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def tighten_window(window, sites, control, middle, ratio_site):
+    """Smaller radii for a window's sites whose bound is too large, and its control points a little closer to the spline `middle`, which
+    is well inside, so that they are inside again: control points (hi - lo, A) and radii (site_end - site,)."""
+    axes, (lo, hi, site, site_end) = control.shape[1], window
+    begin = max(lo - DEGREE, 0)
+    near, e = control[begin : hi + DEGREE].copy(), np.empty(axes)
     for i in range(lo, hi):
         taper = min(min(i - lo + 1, hi - i) / OVERLAP, 1.0)
         for k in range(axes):
-            c[i, k] += (1.0 - AGAIN) * taper * (c0[i, k] - c[i, k])
-    for j in range(j0, j1):
-        needs = INSIDE * site_distance(j, c, span, weights, target, direction, slide, e)
-        if needs >= INSIDE * used[j]:  # pushed out by the taper
-            used[j] = needs
+            near[i - begin, k] += (1.0 - AGAIN) * taper * (middle[i, k] - control[i, k])
+    radius = sites.radius[site:site_end].copy()
+    for j in range(site, site_end):
+        used = sites.radius[j]
+        needs = WIDER * site_distance(sites, j, near, begin, e)
+        if needs >= WIDER * used:  # pushed out by the taper
+            radius[j - site] = needs
         elif ratio_site[j] > 1.0:
-            used[j] = max(TIGHTENED / ratio_site[j] * used[j], min(needs, used[j]))
+            radius[j - site] = max(TIGHTENED / ratio_site[j] * used, min(needs, used))
+    return near[lo - begin : hi - begin], radius
 
 
 @njit(cache=True, error_model="numpy")
-def _relax_window(
-    lo, hi, j0, j1, cut, basis, c, H, linear, span, weights, target, direction, slide, used, axis_weights, gap_last, relative,
-    multiplier,
-):  # fmt: skip
-    """Relax the control points lo .. hi - 1, in place, while the others stay; j0 .. j1 - 1 are the sites they move."""
-    n, axes = c.shape
+def _relaxed_window(window, run, control, radius, goal, gap):
+    """The optimum of a window's control points while the others stay: control points (hi - lo, A), multipliers (site_end - site,)."""
+    (n, axes), (lo, hi, j0, j1), sites = control.shape, window, run.sites
     a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
-    origin = c[a].copy()
+    origin = control[a].copy()
     part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
-    near, aim = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
+    near, target = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
     for i in range(a, b):
         free[i - a] = lo <= i < hi
         for k in range(axes):
-            near[i - a, k] = c[i, k] - origin[k]
+            near[i - a, k] = control[i, k] - origin[k]
             for d in range(ORDER):
-                part[k, i - a, d] = H[k, i, d]
-    here = np.empty(j1 - j0, np.int64)
+                part[k, i - a, d] = run.H[k, i, d]
+    span = np.empty(j1 - j0, np.int64)
     for j in range(j0, j1):
-        here[j - j0] = span[j] - a
+        span[j - j0] = sites.span[j] - a
         for k in range(axes):
-            aim[j - j0, k] = target[j, k] - origin[k]
+            target[j - j0, k] = sites.target[j, k] - origin[k]
     energy = 0.0
-    if relative > 0.0:
-        energy = third_derivative_energy(cut, basis, axis_weights, c, a, min(hi, len(cut) - 1))
-    minimise(
-        part, linear[a:b], free, here, weights[j0:j1], aim, direction[j0:j1], slide[j0:j1], used[j0:j1], near, multiplier[j0:j1],
-        energy, energy + FIRST_GAP * gap_last, gap_last, relative, ITERATIONS,
+    if goal.relative > 0.0:
+        last = min(hi, len(run.knots.breaks) - 1)
+        energy = third_derivative_energy(run.knots, goal.axis_weights, control, a, last)
+    around = Sites(
+        span, sites.place[j0:j1], sites.weights[j0:j1], target, sites.along[j0:j1], sites.slide[j0:j1], radius[j0:j1]
     )  # fmt: skip
-    for i in range(lo, hi):
+    accuracy = Accuracy(energy, energy + FIRST_GAP * gap, gap, goal.relative)
+    found = minimise_in_corridor(Problem(part, run.linear[a:b], free, around), near, accuracy, ITERATIONS)
+    moved = found.control[lo - a : hi - a].copy()
+    for i in range(hi - lo):
         for k in range(axes):
-            c[i, k] = near[i - a, k] + origin[k]
+            moved[i, k] += origin[k]
+    return moved, found.multiplier
 
 
 @njit(cache=True, error_model="numpy")
-def relax_run(
-    place, point, along, tol, tol_chord, cut, basis, c, c0, H, linear, fixed_first, fixed_last, span, weights, site_place, target,
-    direction, slide, used, axis_weights, gap_last, relative, left, multiplier,
-):  # fmt: skip
-    """Relax one run, `c` (n, A) inside the tube of radii `used` (J,), window by window; returns whether the result has a certificate.
-    `c0` is a path well inside the tube."""
-    spans = len(cut) - 1
-    ratio_site, ratio_span = np.zeros(len(span)), np.empty(spans)
-    end = len(c) - fixed_last
+def _put(values, first, into):
+    """into[first : first + len(values)] = values"""
+    for i in range(len(values)):
+        into[first + i] = values[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _put_points(values, first, into):
+    """The same of points (n, A)."""
+    for i in range(len(values)):
+        for k in range(values.shape[1]):
+            into[first + i, k] = values[i, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _relax_run(run, start, goal, gap):
+    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites; returns whether the result
+    has a certificate, and the rest of `Relaxed`."""
+    control, radius = start.copy(), run.sites.radius.copy()
+    multiplier, ratio_site = np.zeros(len(radius)), np.zeros(len(radius))
+    left = np.empty(len(run.knots.breaks) - 1)
+    end = len(control) - run.fixed_last
     for attempt in range(ROUNDS):
-        done, site = fixed_first, 0
+        done, site = run.fixed_first, 0
         while True:
-            lo, hi, site = _next_window(attempt, done, site, fixed_first, end, span, ratio_site)
+            lo, hi, site = _next_window(attempt, done, site, run.fixed_first, end, run.sites.span, ratio_site)
             if lo == end:
                 break
-            j0, j1 = _first_site(span, max(lo - DEGREE, 0)), _first_site(span, min(hi, spans))
+            window = _window(run, lo, hi)
             if attempt > 0:
-                _tighten(lo, hi, j0, j1, c, c0, span, weights, target, direction, slide, used, ratio_site)
-            _relax_window(
-                lo, hi, j0, j1, cut, basis, c, H, linear, span, weights, target, direction, slide, used, axis_weights, gap_last,
-                relative, multiplier,
-            )  # fmt: skip
+                sites = with_radius(run.sites, radius)
+                closer, smaller = tighten_window(window, sites, control, run.middle, ratio_site)
+                _put_points(closer, lo, control)
+                _put(smaller, window.site, radius)
+            moved, prices = _relaxed_window(window, run, control, radius, goal, gap)
+            _put_points(moved, lo, control)
+            _put(prices, window.site, multiplier)
             done = hi
-        certify(
-            place, point, along, tol, tol_chord, cut, basis, c, span, site_place, ratio_site, ratio_span, left
-        )  # fmt: skip
-        if ratio_span.max() <= 1.0:
-            return True
-    return False
+        certificate = certify(run.corridor, run.knots, run.sites.place, control)
+        ratio_site, left = certificate.site, certificate.left
+        if certificate.span.max() <= 1.0:
+            return True, control, radius, left, multiplier
+    return False, control, radius, left, multiplier
 
 
 @njit(cache=True, error_model="numpy")
-def relax(
-    first, place, point, along, tol, tol_chord, span_first, breaks, control, site_first, span, weights, site_place, target, direction,
-    slide, used, fits, fixed_first, fixed_last, left, H_all, Q_all, force, axis_weights, gap, relative, good,
-    multiplier,
-):  # fmt: skip
-    """Move the `control` of all runs that fit to the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now) inside the tube; a run without
-    a certificate stays as it is, and is not `good` (Q,).
-
-    used         : (J,) radius that each site may use, smaller afterwards where the certificate asked for it
-    left         : (S,) what the certificate leaves of the tolerance; of a run that is not good, of its last try: negative where it
-                   fails
-    multiplier   : (J,) of the sites' constraints (interior_point.py)
-    H_all, Q_all : (A, n, 6) bands of all runs
-    force        : (Q,) of each run
-    gap, relative : where to end: gap (Q,) in the units of H, or that share of the integral of squared third derivatives with the
-                   weights axis_weights (A,), if H is its form
-    """
-    axes = point.shape[1]
-    for q in range(len(fits)):
-        if not fits[q]:
-            continue
-        s0, s1 = span_first[q], span_first[q + 1]
-        j0, j1 = site_first[q], site_first[q + 1]
-        b0, b1 = first[q], first[q + 1]
-        cut = breaks[s0 + q : s1 + q + 1]
-        basis = span_basis(clamped(cut))
-        old = control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
-        n = len(old)
-        H, linear = np.empty((axes, n, ORDER)), np.zeros((n, axes))
-        for k in range(axes):
-            for i in range(n):
-                for d in range(ORDER):
-                    at = s0 + DEGREE * q + i
-                    pull = force[q] * Q_all[k, at, DEGREE - d]
-                    H[k, i, DEGREE - d] = H_all[k, at, DEGREE - d] + pull
-                    if d <= i:
-                        linear[i, k] -= pull * (old[i - d, k] - old[0, k])
-                        if d > 0:
-                            linear[i - d, k] -= pull * (old[i, k] - old[0, k])
-        start, c = np.empty((n, axes)), np.empty((n, axes))
-        follow(place[b0:b1], point[b0:b1], cut, start)
+def _run(q, corridor, splines, runs, used, goal):
+    """Run q, its sites with the radii that they may use (J,), and what the goal is there."""
+    own, knots, old = run_corridor(corridor, q), run_knots(splines, q), run_control(splines, q)
+    (n, axes), begin = old.shape, control_first(splines, q)
+    H, linear = np.empty((axes, n, ORDER)), np.zeros((n, axes))
+    for k in range(axes):
         for i in range(n):
-            for k in range(axes):
-                c[i, k] = old[i, k] + (1.0 - AGAIN) * (start[i, k] - old[i, k])
-        tube, kept = used[j0:j1].copy(), left[s0:s1].copy()
-        good[q] = relax_run(
-            place[b0:b1], point[b0:b1], along[b0:b1], tol[b0:b1], tol_chord[b0:b1], cut, basis, c, start, H, linear, fixed_first[q],
-            fixed_last[q], span[j0:j1], weights[j0:j1], site_place[j0:j1], target[j0:j1], direction[j0:j1], slide[j0:j1], tube,
-            axis_weights, gap[q], relative, kept, multiplier[j0:j1],
-        )  # fmt: skip
-        if good[q]:
-            for i in range(n):
-                for k in range(axes):
-                    old[i, k] = c[i, k]
-            for j in range(j1 - j0):
-                used[j0 + j] = tube[j]
-        for i in range(s1 - s0):
-            left[s0 + i] = kept[i]
+            for d in range(ORDER):
+                pull = goal.force[q] * goal.Q[k, begin + i, DEGREE - d]
+                H[k, i, DEGREE - d] = goal.H[k, begin + i, DEGREE - d] + pull
+                if d <= i:
+                    linear[i, k] -= pull * (old[i - d, k] - old[0, k])
+                    if d > 0:
+                        linear[i - d, k] -= pull * (old[i, k] - old[0, k])
+    sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
+    middle = greville_control(own, knots.breaks)
+    return Run(own, knots, sites, H, linear, middle, runs.fixed_first[q], runs.fixed_last[q])
+
+
+@njit(cache=True, error_model="numpy")
+def _relax(corridor, splines, runs, used, left, goal):
+    """Columns of `Relaxed`."""
+    certified, multiplier = np.zeros(len(splines.fits), np.bool_), np.zeros(len(used))
+    control, radius, left = splines.control.copy(), used.copy(), left.copy()
+    for q in range(len(splines.fits)):
+        if not splines.fits[q]:
+            continue
+        run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
+        for i in range(len(start)):
+            for k in range(start.shape[1]):
+                start[i, k] += (1.0 - AGAIN) * (run.middle[i, k] - start[i, k])
+        certified[q], moved, smaller, kept, prices = _relax_run(run, start, goal, goal.gap[q])
+        if certified[q]:
+            _put_points(moved, control_first(splines, q), control)
+            _put(smaller, splines.site_first[q], radius)
+        _put(kept, splines.span_first[q], left)
+        _put(prices, splines.site_first[q], multiplier)
+    return certified, control, radius, left, multiplier
+
+
+def relax(
+    corridor: Corridor, splines: Splines, runs: SplineRuns, used: FloatArray, left: FloatArray, goal: Goal
+) -> Relaxed:
+    """Relax the splines that fit (`Relaxed`).
+
+    used : (J,) radius that each site may use [mm], the present splines strictly inside
+    left : (S,) what the certificate leaves of the tolerance, of runs that do not fit [mm]
+    """
+    return Relaxed(*_relax(corridor, splines, runs, used, left, goal))

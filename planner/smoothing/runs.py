@@ -17,13 +17,14 @@ from planner.machine import Machine
 from planner.smoothing.basis import DEGREE
 
 BRAKING_WAYS = 1.5  # of a straight leg that belong to the run beside it ...
-ROOM = 6.0  # ... and so many of the longest spans, five of which end on the straight line
+END_SPANS = 6.0  # ... and so many of the longest spans, five of which end on the straight line
+MIDDLE = 0.5  # of that at least is left of a leg in the middle, or the runs on both sides are one [-]
 LONGEST_DELAY = 1.0  # a span lasts at most so many times a/j ...
 LONGEST_WAY = 0.2  # ... or takes this share of feed^2/a, if that is more ...
 LONGEST_TOLERANCE = 4.0  # ... or so many tolerances [-]
 
 
-class Runs(NamedTuple):
+class SplineRuns(NamedTuple):
     """Q runs in the order of the path, as in geometry/spline.py; fixed_first, fixed_last: control points that stay at either
     end, 1 at a full stop, 5 on a straight leg."""
 
@@ -43,19 +44,19 @@ def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatAr
     )
 
 
-def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray) -> Runs:
+def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray) -> SplineRuns:
     """The runs of a path; `longest` (R,) span on each leg [mm]."""
     legs, cut = path.legs, path.joint == Joint.STOP
     feed, a, j = _motion(path, machine)
-    reach = BRAKING_WAYS * (feed**2 / (2.0 * a) + feed * a / (2.0 * j)) + ROOM * longest
+    reach = BRAKING_WAYS * (feed**2 / (2.0 * a) + feed * a / (2.0 * j)) + END_SPANS * longest
     inside = ~cut
     ends = cut[:-1].astype(int) + cut[1:]  # of each leg that are no joints of runs
-    split = ~legs.table["round"] & (legs.length > (2.5 - ends) * reach)
+    split = ~legs.table["round"] & (legs.length > (2.0 - ends + MIDDLE) * reach)
     before = np.concatenate([[True], split])  # the leg before each joint is split
     after = np.concatenate([split, [True]])
     first = np.flatnonzero(inside & (before | np.concatenate([[True], cut[:-1]])))
     last = np.flatnonzero(inside & (after | np.concatenate([cut[1:], [True]])))
-    return Runs(
+    return SplineRuns(
         joint_first=first,
         joint_last=last,
         x_first=np.where(split[first - 1], legs.length[first - 1] - reach[first - 1], 0.0),

@@ -13,15 +13,16 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
-from planner.smoothing.corridor import Guide, guide
-from planner.smoothing.forms import third_derivative_forms
-from planner.smoothing.initial import Laid, lay
-from planner.smoothing.relax import TUBE, relax
-from planner.smoothing.runs import Runs, find_runs, longest_span
+from planner.smoothing.basis import ORDER, derivatives
+from planner.smoothing.corridor import Corridor, find_corridor
+from planner.smoothing.forms import third_derivative_bands
+from planner.smoothing.initial import lay
+from planner.smoothing.relax import USED, Goal, relax
+from planner.smoothing.runs import SplineRuns, find_runs, longest_span
+from planner.smoothing.splines import Splines, run_control, run_knots
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
-CUSP_PLACES = 17  # ... looked for at so many places per span
+CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes
 # Gap of the first shape, share of its integral of squared third derivatives [-]: that is only a guess of what the motion wants.
 RELATIVE_GAP = 0.1
 
@@ -30,15 +31,15 @@ RELATIVE_GAP = 0.1
 class SplineShape:
     """The splines of a path with what is needed to change their shape within the tolerance.
 
-    runs, guide, laid : what the splines replace and how they are made up
+    runs, corridor, laid : what the splines replace, the corridor along which they are laid, and the splines
     left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]; negative where a run has none
     reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
     used       : (J,) radius that each site may use [mm]
     """
 
-    runs: Runs
-    guide: Guide
-    laid: Laid
+    runs: SplineRuns
+    corridor: Corridor
+    laid: Splines
     left: FloatArray
     reserve: float
     used: FloatArray
@@ -56,66 +57,60 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
     longest = longest_span(path, machine, of_leg)
     runs = find_runs(path, machine, longest)
-    chain = guide(path, runs, tol)
+    corridor = find_corridor(path, runs, tol)
     # the longest span of a run: of its slowest leg
     of_run = _smallest(longest, runs)
-    laid = lay(chain, runs, of_run)
-    left, used = np.full(laid.span_first[-1], np.inf), TUBE * laid.radius
-    good = np.zeros(len(of_run), np.bool_)
+    laid = lay(corridor, of_run)
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
-    H = np.zeros((len(axes), len(laid.control), ORDER))
-    third_derivative_forms(laid.span_first, laid.breaks, weights, H)
-    nothing = np.zeros(len(of_run))
-    relax(
-        chain.first, chain.place, chain.point, chain.along, chain.tol, chain.tol_chord, laid.span_first, laid.breaks, laid.control,
-        laid.site_first, laid.span, laid.weights, laid.place, laid.target, laid.along, laid.slide, used, laid.fits,
-        runs.fixed_first, runs.fixed_last, left, H, np.zeros_like(H), nothing, weights, nothing, RELATIVE_GAP, good,
-        np.empty(len(used)),
-    )  # fmt: skip
-    laid = laid._replace(fits=good & ~cusps(laid))
+    H, nothing = third_derivative_bands(laid, weights), np.zeros(len(of_run))
+    goal = Goal(H, np.zeros_like(H), nothing, nothing, RELATIVE_GAP, weights)
+    untouched = np.full(laid.span_first[-1], np.inf)
+    relaxed = relax(corridor, laid, runs, USED * laid.sites.radius, untouched, goal)
+    laid = laid._replace(control=relaxed.control)
+    laid = laid._replace(fits=relaxed.certified & ~cusps(laid))
     reserve = float((tolerance - tol).min())
-    return SplineShape(runs=runs, guide=chain, laid=laid, left=left, reserve=reserve, used=used)
+    return SplineShape(
+        runs=runs, corridor=corridor, laid=laid, left=relaxed.left, reserve=reserve, used=relaxed.used
+    )
 
 
-def cusps(laid: Laid) -> Array:
+def cusps(laid: Splines) -> Array:
     """(Q,) True for runs with a cusp."""
     return np.logical_or.reduceat(cusp_spans(laid), laid.span_first[:-1]) if len(laid.fits) else laid.fits
 
 
-def cusp_spans(laid: Laid) -> Array:
+def cusp_spans(laid: Splines) -> Array:
     """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are
     looked at: no motion along it has a direction there."""
-    found = np.zeros(laid.span_first[-1], dtype=np.bool_)
-    _find_cusps(laid.span_first, laid.breaks, laid.control, found)
-    return found
+    return np.asarray(_cusp_spans(laid))
 
 
 @njit(cache=True, error_model="numpy")
-def _find_cusps(span_first, breaks, control, found):
-    """What `cusp_spans` says into found (S,)."""
-    axes = control.shape[1]
+def _cusp_spans(splines):
+    span_first, axes = splines.span_first, splines.control.shape[1]
+    found = np.zeros(span_first[-1], np.bool_)
     rows, tangent, before = np.empty((4, ORDER)), np.empty(axes), np.empty(axes)
     for q in range(len(span_first) - 1):
-        cut = breaks[span_first[q] + q : span_first[q + 1] + q + 1]
-        basis = span_basis(clamped(cut))
+        cut, basis = run_knots(splines, q)
+        control = run_control(splines, q)
         for i in range(len(cut) - 1):
-            at = span_first[q] + DEGREE * q + i
             for place in range(CUSP_PLACES):
                 derivatives(basis[i], place / (CUSP_PLACES - 1.0), cut[i + 1] - cut[i], rows)
                 square, forward = 0.0, 0.0
                 for k in range(axes):
                     before[k], tangent[k] = tangent[k], 0.0
                     for d in range(ORDER):
-                        tangent[k] += rows[1, d] * control[at + d, k]
+                        tangent[k] += rows[1, d] * control[i + d, k]
                     square += tangent[k] * tangent[k]
                     forward += tangent[k] * before[k]
                 if square < CUSP * CUSP or (place > 0 and forward <= 0.0):
                     found[span_first[q] + i] = True
+    return found
 
 
 def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Array:
-    """Joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the tube, without a
+    """Joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the corridor, without a
     certificate or with a cusp, of the joints around it the one that turns most, or those on both sides of it (`fence`), which leave
     a run of a few joints there."""
     laid, runs = shape.laid, shape.runs
@@ -140,13 +135,11 @@ def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Ar
     return path.legs.first[np.unique(np.array(most, dtype=np.int64))]
 
 
-def _polynomials(laid: Laid, q: int) -> tuple[FloatArray, FloatArray]:
+def _polynomials(laid: Splines, q: int) -> tuple[FloatArray, FloatArray]:
     """Breaks (S+1,) of run q, and its spans as polynomials (S, 6, A) (geometry/spline.py)."""
-    s0, s1 = laid.span_first[q], laid.span_first[q + 1]
-    cut = laid.breaks[s0 + q : s1 + q + 1]
-    control = laid.control[s0 + DEGREE * q : s1 + DEGREE * (q + 1)]
-    of_span = control[np.arange(s1 - s0)[:, None] + np.arange(ORDER)]
-    return cut, np.einsum("sbm,sbk->smk", span_basis(clamped(cut)), of_span)
+    breaks, basis = run_knots(laid, q)
+    of_span = run_control(laid, q)[np.arange(len(basis))[:, None] + np.arange(ORDER)]
+    return breaks, np.einsum("sbm,sbk->smk", basis, of_span)
 
 
 def _moving(toolpath: Toolpath) -> Array:
@@ -156,7 +149,7 @@ def _moving(toolpath: Toolpath) -> Array:
     return np.asarray((np.ptp(points, axis=0) > 0.0) | (arcs != 0.0).any(axis=0))
 
 
-def _smallest(longest: FloatArray, runs: Runs) -> FloatArray:
+def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:
     """(Q,) smallest of `longest` over the legs of each run."""
     if not len(runs.joint_first):
         return np.zeros(0)

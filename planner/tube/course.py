@@ -18,7 +18,8 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.allocation import allocate, error_rate, normal_acceleration_max
+from planner.constraints import normal_limit
+from planner.corners.allocation import allocate, error_rate
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
@@ -38,7 +39,7 @@ class Course:
     radius, rate                 : (R,) [mm], [rad/mm]
     curvature                    : (R,) bound of it on the leg [1/mm]
     budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
-    normal_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
+    across_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
                                    where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes
@@ -56,7 +57,7 @@ class Course:
     curvature: FloatArray
     budget: FloatArray
     feed: FloatArray
-    normal_max: FloatArray
+    across_max: FloatArray
     vertex: FloatArray
     vertex_budget: FloatArray
     velocity: FloatArray
@@ -69,7 +70,7 @@ class Course:
         freeze(self, "first", np.int64, (legs + 1,))
         for name in ("length", "radius", "rate", "curvature", "budget"):
             freeze(self, name, np.float64, (legs,))
-        for name in ("feed", "normal_max"):
+        for name in ("feed", "across_max"):
             freeze(self, name, np.float64, (legs,), finite=False)
         for name in ("base", "drift", "e1", "e2"):
             freeze(self, name, np.float64, (legs, axes))
@@ -113,7 +114,7 @@ class Course:
 def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
     """The courses between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
     limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
-    reachable = min(float(np.linalg.norm(limits["acceleration"])), machine.normal_acceleration or np.inf)
+    reachable = normal_limit.anywhere(machine, toolpath.axes)
     rate = error_rate(machine)
     budget = np.maximum(
         toolpath.tolerance[:-1], toolpath.tolerance[1:]
@@ -125,7 +126,7 @@ def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
         row = first[:-1]  # the segment that stands for its leg
         tol_leg = budget[row]
         tol_ap = allocate(tol_leg, np.full(len(row), reachable), rate)
-        left = normal_acceleration_max(tol_leg, tol_ap, np.full(len(row), reachable), rate)
+        left = normal_limit.within_budget(tol_leg, tol_ap, np.full(len(row), reachable), rate)
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
         at_vertex = np.minimum(
             toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
@@ -143,7 +144,7 @@ def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
             curvature=toolpath.curvature[row],
             budget=tol_ap,
             feed=toolpath.feed[row],
-            normal_max=np.where(held, left, np.inf),
+            across_max=np.where(held, left, np.inf),
             vertex=vertex[:, moves],
             vertex_budget=vertex_ap,
             **{name: limit[moves] for name, limit in limits.items()},

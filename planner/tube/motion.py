@@ -92,11 +92,11 @@ def _excess(course: Course, guess: Guess, steps: Steps) -> float:
         np.sqrt((np.abs(a) / course.acceleration).max()),
         np.cbrt((np.abs(j) / course.jerk).max()),
     ]
-    for share in MEASURED_AT if np.isfinite(course.normal_max).any() else ():
+    for share in MEASURED_AT if np.isfinite(course.across_max).any() else ():
         tau = share * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
         speed_sq = (along**2).sum(axis=1)
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2
         normal_sq = np.divide(across_sq, speed_sq, out=np.zeros(len(h)), where=speed_sq > 0)
-        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / course.normal_max[leg]).max())
+        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / course.across_max[leg]).max())
     return float(max(ratios))

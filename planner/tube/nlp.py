@@ -147,7 +147,7 @@ class TubeNLP:
         speed, acc, jerk = length / second, length / second**2, length / second**3
         v_max, a_max, j_max = course.velocity / speed, course.acceleration / acc, course.jerk / jerk
 
-        watched = len(WATCHED) if np.isfinite(course.normal_max).any() else 0
+        watched = len(WATCHED) if np.isfinite(course.across_max).any() else 0
 
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.

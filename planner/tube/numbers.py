@@ -38,7 +38,7 @@ def step_numbers(
             np.minimum(course.step_max[leg], course.offset[-1]) / length,
             np.minimum(feed, fastest) / speed,
             np.minimum(feed_end, fastest) / speed,
-            np.minimum(course.normal_max[leg], strongest) / acc,
+            np.minimum(course.across_max[leg], strongest) / acc,
             part / length,
             _pace(guess) / speed,
         ]

@@ -47,7 +47,7 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
-from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS
+from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS, normal_limit
 from planner.verify.matching import NEAR_MISS
 from planner.verify.pieces import ProgramPieces
 from planner.verify.stream import Limits
@@ -234,7 +234,7 @@ def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machin
     size = np.linalg.norm(direction, axis=1)
     given = np.abs(direction) @ limits
     support = np.divide(given, size, out=np.full(len(size), limits.min()), where=size > 0)
-    return np.minimum(support, machine.normal_acceleration or np.inf)
+    return np.minimum(support, normal_limit(machine))
 
 
 def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatArray:

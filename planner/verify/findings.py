@@ -62,9 +62,9 @@ def limit_checks(
         )
     ]
     table.append(("feed", "mm/s", rows.GROUPS * len(axes) + rows.FEED, np.inf))
-    if machine.normal_acceleration is not None:
-        row = rows.GROUPS * len(axes) + rows.NORMAL
-        table.append(("normal_acceleration", "mm/s2", row, machine.normal_acceleration))
+    across = rows.normal_limit(machine)
+    if np.isfinite(across):
+        table.append((rows.NORMAL_NAME, "mm/s2", rows.GROUPS * len(axes) + rows.NORMAL, across))
     checks = {
         name: _limit_check(name, unit, row, limit, looks, toolpath, pieces, not_limited)
         for name, unit, row, limit in table

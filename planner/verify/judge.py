@@ -16,13 +16,14 @@ from planner.verify.dense import Comparison
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.given import DERIVATIVES, Given
+from planner.verify.limits import NORMAL_NAME, normal_limit
 from planner.verify.pieces import ProgramPieces, program_pieces, widened
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
 from planner.verify.times import AnyMotion, cells_per_period, look
 from planner.verify.verdict import Verdict
 
-NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
+NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
 WHOLE = Given()
 
 
@@ -160,7 +161,7 @@ def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited:
         judged=np.array([name in given.columns for name in DERIVATIVES]),
         rounding=_rounding(trajectory, given, per_axis[1]),
         time_rounding=given.time_rounding,
-        normal_acceleration=machine.normal_acceleration or np.inf,
+        normal=normal_limit(machine),
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         axes=trajectory.axes,

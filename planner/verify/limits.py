@@ -38,11 +38,13 @@ import math
 from typing import NamedTuple
 
 from planner.base.arrays import Array, FloatArray
+from planner.machine import Machine
 from planner.verify.pieces import RATIO_ROUNDING, kernel
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
 FEED_AT_REST = 1e-6  # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
 COLUMN, DIFFERENCE = 0, 1  # how a value was seen
+NORMAL_NAME = "normal_acceleration"
 
 # Rows of the tables: six groups of one row per axis, then three rows of their own.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
@@ -66,14 +68,14 @@ class Allowed(NamedTuple):
 
     limits     : (3, A) velocity, acceleration, jerk
     linear     : (A,) True on linear axes, which make up the feed
-    normal_max : [mm/s2], or inf
+    normal     : limit of the normal acceleration [mm/s2], or inf
     judged     : (3,) True if velocity, acceleration, jerk were delivered
     digits     : (A+1,) largest error of a position [mm], last of a time [s], by the digits they were written with
     """
 
     limits: FloatArray
     linear: Array
-    normal_max: float
+    normal: float
     judged: Array
     digits: FloatArray
 
@@ -88,6 +90,11 @@ class Worst(NamedTuple):
 
     row: FloatArray
     sample: Array
+
+
+def normal_limit(machine: Machine) -> float:
+    """The machine's limit of the normal acceleration [mm/s2]; inf if it names none."""
+    return machine.normal_acceleration or math.inf
 
 
 @kernel()

@@ -38,7 +38,7 @@ class Limits:
     judged: Array
     rounding: FloatArray
     time_rounding: float
-    normal_acceleration: float
+    normal: float  # normal acceleration [mm/s2]
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
     jerk_limited: bool
     axes: tuple[str, ...] = ()
@@ -142,7 +142,7 @@ def _block(
     allowed = Allowed(
         limits=limits.per_axis,
         linear=limits.linear,
-        normal_max=limits.normal_acceleration,
+        normal=limits.normal,
         judged=limits.judged,
         digits=np.append(limits.rounding, limits.time_rounding),
     )

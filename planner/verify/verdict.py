@@ -69,7 +69,7 @@ class Verdict:
     """What `verify` found.
 
     passed           : every check holds (those "not limited" aside)
-    limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
+    limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration if the machine limits it
     contour          : the motion's worst distance from the path as far as it could be followed, against the budget there
     vertex           : the worst distance of a programmed vertex from the motion, of those that are known, against the budget there
     corners          : eq. 18-20 at the programmed corners

@@ -80,7 +80,7 @@ def _ratios(plan, name):
     return {key.partition(".")[0]: c.ratio for key, c in plan.verdict.limits.items() if key.endswith(name)}
 
 
-@pytest.mark.parametrize("method", ["toppra", "optimal"])
+@pytest.mark.parametrize("method", ["second-order", "optimal"])
 @pytest.mark.parametrize("limit", [Soft(), Turntable(), Behind(), Downhill()], ids=lambda limit: limit.name)
 def test_a_limit_is_reached_and_not_exceeded(job, method, limit):
     """It holds the motion somewhere, and nowhere is more of it: the verdict says so from the positions."""
@@ -94,7 +94,7 @@ def test_a_limit_is_reached_and_not_exceeded(job, method, limit):
 
 @pytest.mark.parametrize("limit", [Soft(), Turntable()], ids=lambda limit: limit.name)
 def test_splines_keep_it_too(job, limit):
-    made = planner.plan(job, method="toppra", corner="spline", rounds=1, limits=[limit])
+    made = planner.plan(job, method="second-order", corner="spline", rounds=1, limits=[limit])
     assert made.verdict.passed, made.verdict.faults
     assert max(_ratios(made, limit.name)[q] for q in ("velocity", "acceleration")) > 0.999
 
@@ -159,7 +159,7 @@ def test_the_path_limit_on_a_line_is_the_ramp(tmp_path):
         def acceleration(self, at):
             return 250.0
 
-    made = planner.plan(file, method="toppra", limits=[Gentle()])
+    made = planner.plan(file, method="second-order", limits=[Gentle()])
     assert made.trajectory.cycle_time == pytest.approx(100.0 / 50.0 + 50.0 / 250.0, rel=1e-6)
 
 

@@ -22,9 +22,9 @@ from planner.nc.reader import parse_program, read_program
 from planner.optimal.geometry import splined_with_stops
 from planner.smoothing import initial as lay
 from planner.smoothing import spline_path
-from planner.smoothing.initial import follow
-from planner.smoothing.interior_point import site_distance
-from planner.smoothing.relax import OVERLAP, _tighten, relax
+from planner.smoothing.initial import greville_control
+from planner.smoothing.relax import OVERLAP, ControlWindow, Relaxed, relax, tighten_window
+from planner.smoothing.sites import site_distance, used_share, with_radius
 from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
 
 MACHINE = problems.machine()
@@ -69,8 +69,8 @@ def test_certificate_holds_against_brute_force(seed):
             for tau in np.linspace(0.0, 1.0, 12, endpoint=False):
                 span_point(path.spline.spans, i, tau, out)
                 curve.append(out[0].copy())
-        a, b = shape.guide.first[q], shape.guide.first[q + 1]
-        chain = shape.guide.point[a:b]
+        a, b = shape.corridor.first[q], shape.corridor.first[q + 1]
+        chain = shape.corridor.point[a:b]
         fine = np.vstack([np.linspace(p, r, 60, endpoint=False) for p, r in itertools.pairwise(chain)])
         fine = np.vstack([fine, chain[-1:]])
         step = max(np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in (np.array(curve), fine))
@@ -178,12 +178,10 @@ def test_stops_at_cusps_keep_the_splines_around_them(shared_dir):
     assert (after.joint == Joint.STOP).sum() > (path.joint == Joint.STOP).sum()
 
 
-def used_of_tubes(shape):
-    """(J,) share of its tube that each site of the first spline uses."""
-    laid, e = shape.laid, np.empty(shape.laid.control.shape[1])
-    sites = laid.span, laid.weights, laid.target, laid.along, laid.slide
-    assert len(laid.fits) == 1
-    return np.array([site_distance(j, laid.control, *sites, e) for j in range(len(laid.span))]) / laid.radius
+def used_of_corridor(shape):
+    """(J,) share of its radius that each site of the first spline uses."""
+    assert len(shape.laid.fits) == 1
+    return used_share(shape.laid.sites, shape.laid.control)
 
 
 def one_run():
@@ -196,19 +194,22 @@ def one_run():
 
 @pytest.fixture
 def loose_knots(monkeypatch):
-    """No knots are added, so that first splines use more of the tube than `ROOM`."""
-    monkeypatch.setattr(lay, "_lay", lay._lay.py_func)
+    """No knots are added, so that first splines use more of the tolerance than `ROOM`."""
+    for kernel in ("_lay", "_lay_run"):
+        monkeypatch.setattr(lay, kernel, getattr(lay, kernel).py_func)
     monkeypatch.setattr(lay, "DENSER_MAX", 0)
     monkeypatch.setattr(lay, "ROOM", 0.3)
-    monkeypatch.setattr(
-        spline_path, "relax", lambda *given: np.copyto(given[-2], given[17])
-    )  # as if all had certificates
+
+    def certain(corridor, splines, runs, used, left, goal):  # as if all had certificates
+        return Relaxed(splines.fits, splines.control, used, left, np.zeros(len(used)))
+
+    monkeypatch.setattr(spline_path, "relax", certain)
     return monkeypatch
 
 
 def test_a_first_spline_inside_the_tube_is_one_however_much_room_it_should_have_left(loose_knots):
     path = one_run()
-    first = used_of_tubes(spline_shape(path, MACHINE))
+    first = used_of_corridor(spline_shape(path, MACHINE))
     assert lay.ROOM < first.max() < lay.INSIDE
     loose_knots.setattr(spline_path, "relax", relax)
     shape = spline_shape(path, MACHINE)
@@ -219,11 +220,11 @@ def test_a_first_spline_inside_the_tube_is_one_however_much_room_it_should_have_
 def test_a_place_outside_of_the_tube_costs_a_full_stop_there_and_nothing_else(loose_knots):
     path = one_run()
     first = spline_shape(path, MACHINE)
-    used = used_of_tubes(first)
+    used = used_of_corridor(first)
     loose_knots.setattr(lay, "INSIDE", np.sort(used)[-2])  # all but the worst site are inside
     whole = spline_shape(path, MACHINE)
     assert not whole.laid.fits.any()
-    place = first.laid.place[np.argmax(used)]
+    place = first.laid.sites.place[np.argmax(used)]
     joints = lost_joints(path, whole)
     assert len(joints) == 1
     assert np.abs(path.legs.place[joints] - place).max() < 1.0
@@ -238,14 +239,15 @@ def test_a_place_that_never_gets_a_certificate_loses_its_own_corners_only(monkey
     path = one_run()
     place = 0.5 * path.legs.place[-1]
 
-    def no_certificate(*given):
-        relax(*given)
-        span_first, breaks, left, good = given[6], given[7], given[20], given[-2]
-        for q in range(len(good)):
-            own = breaks[span_first[q] + q : span_first[q + 1] + q + 1]
+    def no_certificate(corridor, splines, *given):
+        relaxed = relax(corridor, splines, *given)
+        certified, left, first = relaxed.certified.copy(), relaxed.left.copy(), splines.span_first
+        for q in range(len(certified)):
+            own = splines.breaks[first[q] + q : first[q + 1] + q + 1]
             if own[0] + 0.1 < place < own[-1] - 0.1:
-                good[q] = False
-                left[span_first[q] + np.searchsorted(own, place) - 1] = -1.0
+                certified[q] = False
+                left[first[q] + np.searchsorted(own, place) - 1] = -1.0
+        return relaxed._replace(certified=certified, left=left)
 
     monkeypatch.setattr(spline_path, "relax", no_certificate)
     after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
@@ -261,29 +263,31 @@ def test_feed_changes_on_a_straight_leg_keep_their_place():
     path, shape = splined(program)
     change = np.flatnonzero(path.legs.offset > 0.0)
     assert len(change) == 1
-    assert np.isclose(shape.guide.place, path.legs.place[change[0]]).any()
+    assert np.isclose(shape.corridor.place, path.legs.place[change[0]]).any()
     plan = AS_IT_IS.plan(program, MACHINE)
     assert plan.verdict.passed, plan.verdict.faults
 
 
-def test_tightening_leaves_every_site_inside_and_widens_no_tube():
+def test_tightening_leaves_every_site_inside_and_widens_none():
     _, shape = splined(problems.zigzag())
-    laid, chain = shape.laid, shape.guide
-    control, middle = laid.control.copy(), np.empty_like(laid.control)
-    follow(chain.place, chain.point, laid.breaks, middle)
-    sites = laid.span, laid.weights, laid.target, laid.along, laid.slide
+    sites, control = shape.laid.sites, shape.laid.control.copy()
+    middle = greville_control(shape.corridor, shape.laid.breaks)
     e = np.empty(control.shape[1])
 
     def distances():
-        return np.array([site_distance(j, control, *sites, e) for j in range(len(laid.span))])
+        return np.array([site_distance(sites, j, control, 0, e) for j in range(len(sites.span))])
 
-    given = np.maximum(1.0005 * distances(), 0.5 * shape.used)  # sites at their tubes, as after an optimum
+    given = np.maximum(1.0005 * distances(), 0.5 * shape.used)  # sites at their radii, as after an optimum
     used, ratio = given.copy(), np.ones(len(given))
     worst = int(np.argmax(distances() / given))
     ratio[worst] = 1.01
-    lo, hi = laid.span[worst] - OVERLAP, laid.span[worst] + OVERLAP + DEGREE + 1
-    first, last = np.searchsorted(laid.span, [lo - DEGREE, hi])
-    _tighten(lo, hi, first, last, control, middle, *sites, used, ratio)
+    lo = max(sites.span[worst] - OVERLAP, 0)
+    hi = min(sites.span[worst] + OVERLAP + DEGREE + 1, len(control))
+    first, last = np.searchsorted(sites.span, [lo - DEGREE, hi])
+    window = ControlWindow(lo, hi, first, last)
+    control[lo:hi], used[first:last] = tighten_window(
+        window, with_radius(sites, given), control, middle, ratio
+    )
     assert (distances() < used).all()
     assert (used <= given).all()
     assert used[worst] < 0.995 * given[worst]

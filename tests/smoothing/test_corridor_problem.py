@@ -1,4 +1,4 @@
-"""The interior-point method for splines in a tube against ipopt on the same problem."""
+"""The interior-point method for splines in a corridor against ipopt on the same problem."""
 
 from __future__ import annotations
 
@@ -6,33 +6,35 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from planner.smoothing.basis import DEGREE, ORDER, clamped, span_basis
-from planner.smoothing.forms import third_derivative_forms
-from planner.smoothing.interior_point import minimise
+from planner.smoothing.basis import DEGREE, ORDER, knots_at
+from planner.smoothing.forms import add_third_derivatives
+from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor
+from planner.smoothing.sites import Sites
 
 
-def random_tube(seed, spans, axes, sites):
-    """A zigzag with a tube around it: bands, sites and the first control points, which are inside."""
+def random_corridor(seed, spans, axes, sites):
+    """A zigzag with a corridor around it: a problem without a linear part, and the first control points, which are inside."""
     rng = np.random.default_rng(seed)
-    breaks = np.arange(spans + 1.0)
-    basis = span_basis(clamped(breaks))
+    knots = knots_at(np.arange(spans + 1.0))
     H = np.zeros((axes, spans + DEGREE, ORDER))
-    third_derivative_forms(np.array([0, spans]), breaks, np.ones(axes), H)
+    add_third_derivatives(knots, np.ones(axes), H)
     control = np.cumsum(rng.normal(size=(spans + DEGREE, axes)), axis=0)
     u = np.sort(rng.uniform(0.0, spans, sites))
     first = np.minimum(u.astype(int), spans - 1)
-    weights = np.einsum("jbm,jm->jb", basis[first], (u - first)[:, None] ** np.arange(ORDER))
-    place = np.einsum("jb,jbk->jk", weights, control[first[:, None] + np.arange(ORDER)])
+    weights = np.einsum("jbm,jm->jb", knots.basis[first], (u - first)[:, None] ** np.arange(ORDER))
+    target = np.einsum("jb,jbk->jk", weights, control[first[:, None] + np.arange(ORDER)])
     along = rng.normal(size=(sites, axes))
     along /= np.linalg.norm(along, axis=1)[:, None]
     slide = rng.choice([0.1, 1.0], sites)
     radius = rng.uniform(0.1, 1.0, sites)
-    place += 0.3 * radius[:, None] * rng.uniform(-1.0, 1.0, (sites, axes)) / np.sqrt(axes)
-    return H, first, weights, place, along, slide, radius, control
+    target += 0.3 * radius[:, None] * rng.uniform(-1.0, 1.0, (sites, axes)) / np.sqrt(axes)
+    where = Sites(first, u, weights, target, along, slide, radius)
+    return Problem(H, np.zeros_like(control), np.ones(len(control), bool), where), control
 
 
-def by_ipopt(H, first, weights, place, along, slide, radius, control, linear):
-    n, axes = control.shape
+def by_ipopt(problem, control):
+    (n, axes), H, linear = control.shape, problem.H, problem.linear
+    first, _, weights, place, along, slide, radius = problem.sites
     c = ca.MX.sym("c", n, axes)
     value = 0
     for k in range(axes):
@@ -60,7 +62,8 @@ def by_ipopt(H, first, weights, place, along, slide, radius, control, linear):
     return float(found["f"])
 
 
-def objective(H, linear, c):
+def objective(problem, c):
+    H, linear = problem.H, problem.linear
     total = float((linear * c).sum())
     for k in range(c.shape[1]):
         for d in range(ORDER):
@@ -73,36 +76,28 @@ def objective(H, linear, c):
 @pytest.mark.parametrize("seed", range(4))
 def test_same_optimum_as_ipopt(seed, linear_part):
     axes = 2 + seed % 2
-    H, first, weights, place, along, slide, radius, control = random_tube(
-        seed, 10 + 5 * seed, axes, 20 + 5 * seed
-    )
-    linear = np.random.default_rng(seed).normal(size=control.shape) if linear_part else np.zeros_like(control)
-    free = np.ones(len(control), bool)
-    free[[0, -1]] = False
-    expected = by_ipopt(H, first, weights, place, along, slide, radius, control, linear)
-    start = objective(H, linear, control)
-    c = control.copy()
-    z = np.empty(len(first))
-    gap, iterations = minimise(
-        H, linear, free, first, weights, place, along, slide, radius, c, z, 0.0, abs(start), 1e-7 * abs(start), 0.0, 100
-    )  # fmt: skip
-    assert iterations < 40
-    assert gap <= 1e-7 * abs(start)
-    assert objective(H, linear, c) == pytest.approx(expected, abs=1e-6 * abs(start))
-    np.testing.assert_array_equal(c[[0, -1]], control[[0, -1]])
+    problem, control = random_corridor(seed, 10 + 5 * seed, axes, 20 + 5 * seed)
+    if linear_part:
+        problem = problem._replace(linear=np.random.default_rng(seed).normal(size=control.shape))
+    problem.free[[0, -1]] = False
+    expected = by_ipopt(problem, control)
+    start = objective(problem, control)
+    accuracy = Accuracy(value=0.0, first=abs(start), last=1e-7 * abs(start), relative=0.0)
+    found = minimise_in_corridor(problem, control, accuracy, 100)
+    assert found.iterations < 40
+    assert found.gap <= 1e-7 * abs(start)
+    assert objective(problem, found.control) == pytest.approx(expected, abs=1e-6 * abs(start))
+    np.testing.assert_array_equal(found.control[[0, -1]], control[[0, -1]])
 
 
 @pytest.mark.parametrize("iterations", [1, 2, 3, 5])
-def test_every_iterate_is_inside_the_tube(iterations):
-    H, first, weights, place, along, slide, radius, control = random_tube(7, 20, 3, 40)
-    c = control.copy()
-    start = objective(H, np.zeros_like(c), c)
-    z = np.empty(len(first))
-    minimise(
-        H, np.zeros_like(c), np.ones(len(c), bool), first, weights, place, along, slide, radius, c, z, start, start, 0.0, 1e-6,
-        iterations,
-    )  # fmt: skip
+def test_every_iterate_is_inside_the_corridor(iterations):
+    problem, control = random_corridor(7, 20, 3, 40)
+    start = objective(problem, control)
+    accuracy = Accuracy(value=start, first=start, last=0.0, relative=1e-6)
+    c = minimise_in_corridor(problem, control, accuracy, iterations).control
+    first, _, weights, place, along, slide, radius = problem.sites
     d = np.einsum("jb,jbk->jk", weights, c[first[:, None] + np.arange(ORDER)]) - place
     e = d - (1.0 - slide)[:, None] * (d * along).sum(axis=1)[:, None] * along
     assert (np.linalg.norm(e, axis=1) < radius).all()
-    assert objective(H, np.zeros_like(c), c) < start
+    assert objective(problem, c) < start

@@ -62,17 +62,21 @@ from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# Budget of reshaping: rounds x grid points <= WORK, ...
+# Budget of reshaping: rounds x grid points <= WORK; that is 8 rounds and 8 s of the 14 s of examples/bracket.ngc.
 WORK = 150_000
-# ... at most ROUNDS_MAX rounds, and none after ROUNDS_SEEN rounds that together gained less than GAIN_MIN of the time [-].
+# At most so many rounds: the first five gain 2e-2 of the time, the next five 2e-3, then ten 1e-3, and the last twenty 4e-4, in an
+# eighth of the computing time (means over random jobs, benchmarks/ablation.py).
 ROUNDS_MAX = 40
+# None after so many that together gained less than this [-]: half of the gap that the solver leaves.
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
-LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
+# Factors on a run's force after a gain and after a loss. With 0.5 and 0.85 for the first 11 jobs end 3e-4 and 4e-4 slower on the mean,
+# 2e-3 and 4e-3 at worst; with 5 for the second 4e-4, with 2 the same.
+LESS, MORE = 0.7, 3.0
 SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 1e-4 to 1e-3 slower (pentagon, zig-zag, spiral)
 # Without jerk limits a failed round teaches what holds its shape; so more of them may fail, with less pull each. With the numbers
 # above, 4 of 40 random polylines stayed where they began, up to 4.5 % behind the motion with jerk limits.
 PATIENCE, MORE_PATIENT = 10, 1.5
-# A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains about 1e-3 of the time.
+# A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains 4e-4 of the time.
 FINE_POINTS, FINER = 20_000, 0.1
 # Of 40 random polylines one exceeded an acceleration by 4e-4 between the places looked at; each time with ten times the margin.
 SEEN_ROUNDS = 3

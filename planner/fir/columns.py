@@ -41,7 +41,7 @@ def freeze_columns(record: Any, sizes: dict[str, int], axes: int) -> None:
             freeze(record, one.name, one.metadata["dtype"], shape, finite=one.metadata["finite"])
 
 
-def rows_of(first: Array, chosen: Array) -> dict[str, Array]:
+def chosen_rows(first: Array, chosen: Array) -> dict[str, Array]:
     """Which rows per stretch, leg and joint the stretches `chosen` (S,) have; first (S+1,) as of `Polyline`."""
     stretch = np.flatnonzero(chosen)
     legs = np.flatnonzero(np.repeat(chosen, np.diff(first)))

@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.fir.columns import freeze_columns, per_joint, per_leg, picked, rows_of
+from planner.fir.columns import chosen_rows, freeze_columns, per_joint, per_leg, picked
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,7 +89,7 @@ class Polyline(ABC):
 
     def pick(self, chosen: Array) -> Self:
         """The stretches `chosen` (S,), each shifted to where the one before ends, without the dwells: good for planning only."""
-        columns = picked(self, rows_of(self.first, chosen))
+        columns = picked(self, chosen_rows(self.first, chosen))
         way = np.cumsum(columns["length"][:, None] * columns["direction"], axis=0)
         columns["point"] = np.vstack([np.zeros((1, len(self.axes))), way])
         columns["s"] = np.concatenate([[0.0], np.cumsum(columns["length"])])

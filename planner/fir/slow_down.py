@@ -17,7 +17,7 @@ from typing import Self, TypeVar
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.fir.columns import freeze_columns, per_stretch, picked, put, rows_of
+from planner.fir.columns import chosen_rows, freeze_columns, per_stretch, picked, put
 from planner.fir.command import Command
 from planner.fir.measure import Measured, measure
 from planner.fir.polyline import Polyline
@@ -62,12 +62,12 @@ class SpeedPlan(ABC):
 
     def pick(self, chosen: Array) -> Self:
         """The plan of the stretches `chosen` (S,) of its course."""
-        columns = picked(self, rows_of(self.course.first, chosen))
+        columns = picked(self, chosen_rows(self.course.first, chosen))
         return dataclasses.replace(self, course=self.course.pick(chosen), **columns)
 
     def put(self, chosen: Array, part: Self) -> Self:
         """This plan with `part` for the stretches `chosen` (S,)."""
-        return dataclasses.replace(self, **put(self, rows_of(self.course.first, chosen), part))
+        return dataclasses.replace(self, **put(self, chosen_rows(self.course.first, chosen), part))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

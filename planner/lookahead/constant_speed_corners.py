@@ -54,7 +54,7 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     joint = ~samples.element[at]
     bends = np.zeros((len(at), 2))
     which = np.zeros((len(at), 2), np.int64)
-    on = Intervals(*samples.table, samples.element[at], samples.w0[at], samples.w1[at])
+    on = CornerIntervals(*samples.table, samples.element[at], samples.w0[at], samples.w1[at])
     _bends(on, limits, bends, which)
     ends = np.where(problem.feed_sq_max[at] <= problem.feed_sq_max[at + 1], at, at + 1)
     with np.errstate(divide="ignore"):
@@ -148,7 +148,7 @@ def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
     return np.stack([v, a, j])
 
 
-class Intervals(NamedTuple):
+class CornerIntervals(NamedTuple):
     """Grid intervals on corners: where the kernels evaluate the path (corners/elements.py)."""
 
     legs: Array

@@ -41,7 +41,7 @@ ARC_SHORTEST = 2e-5
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
 
-class Rows(NamedTuple):
+class PieceRows(NamedTuple):
     """L pieces of constant jerk, as the kernels write them.
 
     joint    : (L,) the joint k that the piece is anchored at
@@ -61,7 +61,7 @@ class Rows(NamedTuple):
 class CornerPieces(NamedTuple):
     """L pieces of constant jerk, and the toolpath's segment (L,) that each belongs to."""
 
-    rows: Rows
+    rows: PieceRows
     segment: Array
 
 
@@ -76,7 +76,7 @@ def corner_pieces(passage: Passage, limits: LegLimits, path: Legs, dwell: FloatA
     cut = _empty(len(rows.leg) + len(path.offset))
     segment = np.zeros(len(cut.leg), np.int64)
     count = _cut(rows, limits.length, path.first, path.offset, cut, segment)
-    return CornerPieces(Rows(*(column[:count] for column in cut)), segment[:count])
+    return CornerPieces(PieceRows(*(column[:count] for column in cut)), segment[:count])
 
 
 def along_axes(
@@ -116,8 +116,8 @@ def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[
     return position, *spline_at_rest(pieces.rows.duration[move], points, last)
 
 
-def _empty(count: int) -> Rows:
-    return Rows(
+def _empty(count: int) -> PieceRows:
+    return PieceRows(
         joint=np.zeros(count, np.int64),
         leg=np.zeros(count, np.int64),
         duration=np.zeros(count),

@@ -6,6 +6,7 @@ Each function returns a `Program`; sources are named where a job comes from some
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,6 +83,8 @@ def chord_circle(chords: int = 360, radius: float = 10.0) -> Program:
     return polyline(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), source="circle of chords")
 
 
+@cache
+@cache
 def star_spiral(chords: int = 1000, chord: float = 0.2) -> Program:
     """Five-lobed star on an Archimedean spiral, chords of about `chord` [mm]."""
     t = np.linspace(0.0, 26.0, 200_001)

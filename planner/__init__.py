@@ -3,6 +3,8 @@
     plan                     plan, sample and verify a program: one call
     Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost
     Machine, load_machine    limits, interpolation period and tolerance of a machine, from a TOML file
+    PathLimit, JointLimit    limits of your own; with corner shapes (PolynomialCorner) and methods (Method): docs/extending.md
+    compare                  several methods on one program, judged by the same verifier
     Program, read_program    the blocks of an NC program
     Toolpath                 the programmed path with its joints and tolerances
     Trajectory               the setpoints, one row per interpolation period
@@ -21,7 +23,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
+    from planner.constraints.own import JointLimit, PathLimit
+    from planner.corners.own import PolynomialCorner
     from planner.geometry.toolpath import Toolpath
+    from planner.job.job import Method
     from planner.job.plan import Plan
     from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
@@ -29,6 +34,7 @@ if TYPE_CHECKING:
     from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
     from planner.nc.reader import read_program
+    from planner.report.comparison import compare
     from planner.verify import Verdict
 
     __version__: str
@@ -37,6 +43,11 @@ _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
     "Trace": "planner.job.trace",
+    "JointLimit": "planner.constraints.own",
+    "PathLimit": "planner.constraints.own",
+    "PolynomialCorner": "planner.corners.own",
+    "Method": "planner.job.job",
+    "compare": "planner.report.comparison",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
@@ -50,14 +61,19 @@ _HOME = {
 
 __all__ = [
     "InputError",
+    "JointLimit",
     "Machine",
+    "Method",
     "NotSolvedError",
+    "PathLimit",
     "Plan",
+    "PolynomialCorner",
     "Program",
     "Toolpath",
     "Trace",
     "Trajectory",
     "Verdict",
+    "compare",
     "load_machine",
     "plan",
     "read_program",

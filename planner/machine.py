@@ -7,17 +7,27 @@ template with every key and its unit.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.base.units import RAD_PER_DEG
+from planner.constraints.own import OwnLimit, check_names
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
@@ -97,6 +107,7 @@ class Machine(_Record):
     tools: dict[str, Finite] = {}
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}
+    _own: tuple[OwnLimit, ...] = PrivateAttr(default=())
 
     @field_validator("axes")
     @classmethod
@@ -139,6 +150,21 @@ class Machine(_Record):
                 )
         scale = [RAD_PER_DEG if letter in ROTARY_AXES else 1.0 for letter in axes]
         return np.array([getattr(self.axes[letter], quantity) for letter in axes]) * scale
+
+    @property
+    def own(self) -> tuple[OwnLimit, ...]:
+        """Limits beside those of a machine file (constraints/own.py)."""
+        return self._own
+
+    def with_own(self, limits: Sequence[OwnLimit]) -> Machine:
+        """The machine with these limits of one's own, and no others.
+
+        Raises InputError for limits without a name, and for a name that is there already.
+        """
+        check_names(limits, [*self.axes])
+        machine = self.model_copy()
+        machine._own = tuple(limits)
+        return machine
 
 
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")

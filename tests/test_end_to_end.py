@@ -6,17 +6,19 @@ import json
 from pathlib import Path
 
 import pytest
+from quick import slow_but
 from typer.testing import CliRunner
 
 from planner.cli import app
 
+STOPPING = "--method stop --format npz"
 BRACKET = Path(__file__).resolve().parent.parent / "planner" / "examples" / "bracket.ngc"
 
 
-@pytest.mark.parametrize("arguments", [[], ["--corner", "fir"], ["--method", "stop", "--format", "npz"]])
-def test_plan_then_verify_the_file(tmp_path: Path, arguments: list[str]) -> None:
+@pytest.mark.parametrize("arguments", slow_but([STOPPING], ["", "--corner fir", STOPPING]))
+def test_plan_then_verify_the_file(tmp_path: Path, arguments: str) -> None:
     out = tmp_path / "out"
-    planned = CliRunner().invoke(app, ["plan", str(BRACKET), "-o", str(out), "--json", *arguments])
+    planned = CliRunner().invoke(app, ["plan", str(BRACKET), "-o", str(out), "--json", *arguments.split()])
     assert planned.exit_code == 0, planned.output
     summary = json.loads((out / "summary.json").read_text())
     assert json.loads(planned.stdout)["cycle_time_s"] == summary["cycle_time_s"]

@@ -20,6 +20,7 @@ PAGES = {"README.md": README} | {
 COMMANDS = PAGES["docs/command-line.md"]
 
 
+@pytest.mark.slow
 def test_the_python_example_runs_and_the_output_is_that_of_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     monkeypatch.chdir(ROOT)
@@ -51,8 +52,8 @@ def test_options_that_are_shown_exist_and_the_others_are_shown(
     missing = {option for option in shown if not re.search(rf"(?<![\w-]){option}(?![\w-])", help_text)}
     assert shown
     assert not missing
-    long = set(re.findall(r"^. (?:\*\s+)?(--[a-z][a-z-]*)", help_text, re.MULTILINE))
-    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--help": "-h"}
+    long = set(re.findall(r"^. (?:-\w, )?(--[a-z][a-z-]*)", help_text, re.MULTILINE))
+    short = {"--machine": "-m", "--output": "-o", "--quiet": "-q", "--help": "-h", "--verbose": "-v"}
     assert long
     assert not {short.get(option, option) for option in long} - shown - {"-h"}
 

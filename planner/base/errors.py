@@ -1,18 +1,17 @@
-"""What goes wrong, and how it is said.
+"""What can go wrong, and how it is reported.
 
-Three kinds of failure, three treatments:
+There are three kinds of failure:
 
-* bad input          -> an `InputError`, raised before any work, naming the file, line and column, what was found
-                        and what is allowed;
-* an unsolved problem-> a status with a sentence and a remedy; `require()` turns it into `NotSolvedError`;
-* our own bug        -> an assertion or an uncaught exception.
+* bad input            an `InputError`, raised before any work: file, line and column, what was found and what is allowed;
+* an unsolved problem  a status with a sentence and a remedy; `require()` turns it into `NotSolvedError`;
+* a bug of ours        an assertion or an uncaught exception.
 """
 
 from __future__ import annotations
 
 
 class PlannerError(Exception):
-    """Base of everything this package raises on purpose."""
+    """Base of all exceptions that this package raises on purpose."""
 
 
 class InputError(PlannerError, ValueError):
@@ -33,4 +32,4 @@ class InputError(PlannerError, ValueError):
 
 
 class NotSolvedError(PlannerError, RuntimeError):
-    """A solver ended without a solution; the text is the status' sentence with its remedy."""
+    """There is no solution. The text is the sentence of the status, with its remedy."""

@@ -27,7 +27,7 @@ BESIDE = {
     "vertex": "the programmed point of a corner",
     "chord": "the straight line between two points of a curve: what the machine runs between two samples, or "
     "a line that stands for part of an arc",
-    "piece": "a part of a motion, in time: each axis has constant jerk in it",
+    "piece": "a part of a motion, in time: each axis has constant jerk in it; of a feedrate problem, the grid points of one run",
     "window": "neighbouring intervals, or spans, that are solved together",
     "row": "one line of a table, or one inequality of a problem",
 }
@@ -39,7 +39,7 @@ TERMS = {
     "full stop": "a place at which the feed is zero",
     "dwell": "a full stop whose duration the program sets (G4)",
     "standstill": "a full stop whose duration the planner sets, so that filters settle or a sample falls on the vertex",
-    "corridor": "all points within the tolerance of the path; splines stay inside it",
+    "corridor": "all points within the tolerance of the path, also called the tube; splines stay inside it",
     "contour error": "distance of the motion from the programmed path",
     "vertex error": "distance of a vertex from the motion",
     "chord error": "how far the machine's chord between two samples cuts off the curve, kappa feed^2 dt^2 / 8",

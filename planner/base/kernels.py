@@ -13,6 +13,10 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+# What reading an index raises that another version of the package has written: it names the classes of the kernels' arguments, and
+# those may have gone since. numba reads the whole index before it looks whether it is out of date.
+_OUT_OF_DATE = (AttributeError, ImportError)
+
 _told: Callable[[bool], None] | None = None
 _warned = False
 
@@ -57,6 +61,9 @@ class _Cache:
         except (OSError, EOFError) as fault:
             self._failed(fault)
             found = None
+        except _OUT_OF_DATE:
+            found = None
+            self._forget()
         if found is None and _told is not None:
             _told(self._kept)
         return found
@@ -64,10 +71,17 @@ class _Cache:
     def save_overload(self, signature: Any, made: Any) -> None:
         try:
             self._numba_s.save_overload(signature, made)
+        except (OSError, *_OUT_OF_DATE) as fault:
+            self._failed(fault)
+
+    def _forget(self) -> None:
+        """Empty the index of a kernel."""
+        try:
+            self._numba_s.flush()
         except OSError as fault:
             self._failed(fault)
 
-    def _failed(self, fault: OSError | EOFError) -> None:
+    def _failed(self, fault: Exception) -> None:
         self._kept = False
         _warn(fault)
 

@@ -43,7 +43,11 @@ class MethodName:
 
 
 METHODS: dict[str, MethodName] = {
-    OPTIMAL: MethodName(home="planner.methods.optimal:OptimalMethod", shapes=True),
+    OPTIMAL: MethodName(
+        home="planner.methods.optimal:OptimalMethod",
+        shapes=True,
+        solvers=("own", "ipopt", "fatrop", "sequential-convex"),
+    ),
     SECOND_ORDER: MethodName(
         home="planner.methods.second_order:SecondOrderMethod", shapes=True, solvers=("reachability", "toppra")
     ),

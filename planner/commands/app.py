@@ -20,6 +20,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # rich would take longer to import than everything else for --help
     context_settings=HELP_OPTIONS,
 )
 
@@ -50,7 +51,7 @@ for name, command in {
 }.items():
     app.command(name)(command)
 
-machine_app = typer.Typer(help="Machine files.", no_args_is_help=True)
+machine_app = typer.Typer(help="Machine files.", no_args_is_help=True, rich_markup_mode=None)
 machine_app.command("list")(list_machines)
 machine_app.command("show")(show_machine)
 machine_app.command("init")(init_file)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from planner.base.errors import InputError, NotSolvedError
+from planner.base.errors import InputError
 from planner.base.names import METHODS, method_name
 from planner.commands.options import (
     DEFAULT_MACHINE,
@@ -110,21 +110,17 @@ def parse_methods(text: str) -> list[str]:
 
 def _run(method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool) -> Row:
     """Plan with one method and say on standard error how it went."""
-    from planner import plan
-    from planner.report.comparison import Row, refused, row_of_plan
+    from planner.report.comparison import Row, row_of
 
     with ProgressBar(quiet=quiet) as progress:
         try:
-            made = plan(
+            row = row_of(
+                method,
                 program,
                 machine,
-                method=method,
-                tolerance=tolerance,
-                progress=lambda stage, fraction: progress(f"{method}: {stage}", fraction),
+                tolerance,
+                lambda stage, fraction: progress(f"{method}: {stage}", fraction),
             )
-            row = row_of_plan(method, made)
-        except (InputError, NotSolvedError) as fault:
-            row = refused(method, fault)
         except MemoryError as fault:
             row = Row(method=method, outcome="not solved", sentence=memory_used_up(fault))
     took = "" if row.cycle_time is None else f" {row.cycle_time:.4f} s,"

@@ -27,7 +27,7 @@ from planner.commands.options import (
 )
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
 
-NO_CORNERS = "no corners to list: the program turns nowhere without a stop"
+NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 
 
 @guarded

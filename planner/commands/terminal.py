@@ -1,4 +1,4 @@
-"""How a command speaks: its exit code, its messages, tables on standard output, progress on standard error."""
+"""How a command reports: exit codes, messages, tables on standard output, progress on standard error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PLAIN = {"µ": "u", "²": "2", "³": "3", "°": "deg", "…": "..."}  # for enco
 
 
 def prepare_streams() -> None:
-    """Let any text be written whatever the encoding, and warnings be one line."""
+    """Let the output take any text, whatever its encoding, and print warnings on one line."""
     codecs.register_error("planner", _plain_text)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -55,7 +55,7 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn what a command raises into a message and an exit code."""
+    """Turn the exceptions of a command into a message and an exit code."""
 
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
@@ -93,15 +93,15 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def memory_used_up(fault: MemoryError) -> str:
-    """What to say, and what to do."""
+    """The message for a job that needs more memory than there is, and what to do about it."""
     said = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
     return f"{said}; split the program, or use --geometry spline or a faster --method (kinematic, stop)"
 
 
 def say(text: str, *, err: bool = False) -> None:
-    """Print a line or more; control characters, which a terminal might obey, are printed as escapes.
+    """Print one or more lines. Control characters, which a terminal might obey, are printed as escapes.
 
-    Raises InputError where the output cannot be written, BrokenPipeError where nobody reads it any more.
+    Raises InputError if the output cannot be written, BrokenPipeError if its reader has gone.
     """
     _write(printable(text), err=err)
 
@@ -134,7 +134,7 @@ def printable(text: str) -> str:
 
 
 def show(*tables: RenderableType) -> None:
-    """Print tables, folded to a terminal's width; elsewhere a row is a line."""
+    """Print tables, folded to the width of a terminal; elsewhere a row is one line."""
     from rich.console import Console
     from rich.segment import Segment, Segments
 
@@ -154,12 +154,12 @@ def show(*tables: RenderableType) -> None:
 
 
 class ProgressBar:
-    """What a long job does, on standard error: on a terminal a bar with a clock, elsewhere a line now and then.
+    """Progress of a long job on standard error: a bar with a clock on a terminal, a line now and then elsewhere.
 
-    quiet : say nothing
+    quiet : print nothing
 
-    The number of rounds is not known before, so the bar only shows that work goes on; the text beside it names the stage, says in
-    which pass it is, and how much of the pass is done.
+    The number of rounds is not known beforehand, so the bar only shows that work goes on. The text beside it names the stage, the pass,
+    and how much of the pass is done.
     """
 
     def __init__(self, *, quiet: bool = False) -> None:
@@ -182,7 +182,7 @@ class ProgressBar:
             self._bar = None
 
     def __call__(self, stage: str, fraction: float) -> None:
-        """Show that `stage` is done to `fraction` (0 to 1); at 0 it begins, perhaps once more."""
+        """Show that `stage` is done to `fraction` (0 to 1); 0 begins it, perhaps once more."""
         if fraction == 0.0:
             self._times[stage] = self._times.get(stage, 0) + 1
         self._show(self._text(stage, fraction))

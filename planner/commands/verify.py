@@ -1,8 +1,8 @@
 """`planner verify`: judge a trajectory file.
 
-The command line says against what. Where it is silent, a file that `plan` wrote brings its machine and its tolerance, and that is
-said; with -m it is that machine's tolerance, unless the program (G64 P) or --tolerance has another. What a file says about limits it
-did not keep is reported and never believed.
+The command line says what to judge it against. Without -m and --tolerance a file that `plan` wrote is judged with its own machine and
+tolerance, and the output says so. With -m the tolerance is that of the machine, unless the program (G64 P) or --tolerance sets another.
+Limits that a file declares as not kept are reported, and judged all the same.
 """
 
 from __future__ import annotations
@@ -63,9 +63,7 @@ def verify_command(
     unjudged = tuple(not_limited or ())
     for name in unjudged:
         if name not in NOT_LIMITED_NAMES:
-            raise InputError(
-                f"--not-limited {name}: there is no such limit; {', '.join(NOT_LIMITED_NAMES)} are"
-            )
+            raise InputError(f"--not-limited {name}: no such limit; there are {', '.join(NOT_LIMITED_NAMES)}")
     read = read_trajectory(trajectory)
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)
@@ -120,7 +118,8 @@ def _machine(machine: str | None, trajectory: Path, says: FileSays) -> tuple[Mac
 
 @dataclass(frozen=True, kw_only=True)
 class FileSays:
-    """What a trajectory file says of itself: used where the command line is silent, reported always, and no reason to pass.
+    """What a trajectory file says about itself. It is used where the command line is silent, always reported, and never a reason to
+    pass.
 
     machine     : its machine, as in a machine file, or None
     tolerance   : the tolerance it was planned with [mm], or None
@@ -133,7 +132,7 @@ class FileSays:
 
     @classmethod
     def of(cls, metadata: dict[str, Any]) -> FileSays:
-        """From a file's metadata, which may be anybody's: what is not of its kind is not there."""
+        """From the metadata of a file; entries of another type than expected are ignored."""
         machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
         free = metadata.get("not_limited")
         number = isinstance(tolerance, (int, float)) and not isinstance(tolerance, bool)
@@ -146,7 +145,7 @@ class FileSays:
         )
 
     def sentences(self, machine_taken: bool, tolerance_taken: bool) -> list[str]:
-        """What it says, and whether that was taken."""
+        """What the file says, and whether it was used."""
         said = []
         if self.machine is not None:
             taken = "taken" if machine_taken else "not taken, -m is given"
@@ -161,7 +160,7 @@ class FileSays:
         return said
 
     def remedies(self, verdict: Verdict, unjudged: tuple[str, ...]) -> list[str]:
-        """For limits that are exceeded and that the file's plan did not keep."""
+        """Sentences for limits that are exceeded and that the plan of the file did not keep."""
         broken = {name.partition(".")[0] for name, check in verdict.limits.items() if check.broken}
         return [
             f"{name} is exceeded; the file says that its plan did not limit it: --not-limited {name} reports it without judging"

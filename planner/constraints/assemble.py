@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import NotSolvedError
 from planner.base.units import RAD_PER_DEG
-from planner.constraints import bounds
+from planner.constraints import bounds, normal_limit
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.allocation import error_rate
 from planner.machine import Machine
+from planner.path.own_rows import own_rows
 from planner.path.samples import PathSamples
 
 # The effective curvature is exact in the middle of an interval; at its quarters up to 4e-4 is missing on grids of the default
@@ -55,7 +58,7 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
     for k, letter in enumerate(axes):
         collected.tighten(f"curvature_jump.{letter}", np.where(axis == k, jump, np.inf))
     pieces = len(samples.piece) - 1
-    return FeedrateProblem(
+    problem = FeedrateProblem(
         piece=samples.piece,
         s=samples.s,
         axes=axes,
@@ -74,13 +77,61 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
         feed_sq_start=np.zeros(pieces),
         feed_sq_end=np.zeros(pieces),
     )
+    return _with_own(problem, samples, machine) if machine.own else problem
+
+
+def _with_own(problem: FeedrateProblem, samples: PathSamples, machine: Machine) -> FeedrateProblem:
+    """The problem with the machine's own limits as further axes, in units in which none of them moves faster than the path."""
+    rows = own_rows(samples, machine)
+    if rows.margin.max() >= 1.0:
+        line = int(samples.path.toolpath.line[samples.segment[int(rows.margin.argmax())]])
+        all_names = ", ".join(rows.names)
+        raise NotSolvedError(
+            f"one of the limits {all_names} changes faster at line {line} than a grid of the finest step follows"
+        )
+    fastest = np.abs(rows.d1).max(axis=0)
+    unit = np.divide(1.0, fastest, out=np.ones(len(fastest)), where=fastest > 0.0)
+    bounds, names = problem.feed_sq_max.copy(), list(problem.bound_names)
+    which = problem.feed_sq_bound.copy()
+    for k, name in enumerate(rows.names):
+        tighter = rows.feed_sq_max[:, k] < bounds
+        bounds[tighter], which[tighter] = rows.feed_sq_max[tighter, k], len(names)
+        names.append(f"velocity.{name}")
+    least = [getattr(rows, q).min(axis=0) for q in ("acceleration", "jerk")]
+
+    def columns(name: str) -> FloatArray:
+        return np.hstack([getattr(problem, name), unit * getattr(rows, name)])
+
+    return replace(
+        problem,
+        axes=problem.axes + rows.names,
+        d1=columns("d1"),
+        d2_left=columns("d2_left"),
+        d2_right=columns("d2_right"),
+        d3_left=columns("d3_left"),
+        d3_right=columns("d3_right"),
+        velocity=np.append(problem.velocity, unit * rows.velocity),
+        acceleration=np.append(problem.acceleration, unit * least[0]),
+        jerk=np.append(problem.jerk, unit * least[1]),
+        feed_sq_max=bounds,
+        feed_sq_bound=which,
+        bound_names=tuple(names),
+        margin=np.maximum(problem.margin, rows.margin),
+        own=len(rows.names),
+        own_here=np.stack([rows.acceleration / least[0], rows.jerk / least[1]]),
+    )
 
 
 def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
     """(P,) bound of feed^2 inside straight intervals: programmed feed and axis velocities [mm2/s2]."""
     feed_sq = bounds.programmed_feed(samples.path.toolpath.feed[samples.segment])
     velocity, _ = bounds.axis_velocity(samples.d1, machine.limits("velocity", samples.path.toolpath.axes))
-    return np.minimum(feed_sq, velocity)
+    feed_sq = np.minimum(feed_sq, velocity)
+    if machine.own:
+        at = samples.intervals
+        own = own_rows(samples, machine).feed_sq_max.min(axis=1)
+        feed_sq[at] = np.minimum(feed_sq[at], np.maximum(own[at], own[at + 1]))
+    return feed_sq
 
 
 def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
@@ -119,8 +170,9 @@ def _curvature_bounds(
     elsewhere the chord has the whole of it."""
     rate = error_rate(machine)
     found = []
-    if machine.normal_acceleration is not None:
-        found.append(("normal_acceleration", bounds.normal_acceleration(kappa, machine.normal_acceleration)))
+    across = normal_limit.feed_sq_max(kappa, machine)
+    if across is not None:
+        found.append((normal_limit.NAME, across))
     tol_chord = np.where(closed, budget * (machine.dt**2 / 8.0 / rate), budget)
     found.append(("chord_error", bounds.chord_error(kappa, tol_chord, machine.dt)))
     if machine.fir is not None:

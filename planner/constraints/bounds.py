@@ -2,7 +2,7 @@
 
     programmed feed       x <= F^2
     axis velocity         |r'_k| feed <= v_k                     x <= min_k (v_k / r'_k)^2
-    normal acceleration   kappa x <= A                           eq. (19)
+    normal acceleration   kappa x <= A                           eq. (19), constraints/normal_limit.py
     chord error           kappa x dt^2 / 8 <= eps_ch             eq. (19), approximate form: rigorous, because the interpolator
                                                                  advances the arc length feed*dt per period (docs/papers.md D)
     filter error          kappa x sum_i T_i^2 / 24 <= eps_fir    papers 000/001 (par. 21)
@@ -31,11 +31,6 @@ def axis_velocity(d1: FloatArray, limits: FloatArray) -> tuple[FloatArray, Array
     ratio = np.abs(d1) / limits
     axis = ratio.argmax(axis=1)
     return 1.0 / ratio[np.arange(len(d1)), axis] ** 2, axis
-
-
-def normal_acceleration(kappa: FloatArray, limit: float) -> FloatArray:
-    """kappa x <= A [mm/s2]."""
-    return _over(limit, kappa)
 
 
 def chord_error(kappa: FloatArray, tol: FloatArray, dt: float) -> FloatArray:

@@ -47,6 +47,9 @@ class FeedrateProblem:
     margin                : (P,) of the interval to the right, share of the acceleration limits [-]
     feed_sq_start, feed_sq_end : (G,) x at both ends of each piece; 0 = rest
     limit_scale           : (P,) by what factor the motion has to be slower around each point (module text) [-]; 1 if not given
+    own                   : how many of the axes, the last ones, are limits of one's own (constraints/own.py): functions of the
+                            position with rows like an axis
+    own_here              : (2, P, own) by what factors their acceleration and jerk limits are larger at each point [-]
 
     Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in them.
     """
@@ -69,6 +72,8 @@ class FeedrateProblem:
     feed_sq_start: FloatArray
     feed_sq_end: FloatArray
     limit_scale: FloatArray = field(default_factory=lambda: np.ones(()))
+    own: int = 0
+    own_here: FloatArray | None = None
 
     def __post_init__(self) -> None:
         points, axes = np.shape(self.d1)
@@ -84,6 +89,8 @@ class FeedrateProblem:
         for name in ("feed_sq_max", "margin", "limit_scale"):
             freeze(self, name, np.float64, (points,))
         freeze(self, "feed_sq_bound", np.int64, (points,))
+        if self.own:
+            freeze(self, "own_here", np.float64, (2, points, self.own))
         for name in ("feed_sq_start", "feed_sq_end"):
             freeze(self, name, np.float64, (pieces,))
         self._check()
@@ -116,12 +123,22 @@ class FeedrateProblem:
     @cached_property
     def acceleration_limit(self) -> FloatArray:
         """(P, A) axis accelerations at each point, without the margin [mm/s2]."""
-        return self.acceleration / self.limit_scale[:, None] ** 2
+        return self._here(0, self.acceleration / self.limit_scale[:, None] ** 2)
 
     @cached_property
     def jerk_limit(self) -> FloatArray:
         """(P, A) axis jerks at each point [mm/s3]."""
-        return self.jerk / self.limit_scale[:, None] ** 3
+        return self._here(1, self.jerk / self.limit_scale[:, None] ** 3)
+
+    def _here(self, quantity: int, limit: FloatArray) -> FloatArray:
+        if self.own_here is not None:
+            limit[:, -self.own :] *= self.own_here[quantity]
+        return limit
+
+    @property
+    def machine_axes(self) -> int:
+        """How many of the axes are the machine's; the others are limits of one's own."""
+        return len(self.axes) - self.own
 
     @property
     def interval(self) -> Array:

@@ -12,9 +12,8 @@ is a parabola with its top at eps/(2c), hence
 
 and where a short leg keeps the corner from using eps_ap, X = min(A, (eps - eps_ap)/c).
 
-A is the machine's normal acceleration limit (eq. (19)'s A_max) and never more than what its axes can give in the direction n of
-the corner's bisector: sum_k a_k |n_k|, the support function of the box of axis accelerations. With it the closed-form speed is
-a true upper bound: no motion within the axis limits passes the apex faster, whatever it does along the path.
+A is what machine and axes allow in the direction of the corner's bisector (constraints/normal_limit.py). With it the closed-form speed
+is a true upper bound: no motion within the axis limits passes the apex faster, whatever it does along the path.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from planner.machine import Machine
 
 
 def error_rate(machine: Machine) -> float:
-    """c [s2]: chord and filter error per unit of normal acceleration."""
+    """c = dt^2/8 + sum T^2/24 [s2]: chord and filter error per unit of normal acceleration."""
     return machine.dt**2 / 8.0 + filter_rate(machine)
 
 
@@ -36,23 +35,12 @@ def filter_rate(machine: Machine) -> float:
 
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
-    """eps_ap [mm]: the share of the budget `tol` (n,) that the rounding may use, eq. (20)."""
-    return tol - rate * np.minimum(acceleration, tol / (2.0 * rate))
+    """The part of the tolerance that the rounding may use, eq. (20).
 
+    tol          : (n,) tolerance eps [mm]
+    acceleration : (n,) largest normal acceleration A [mm/s2]
+    rate         : c, from `error_rate` [s2]
 
-def normal_acceleration_max(
-    tol: FloatArray, tol_ap: FloatArray, acceleration: FloatArray, rate: float
-) -> FloatArray:
-    """X [mm/s2]: the largest kappa feed^2 that leaves eps_ap + c X within the budget, and at most A."""
-    return np.minimum(acceleration, (tol - tol_ap) / rate)
-
-
-def normal_acceleration_of_axes(limits: FloatArray, u1: FloatArray, u2: FloatArray) -> FloatArray:
-    """sum_k a_k |n_k| along the bisector n of corners with unit tangents u1, u2 (n, A) [mm/s2].
-
-    Where the tangents agree (no bisector) the largest over all directions, the norm of the limits.
+    Returns eps_ap (n,) [mm].
     """
-    across = u2 - u1
-    size = np.linalg.norm(across, axis=-1, keepdims=True)
-    normal = np.divide(across, size, out=np.zeros_like(across), where=size > 1e-6)
-    return np.where(size[..., 0] > 1e-6, np.abs(normal) @ limits, np.linalg.norm(limits))
+    return tol - rate * np.minimum(acceleration, tol / (2.0 * rate))

@@ -46,13 +46,22 @@ class Shape(IntEnum):
 
     BEZIER = 0  # (d, w1, w2, -): tangent length [mm] and the inner weights of the rational cubic
     FIR = 1  # (V, T1, T2, Tk): feed [mm/s], filter lengths and overlap time [s]
+    OWN = 2  # (d, -, -, -): tangent length [mm]; the polynomial is in the record (corners/own.py)
 
 
-SHAPE_BEZIER = int(Shape.BEZIER)  # numba reads plain integers
+SHAPE_BEZIER, SHAPE_OWN = int(Shape.BEZIER), int(Shape.OWN)  # numba reads plain integers
+OWN_TERMS = 10  # coefficients of a shape of one's own
 
 # What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.stretch`). Scaling X
 # and Y is an affine map, which keeps every geometric continuity.
-CORNER_DTYPE = np.dtype([("shape", np.int64), ("params", np.float64, (4,)), ("stretch", np.float64, (2,))])
+CORNER_DTYPE = np.dtype(
+    [
+        ("shape", np.int64),
+        ("params", np.float64, (4,)),
+        ("stretch", np.float64, (2,)),
+        ("own", np.float64, (OWN_TERMS,)),
+    ]
+)
 
 
 def middle_from_tolerance(tol: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
@@ -130,6 +139,27 @@ def _fir_shape(V, T1, T2, Tk, w, w_ref):
 
 
 @njit(cache=True, error_model="numpy")
+def _own_at(c, z):
+    """sum c_n z^(n + 3) and its three derivatives."""
+    g0, g1, g2, g3 = 0.0, 0.0, 0.0, 0.0  # of sum c_n z^n, over k!
+    for n in range(len(c) - 1, -1, -1):
+        g3, g2, g1, g0 = g3 * z + g2, g2 * z + g1, g1 * z + g0, g0 * z + c[n]
+    g2, g3 = 2.0 * g2, 6.0 * g3
+    return (
+        z * z * z * g0,
+        z * z * (3.0 * g0 + z * g1),
+        z * (6.0 * g0 + z * (6.0 * g1 + z * g2)),
+        6.0 * g0 + z * (18.0 * g1 + z * (9.0 * g2 + z * g3)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _own_shape(d, c, w):
+    """Own polynomials: X = d f(w), Y = d f(1 - w), f given in z = 1 - w."""
+    return _scaled(_own_at(c, 1.0 - w), d, -1.0), _scaled(_own_at(c, w), d, 1.0)
+
+
+@njit(cache=True, error_model="numpy")
 def shape_at(corner, w, w_ref):
     """Retreat X and advance Y of a corner record at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
 
@@ -138,6 +168,8 @@ def shape_at(corner, w, w_ref):
     p = corner.params
     if corner.shape == SHAPE_BEZIER:
         X, Y = _bezier_shape(p[0], p[1], p[2], w, w_ref)
+    elif corner.shape == SHAPE_OWN:
+        X, Y = _own_shape(p[0], corner.own, w)
     else:
         X, Y = _fir_shape(p[0], p[1], p[2], p[3], w, w_ref)
     return _scaled(X, corner.stretch[0], 1.0), _scaled(Y, corner.stretch[1], 1.0)

@@ -20,6 +20,7 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.base.kernels import njit
 from planner.corners.blend import CORNER_DTYPE, corner_point, shape_at
+from planner.corners.own import PolynomialCorner
 from planner.corners.smooth import SmoothPath
 from planner.geometry.legs import leg_point, leg_tangent
 from planner.geometry.spline import span_point, span_tangent
@@ -43,6 +44,8 @@ def element_table(path: SmoothPath) -> ElementTable:
     corners = np.zeros(len(path.params), CORNER_DTYPE)
     corners["shape"], corners["params"] = int(path.corner.shape), path.params
     corners["stretch"] = path.stretch
+    if isinstance(path.corner, PolynomialCorner):
+        corners["own"] = path.corner.coefficients
     return ElementTable(path.legs.table, corners, path.spline.spans)
 
 

@@ -1,7 +1,7 @@
-"""The smooth path: the legs of a toolpath with a corner blended at each joint, within the error budget.
+"""The smooth path: the legs of a toolpath with each corner rounded within its tolerance.
 
-Corners are data, not objects: the record holds, for each of the R+1 joints between legs, how far the corner reaches back (d),
-the shape's parameters, the part of the budget it uses and the normal acceleration that is left for the motion.
+Corners are data, not objects. For each of the R+1 joints between legs the record holds how far the corner reaches back (d), the
+parameters of its shape, the part of the tolerance it uses, and the normal acceleration that is left for the motion.
 """
 
 from __future__ import annotations
@@ -13,12 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.allocation import (
-    allocate,
-    error_rate,
-    normal_acceleration_max,
-    normal_acceleration_of_axes,
-)
+from planner.constraints import normal_limit
+from planner.corners.allocation import allocate, error_rate
 from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_from_tolerance
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
@@ -29,24 +25,34 @@ from planner.machine import Machine
 
 
 class CornerFamily(Protocol):
-    """Corners at n given joints: how tangent length d and middle value m belong together (see corners/blend.py)."""
+    """Corners at n given joints: how tangent length d and middle value m depend on each other (corners/blend.py)."""
 
-    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray: ...
+    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
+        """Tangent lengths d (n,) [mm] for middle values m (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        ...
 
-    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Middle values m (n,) [mm] for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        ...
 
-    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray: ...
+    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Parameters of the shape (n, 4) for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        ...
 
 
 class CornerShape(Protocol):
-    """A shape of corners; `at` tells it by how much the direction of each axis changes at the joints, (n, A)."""
+    """A shape of corners. To add one: docs/algorithm.md."""
 
     name: str
     shape: Shape
 
-    def at(self, change: FloatArray) -> CornerFamily: ...
+    def at(self, change: FloatArray) -> CornerFamily:
+        """The corners at n joints where the directions of the axes change by `change` (n, A)."""
+        ...
 
-    def breaks(self, params: FloatArray) -> tuple[float, ...]: ...
+    def breaks(self, params: FloatArray) -> tuple[float, ...]:
+        """Parameters w in (0, 1) of a corner with these `params` (4,) at which two of its pieces meet."""
+        ...
 
 
 # A leg whose free part is shorter than this share of it is closed by stretching one of its corners [-]; grid intervals of the
@@ -158,14 +164,8 @@ def round_corners(
     curvature = toolpath.curvature[before] + toolpath.curvature[after]
     feed = np.minimum(_finite_feed(toolpath, machine, before), _finite_feed(toolpath, machine, after))
 
-    limits = machine.limits("acceleration", toolpath.axes)
-    reachable = normal_acceleration_of_axes(
-        limits, toolpath.tangent_end[before], toolpath.tangent_start[after]
-    )
-    # Between arcs the normal at the apex is not the bisector at the vertex: the largest over all directions bounds it.
-    reachable = np.where(curvature > 0, np.linalg.norm(limits), reachable)
-    if machine.normal_acceleration is not None:
-        reachable = np.minimum(reachable, machine.normal_acceleration)
+    u1, u2 = toolpath.tangent_end[before], toolpath.tangent_start[after]
+    reachable = normal_limit.at_corners(machine, toolpath.axes, u1, u2, curvature)
     rate = error_rate(machine)
 
     usable = (1.0 - free) * legs.length
@@ -199,7 +199,7 @@ def round_corners(
         stretch=stretch,
         tol=tol,
         tol_ap=tol_ap,
-        normal_max=normal_acceleration_max(tol, tol_ap, reachable, rate),
+        normal_max=normal_limit.within_budget(tol, tol_ap, reachable, rate),
         spline=no_spline(len(toolpath.axes)),
     )
 

@@ -23,13 +23,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.delivery.pacing import Runs, Timed, TimedT, paced, runs_of
+from planner.delivery.pacing import MotionRuns, Timed, TimedT, paced, runs_of
 from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.timing import MotionInTime
 from planner.verify.filtered import look_behind, motion_asked
-from planner.verify.pieces import pieces_of, widened
+from planner.verify.pieces import program_pieces, widened
 
 # Of the tolerance, what measuring at other times may find more [-].
 SPARE = 2e-3
@@ -78,7 +78,7 @@ class Behind:
     def __init__(self, toolpath: Toolpath, machine: Machine):
         self.toolpath, self.machine = toolpath, machine
         self.tolerance = float(toolpath.tolerance.min())
-        self.pieces = pieces_of(toolpath)
+        self.pieces = program_pieces(toolpath)
         self._wide = widened(self.pieces, WIDER)
         if machine.fir is None:
             return  # `errors` of the motion itself can be asked for
@@ -137,13 +137,13 @@ class Behind:
         early, late = self.runs_within(runs_of(motion), time)
         return early < late
 
-    def runs_within(self, runs: Runs, time: FloatArray) -> tuple[Array, Array]:
+    def runs_within(self, runs: MotionRuns, time: FloatArray) -> tuple[Array, Array]:
         """First and last of the runs of which the filters hold some part at the times (n,) [s]."""
         early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
         late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
         return np.minimum(early, late), late
 
-    def rests(self, motion: Timed, runs: Runs) -> FloatArray:
+    def rests(self, motion: Timed, runs: MotionRuns) -> FloatArray:
         """(G,) the shortest rest behind each run with which the filtered motion keeps the tolerance [s]; 0 behind the last run."""
         found = np.zeros(len(runs))
         for low in range(0, len(runs) - 1, STOPS_AT_ONCE):

@@ -25,7 +25,7 @@ TimedT = TypeVar("TimedT", Motion, AxisMotion)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Runs:
+class MotionRuns:
     """G runs of a motion.
 
     first : (G,) index of the first piece of the run
@@ -43,7 +43,7 @@ class Runs:
         return len(self.first)
 
 
-def runs_of(motion: Timed) -> Runs:
+def runs_of(motion: Timed) -> MotionRuns:
     """The runs of a motion; none if the motion rests all the time."""
     edges = np.append(motion.t, motion.end)
     if isinstance(motion, Motion):
@@ -58,7 +58,7 @@ def runs_of(motion: Timed) -> Runs:
             motion.velocity[a:b].any() or motion.jerk[a:b].any() for a, b in zip(begins, ends, strict=True)
         ]
         first, last = begins[moving], ends[moving]
-    return Runs(first=first, last=last, begin=edges[first], end=edges[last])
+    return MotionRuns(first=first, last=last, begin=edges[first], end=edges[last])
 
 
 def _rests(motion: AxisMotion) -> Array:
@@ -73,7 +73,7 @@ def _rests(motion: AxisMotion) -> Array:
     return still
 
 
-def paced(motion: TimedT, runs: Runs, factor: FloatArray, pause: FloatArray) -> TimedT:
+def paced(motion: TimedT, runs: MotionRuns, factor: FloatArray, pause: FloatArray) -> TimedT:
     """The motion with every run slowed down and followed by more rest.
 
     factor : (G,) by which each run takes longer [-], >= 1

@@ -51,7 +51,7 @@ def add_switching_points(
     interval = _straight(samples)
     x0, x1, cap = x[interval], x[interval + 1], cap[interval]
     length = samples.s[interval + 1] - samples.s[interval]
-    along = np.abs(samples.d1[interval]) / problem.acceleration
+    along = np.abs(problem.d1[interval]) / problem.acceleration_limit[interval]
     rate = (1.0 - samples.margin[interval]) / along.max(axis=1)
     single = (x1 - x0 + 2.0 * rate * length) / (4.0 * rate)
     capped = x0 + 2.0 * rate * single > cap
@@ -104,7 +104,7 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
     """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the feed."""
-    turning = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right)) / problem.jerk
+    turning = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right)) / problem.jerk_limit
     with np.errstate(divide="ignore"):
         allowed = turning.max(axis=1) ** (-2.0 / 3.0)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))

@@ -170,7 +170,7 @@ def _interval(rows, on, x, parallel):
 
 
 @njit(cache=True, error_model="numpy")
-def _largest(rows, on, x_max):
+def largest_feed_sq(rows, on, x_max):
     """Largest x <= x_max on an interval from which some u leads to x_{i+1} in [0, target]."""
     d1, d2_left, d2_right, limit = rows
     i, h, scale, target = on
@@ -213,7 +213,7 @@ def _backward(rows, bounds, g, reach):
     reach[last] = min(bounds.x_end[g], x_max[last])
     for i in range(last - 1, first - 1, -1):
         on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
-        reach[i] = _largest(rows, on, x_max[i])
+        reach[i] = largest_feed_sq(rows, on, x_max[i])
     return True
 
 

@@ -22,6 +22,7 @@ class Status(Enum):
     INFEASIBLE = "infeasible"
     ITERATION_LIMIT = "iteration limit"
     NUMERICAL_ERROR = "numerical error"
+    TOO_LARGE = "too large"  # for this solver, which was not tried
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

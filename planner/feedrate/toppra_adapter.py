@@ -40,6 +40,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.packages import needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
@@ -186,8 +187,7 @@ def _import_toppra() -> Any:
         warnings.simplefilter(
             "ignore"
         )  # its sources hold escapes that newer Pythons warn of when they compile them
-        import toppra
-    return toppra
+        return needed("toppra", "solver toppra")
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
-from planner.fir.course import Course
+from planner.fir.polyline import Polyline
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,7 +79,7 @@ class Command:
         return self.begin + self.t[self.first[1:] - 1] + self.T1 + self.T2 + self.dwell
 
 
-def command_of(course: Course, cells: Cells, gap: FloatArray, T1: FloatArray, T2: FloatArray) -> Command:
+def command_of(course: Polyline, cells: Cells, gap: FloatArray, T1: FloatArray, T2: FloatArray) -> Command:
     """Put the cells one after another, with the gaps (R+1,) [s] at the joints."""
     leg, rest = cells.leg, np.append(np.diff(cells.leg) > 0, True)
     ends_leg = np.flatnonzero(rest)
@@ -134,3 +134,22 @@ def _starts(duration, first):
             t[n] = now
             now += duration[n]
     return t
+
+
+@njit(cache=True, error_model="numpy")
+def lower_between(order, value, first, last, speed):
+    """speed[n] = min(speed[n], value[b]) for all cells first[b] <= n < last[b]; every cell is visited once, the lowest value first."""
+    onward = np.arange(len(speed) + 1)  # the next cell that is not yet painted, or a step towards it
+    for b in order:
+        n = first[b]
+        while True:
+            root = n
+            while onward[root] != root:
+                root = onward[root]
+            while onward[n] != root:
+                onward[n], n = root, onward[n]
+            n = root
+            if n >= last[b]:
+                break
+            speed[n] = min(speed[n], value[b])
+            onward[n] = n + 1

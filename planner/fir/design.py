@@ -6,9 +6,10 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.corners.fir import overlap_time
-from planner.fir.course import Course
+from planner.fir.course import StraightCourse
 from planner.fir.filters import damped_period, lengths_from_limits, suppressing
-from planner.fir.schedule import Schedule, schedule
+from planner.fir.rules import schedule
+from planner.fir.schedule import Schedule
 from planner.machine import Machine
 
 # In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion by dt^2/8 of it. T1 is at
@@ -19,7 +20,7 @@ MODES = 2
 
 
 def filters_for(
-    course: Course, machine: Machine, speed: FloatArray, margin: FloatArray
+    course: StraightCourse, machine: Machine, speed: FloatArray, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """T1 and T2 (S,) [s]: the course's own, or the shortest for legs run at their feed and at most at `speed`.
 
@@ -30,7 +31,7 @@ def filters_for(
     margin : (S,) [-]
     """
     if course.own is not None:
-        return _own(course, course.own)
+        return course.given_filters()
     V = np.minimum(course.feed, speed[course.stretch])
     T1 = course.largest(V / course.a_max)
     product = margin * course.largest(V / course.j_max)
@@ -46,23 +47,24 @@ def filters_for(
     )
 
 
-def plan_for(course: Course, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
-    """The first schedule with these filters."""
+def plan_for(course: StraightCourse, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
+    """The first schedule of a course run at `speed` (S,) [mm/s] at most, with the filters for it and the `margin` (S,)."""
     T1, T2 = filters_for(course, machine, speed, margin)
     return schedule(course, machine, np.minimum(course.feed, speed[course.stretch]), T1, T2)
 
 
-def plain_plan(course: Course, machine: Machine) -> Schedule:
+def plain_plan(course: StraightCourse, machine: Machine) -> Schedule:
     """The paper's rules and nothing else: T1 = V/A, T2 = A/J, full speed, and eq. 15 at every corner."""
-    a, j = (machine.limits(q, course.lines.axes).min() for q in ("acceleration", "jerk"))
+    a, j = (machine.limits(q, course.axes).min() for q in ("acceleration", "jerk"))
     V = course.largest(course.feed)
-    T1, T2 = lengths_from_limits(V, a, j) if course.own is None else _own(course, course.own)
+    T1, T2 = lengths_from_limits(V, a, j) if course.own is None else course.given_filters()
     before, after, at = course.feed[:-1], course.feed[1:], course.stretch[1:]
     overlap = np.zeros(len(course) + 1)
     overlap[1:-1] = overlap_time(
         course.tol[1:-1], np.sqrt(before * after), course.sin_half[1:-1], T1[at], T2[at]
     )
     return Schedule(
+        course=course,
         T1=T1,
         T2=T2,
         speed=course.feed,
@@ -70,9 +72,3 @@ def plain_plan(course: Course, machine: Machine) -> Schedule:
         overlap=np.where(course.inner, overlap, 0.0),
         holding=np.zeros(len(course), bool),
     )
-
-
-def _own(course: Course, own: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """The two given filters for every stretch."""
-    T2, T1 = sorted(own)
-    return np.full(course.stretches, T1), np.full(course.stretches, T2)

@@ -6,11 +6,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
-from planner.fir.superpose import Pieces
+from planner.fir.superpose import Filtered
 from planner.geometry.toolpath import Toolpath
 from planner.motion.axis_motion import AxisMotion
-
-COLUMNS = ("position", "velocity", "acceleration", "jerk")
 
 
 def check_profile_filters(times: tuple[float, float] | None) -> None:
@@ -22,31 +20,38 @@ def check_profile_filters(times: tuple[float, float] | None) -> None:
         )
 
 
-def reached(pieces: Pieces) -> FloatArray:
+def reached(motion: Filtered) -> FloatArray:
     """(P,) how far the middle of each piece has come along the course, which is the last column of the pieces [mm]."""
-    middle = (pieces.t + np.append(pieces.t[1:], pieces.end[-1])) / 2 - pieces.t
-    s, v, a, j = (getattr(pieces, name)[:, -1] for name in COLUMNS)
+    middle = (motion.ends + motion.t) / 2 - motion.t
+    s, v, a, j = motion.state[:, :, -1]
     along: FloatArray = s + middle * (v + middle * (a / 2 + middle * j / 6))
     return along
 
 
-def axes_of(pieces: Pieces, segment: Array, first: int, toolpath: Toolpath, start: FloatArray) -> AxisMotion:
+def axes_of(
+    motion: Filtered, segment: Array, first: int, toolpath: Toolpath, start: FloatArray
+) -> AxisMotion:
     """The axes of the filtered motion.
 
     segment : (P,) of the toolpath, that each piece belongs to
     first   : the segment that a standstill before the first move belongs to
     start   : (A,) where that is [mm]
     """
-    t, columns = pieces.t, {name: getattr(pieces, name)[:, :-1] for name in COLUMNS}
+    t, state = motion.t, motion.state[:, :, :-1]
     if t[0] > 0:
         t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, first)
-        still = {name: np.zeros((1, len(start))) for name in COLUMNS} | {"position": start[None]}
-        columns = {name: np.vstack([still[name], column]) for name, column in columns.items()}
+        still = np.zeros((4, 1, len(start)))
+        still[0, 0] = start
+        state = np.concatenate([still, state], axis=1)
+    position, velocity, acceleration, jerk = state
     return AxisMotion(
         axes=toolpath.axes,
         t=t,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
         block=toolpath.block[segment],
         line=toolpath.line[segment],
-        end=float(pieces.end[-1]),
-        **columns,
+        end=float(motion.end[-1]),
     )

@@ -9,175 +9,109 @@ this curvature in the osculating plane (paper 001, par. 9 to 17): with the unit 
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.corners.elements import element_point, to_arc_length
-from planner.fir.schedule import lower_between
+from planner.fir.columns import per_leg, picked
+from planner.fir.command import lower_between
+from planner.fir.polyline import Polyline
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 from planner.path.samples import PathSamples
 
-SAGITTA = 0.01  # deviation of the chords from the path [share of the tolerance]
-TURN = 0.1  # from one chord to the next [rad]
-# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s].
+# Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their turning from one to the next
+# [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4. Motions of ten jobs hardly depend on it (0.2: 0.004 % slower).
+SAGITTA, TURN = 0.01, 0.1
+# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s]: from 2 ms to 0.35 s, as filters
+# come, each 1.6 times the one before, by which a chord may be slow for longer than it should.
 CUTS = 2e-3 * 1.6 ** np.arange(12)
 STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
-COLUMNS = (
-    "point",
-    "s",
-    "length",
-    "feed",
-    "programmed",
-    "kappa",
-    "v_acc",
-    "v_jerk",
-    "tol",
-    "corner",
-    "sin_half",
-    "whole",
-    "segment",
-)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Guide:
-    """P points in G runs from rest to rest: first[g] .. first[g+1] - 1, the last of them the run's end, which is the next one's start.
+class ChordGuide(Polyline):
+    """The chords of a smooth path, with what paper 001's formulas need of each.
 
-    Values of the chord from each point to the next; at the end of a run there is none, its length is 0.
-
-    axes    : axis letters
-    first   : (G+1,)
-    dwell   : (G+1,) standstill before the first run and after each [s]
-    point   : (P, A) [mm]
-    s       : (P,) length along the chords from the start of the job [mm]
-    length  : (P,) of the chord [mm]
-    feed    : (P,) programmed feed, at most what the axes' velocities allow [mm/s]
-    programmed : (P,) programmed feed, inf for rapids [mm/s]
-    kappa   : (P,) largest curvature of the path at the chord [1/mm]
-    v_acc, v_jerk : (P,) speeds that the axes' accelerations and jerks allow on a circle of that curvature [mm/s]; inf if straight
-    tol     : (P,) what filters and interpolation may use of the tolerance [mm]
-    corner  : (P,) joint whose rounded corner the chord belongs to, ascending, or -1
-    sin_half: (P,) sine of half the turning angle there
-    whole   : (P,) tolerance, with what the rounding uses of it [mm]
-    segment : (P,) segment of the toolpath
+    programmed : (R,) programmed feed, inf for rapids [mm/s]
+    kappa   : (R,) largest curvature of the path at the chord [1/mm]
+    v_acc, v_jerk : (R,) speeds that the axes' accelerations and jerks allow on a circle of that curvature [mm/s]; inf if straight
+    tol     : (R,) what filters and interpolation may use of the tolerance [mm]
+    corner  : (R,) joint whose rounded corner the chord belongs to, ascending, or -1
+    sin_half: (R,) sine of half the turning angle there
+    whole   : (R,) tolerance, with what the rounding uses of it [mm]
+    segment : (R,) segment of the toolpath
     """
 
-    axes: tuple[str, ...]
-    first: Array
-    dwell: FloatArray
-    point: FloatArray
-    s: FloatArray
-    length: FloatArray
-    feed: FloatArray
-    programmed: FloatArray
-    kappa: FloatArray
-    v_acc: FloatArray
-    v_jerk: FloatArray
-    tol: FloatArray
-    corner: Array
-    sin_half: FloatArray
-    whole: FloatArray
-    segment: Array
-
-    def __post_init__(self) -> None:
-        points = len(self.point)
-        freeze(self, "first", np.int64, (None,))
-        freeze(self, "dwell", np.float64, (len(self.first),))
-        freeze(self, "point", np.float64, (points, len(self.axes)))
-        for name in ("s", "length", "kappa", "tol", "sin_half", "whole"):
-            freeze(self, name, np.float64, (points,))
-        for name in ("feed", "programmed", "v_acc", "v_jerk"):
-            freeze(self, name, np.float64, (points,), finite=False)
-        for name in ("corner", "segment"):
-            freeze(self, name, np.int64, (points,))
-
-    def __len__(self) -> int:
-        return len(self.point)
+    feed: FloatArray = per_leg(finite=False)
+    programmed: FloatArray = per_leg(finite=False)
+    kappa: FloatArray = per_leg()
+    v_acc: FloatArray = per_leg(finite=False)
+    v_jerk: FloatArray = per_leg(finite=False)
+    tol: FloatArray = per_leg()
+    corner: Array = per_leg(np.int64)
+    sin_half: FloatArray = per_leg()
+    whole: FloatArray = per_leg()
+    segment: Array = per_leg(np.int64)
 
     @property
-    def runs(self) -> int:
-        """G."""
-        return len(self.first) - 1
-
-    @property
-    def run(self) -> Array:
-        """(P,) run of each point."""
-        return np.repeat(np.arange(self.runs), np.diff(self.first))
-
-    @property
-    def direction(self) -> FloatArray:
-        """(P, A) unit vector of each chord; 0 at the end of a run."""
-        way = np.diff(self.point, axis=0, append=self.point[-1:])
-        length = self.length[:, None]
-        return np.divide(way, length, out=np.zeros_like(way), where=length > 0)
-
-    def largest(self, value: FloatArray) -> FloatArray:
-        """(G,) the largest of a value per chord (P,) in each run."""
-        return np.maximum.reduceat(value, self.first[:-1])
-
-    def pick(self, chosen: Array) -> Guide:
-        """The runs `chosen` (G,) by themselves, without dwells."""
-        rows = chosen[self.run]
-        size = np.diff(self.first)[chosen]
-        return Guide(
-            axes=self.axes,
-            first=np.concatenate([[0], np.cumsum(size)]),
-            dwell=np.zeros(len(size) + 1),
-            **{name: getattr(self, name)[rows] for name in COLUMNS},
-        )
+    def budget(self) -> FloatArray:
+        """(R, 2) the same on both halves of a chord [mm]."""
+        return np.stack([self.tol, self.tol], axis=1)
 
 
-def cut_beside_slower(guide: Guide) -> Guide:
+def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
     """The same guide with its chords cut beside feeds that are lower than theirs, by what those run in the times `CUTS`: filters make
     them hold on there (`feeds_held`), and a long chord should not have to as a whole."""
-    change = np.flatnonzero(guide.programmed[1:] != guide.programmed[:-1]) + 1
-    change = change[np.diff(guide.run)[change - 1] == 0]
+    change = np.flatnonzero((guide.programmed[1:] != guide.programmed[:-1]) & guide.inner[1:-1]) + 1
     before, after = guide.programmed[change - 1], guide.programmed[change]
     way = np.where(before < after, before, -after)[:, None] * CUTS
-    run = np.repeat(guide.run[change], len(CUTS))
+    stretch = np.repeat(guide.stretch[change], len(CUTS))
     s = (guide.s[change, None] + way).ravel()
-    inside = (s > guide.s[guide.first[run]]) & (s < guide.s[guide.first[run + 1] - 1])
+    inside = (s > guide.s[guide.first[stretch]]) & (s < guide.s[guide.first[stretch + 1]])
     s = np.setdiff1d(s[inside], guide.s)
     at = np.searchsorted(guide.s, s, side="right") - 1  # the chord that is cut
     rows = np.insert(np.arange(len(guide)), at + 1, at)
-    new = np.insert(np.zeros(len(guide), bool), at + 1, True)
-    columns = {name: getattr(guide, name)[rows] for name in COLUMNS}
-    columns["s"][new] = s
-    columns["point"][new] += (s - guide.s[at])[:, None] * guide.direction[at]
-    columns["length"] = np.where(columns["length"] > 0, np.append(np.diff(columns["s"]), 0.0), 0.0)
-    first = guide.first + np.searchsorted(at, guide.first - 1, side="right")
-    return Guide(axes=guide.axes, first=first, dwell=guide.dwell, **columns)
+    columns = picked(guide, {"leg": rows, "joint": np.arange(len(guide) + 1)})
+    cuts = guide.point[at] + (s - guide.s[at])[:, None] * guide.direction[at]
+    columns["point"] = np.insert(guide.point, at + 1, cuts, axis=0)
+    columns["s"] = np.insert(guide.s, at + 1, s)
+    columns["length"] = np.diff(columns["s"])
+    first = guide.first + np.searchsorted(at, guide.first)
+    return dataclasses.replace(guide, first=first, **columns)
 
 
-def feeds_held(guide: Guide, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """Speeds (P,) up to which the chords keep the programmed feeds behind filters T1, T2 (G,) of the runs.
+def feeds_held(guide: ChordGuide, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """Speeds (R,) up to which the chords keep the programmed feeds behind filters T1, T2 (S,) of the stretches.
 
     Where the filtered motion is at s, the command has been within V Td/2 of it if it ran there at V at most; so a feed V that is lower
     than those beside it has to hold on V Td/2 before and behind.
     """
     speed = guide.programmed.copy()
-    new_run = np.diff(guide.run, prepend=-1) != 0
-    edge = np.flatnonzero(new_run | (guide.programmed != np.roll(guide.programmed, 1)))
-    run, value = guide.run[edge], guide.programmed[edge]
+    edge = np.flatnonzero(~guide.inner[:-1] | (guide.programmed != np.roll(guide.programmed, 1)))
+    stretch, value = guide.stretch[edge], guide.programmed[edge]
     ends = np.append(edge[1:], len(guide))  # one behind the last chord of each feed
-    beside = np.append(run[1:] == run[:-1], False)
+    beside = np.append(stretch[1:] == stretch[:-1], False)
     lower = np.append(value[1:] > value[:-1], False) & beside
     lower[1:] |= (value[:-1] > value[1:]) & beside[:-1]
-    edge, ends, run, value = edge[lower], ends[lower], run[lower], value[lower]
-    reach = value * (T1 + T2)[run] / 2
-    low, high = guide.first[run], guide.first[run + 1] - 1
+    edge, ends, stretch, value = edge[lower], ends[lower], stretch[lower], value[lower]
+    reach = value * (T1 + T2)[stretch] / 2
+    low, high = guide.first[stretch], guide.first[stretch + 1]
     begin = np.searchsorted(guide.s, guide.s[edge] - reach, side="right") - 1
-    end = np.searchsorted(guide.s, guide.s[np.minimum(ends, high)] + reach, side="left")
+    end = np.searchsorted(guide.s, guide.s[ends] + reach, side="left")
     order = np.argsort(value)
     lower_between(order, value, np.maximum(begin, low), np.clip(end, edge + 1, high), speed)
     return speed
 
 
-def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
+def guide_of_path(
+    samples: PathSamples, machine: Machine, own: tuple[float, float] | None = None
+) -> ChordGuide:
     """The chords of a smooth path."""
     path, segment = samples.path, samples.segment
     toolpath = path.toolpath
@@ -192,7 +126,7 @@ def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
     parts = np.maximum(parts, 1).astype(np.int64)
     parts[samples.piece[1:] - 1] = 1
     start, end = (np.empty((parts.sum(), 4, len(toolpath.axes))) for _ in range(2))
-    _evaluate(*samples.table, samples.element, samples.w0, samples.w1, parts, start, end)
+    _evaluate(_Path(*samples.table, samples.element, samples.w0, samples.w1), parts, start, end)
     row = np.repeat(np.arange(len(samples)), parts)
     first = np.concatenate([[0], np.cumsum(parts)])[samples.piece]
     made = _guide(
@@ -201,24 +135,33 @@ def guide_of_path(samples: PathSamples, machine: Machine) -> Guide:
         end,
         axes=toolpath.axes,
         first=first,
+        own=own,
         dwell=toolpath.dwell[path.legs.first[samples.stop]],
-        feed=toolpath.feed[segment][row],
-        tol=tol[row],
-        corner=corner[row],
-        sin_half=np.where(corner >= 0, np.sin(path.theta[corner] / 2), 0.0)[row],
-        whole=whole[row],
-        segment=segment[row],
+        columns={
+            "feed": toolpath.feed[segment][row],
+            "tol": tol[row],
+            "corner": corner[row],
+            "sin_half": np.where(corner >= 0, np.sin(path.theta[corner] / 2), 0.0)[row],
+            "whole": whole[row],
+            "segment": segment[row],
+        },
     )
     return cut_beside_slower(made)
 
 
 def guide_of_curve(
-    curve: Nurbs, machine: Machine, feed: float, tolerance: float, blocks: FloatArray, reversals: FloatArray
-) -> Guide:
+    curve: Nurbs,
+    machine: Machine,
+    feed: float,
+    tolerance: float,
+    blocks: FloatArray,
+    reversals: FloatArray,
+    own: tuple[float, float] | None = None,
+) -> ChordGuide:
     """The chords of a curve at `feed` [mm/s] within `tolerance` [mm]; full stops at its kinks and reversals.
 
     blocks    : (B+1,) parameters of the ends of the program's blocks
-    reversals : (R,) those of them at which the blocks turn back: cusps sharper than the chords
+    reversals : (n,) those of them at which the blocks turn back: cusps sharper than the chords
     """
     u = curve.stations(SAGITTA * tolerance)
     kappa = [
@@ -241,13 +184,16 @@ def guide_of_curve(
         end,
         axes=curve.axes,
         first=np.concatenate([[0], np.flatnonzero(closing) + 1]),
+        own=own,
         dwell=np.zeros(len(stops) + 1),
-        feed=np.full(count, feed),
-        tol=np.full(count, tolerance),
-        corner=np.full(count, -1),
-        sin_half=np.zeros(count),
-        whole=np.full(count, tolerance),
-        segment=np.clip(np.searchsorted(blocks, at, side="right") - 1, 0, len(blocks) - 2),
+        columns={
+            "feed": np.full(count, feed),
+            "tol": np.full(count, tolerance),
+            "corner": np.full(count, -1),
+            "sin_half": np.zeros(count),
+            "whole": np.full(count, tolerance),
+            "segment": np.clip(np.searchsorted(blocks, at, side="right") - 1, 0, len(blocks) - 2),
+        },
     )
 
 
@@ -258,58 +204,79 @@ def _guide(
     *,
     axes: tuple[str, ...],
     first: Array,
-    feed: FloatArray,
-    tol: FloatArray,
-    **columns: Array,
-) -> Guide:
-    """From points and arc-length derivatives (P, 4, A) at start and end of each chord, and the columns of the record."""
+    own: tuple[float, float] | None,
+    dwell: FloatArray,
+    columns: dict[str, Array],
+) -> ChordGuide:
+    """From points and arc-length derivatives (P, 4, A) at start and end of each chord; each stretch ends with one that has no length.
+
+    first   : (S+1,) first row of each stretch
+    columns : of the record, (P,); `feed` as programmed, `tol` with what the chords use of it
+    """
     way = end[:, 0] - start[:, 0]
     way[first[1:] - 1] = 0.0
     length = np.linalg.norm(way, axis=1)
-    velocity, acceleration, jerk = (machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk"))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        axes_allow = np.where(length > 0, length * (velocity / np.abs(way)).min(axis=1), np.inf)
-    speeds = [_circle_speeds(side, acceleration, jerk) for side in (start, end)]
-    return Guide(
+    moving = length > 0
+    start, end, way, length = start[moving], end[moving], way[moving], length[moving]
+    columns = {name: column[moving] for name, column in columns.items()}
+    with np.errstate(divide="ignore", over="ignore"):
+        axes_allow = length * (machine.limits("velocity", axes) / np.abs(way)).min(axis=1)
+    speeds = [_circle_speeds(side, machine, axes) for side in (start, end)]
+    programmed = columns.pop("feed")
+    columns["tol"] = columns["tol"] * (1 - SAGITTA)
+    return ChordGuide(
         axes=axes,
-        first=first,
-        point=start[:, 0],
-        s=np.concatenate([[0.0], np.cumsum(length)[:-1]]),
+        own=own,
+        first=np.append(0, np.cumsum(moving)[first[1:] - 1]),
+        dwell=dwell,
+        point=np.vstack([start[:, 0], end[-1:, 0]]),
+        s=np.append(0.0, np.cumsum(length)),
         length=length,
-        feed=np.minimum(feed, axes_allow),
-        programmed=feed,
+        direction=way / length[:, None],
+        feed=np.minimum(programmed, axes_allow),
+        programmed=programmed,
         kappa=np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end))),
         v_acc=np.minimum(speeds[0][0], speeds[1][0]),
         v_jerk=np.minimum(speeds[0][1], speeds[1][1]),
-        tol=tol - SAGITTA * tol,
         **columns,
     )
 
 
 def _circle_speeds(
-    by_s: FloatArray, acceleration: FloatArray, jerk: FloatArray
+    by_s: FloatArray, machine: Machine, axes: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray]:
     """v_acc and v_jerk (P,) from point and derivatives by the arc length (P, 4, A)."""
     kappa = np.linalg.norm(by_s[:, 2], axis=1)
     bent = kappa[:, None] > STRAIGHT
     normal = np.divide(by_s[:, 2], kappa[:, None], out=np.zeros_like(by_s[:, 2]), where=bent)
     amplitude = np.where(bent, np.sqrt(by_s[:, 1] ** 2 + normal**2), 0.0)
-    with np.errstate(divide="ignore"):
-        a, j = ((limit / amplitude).min(axis=1) for limit in (acceleration, jerk))
+    with np.errstate(divide="ignore", over="ignore"):
+        a, j = ((machine.limits(q, axes) / amplitude).min(axis=1) for q in ("acceleration", "jerk"))
         return np.sqrt(a / kappa), np.cbrt(j / kappa**2)
 
 
+class _Path(NamedTuple):
+    """The intervals of a sampled path, for the kernels (corners/elements.py)."""
+
+    legs: Array
+    corners: Array
+    spans: Array
+    element: Array
+    w0: FloatArray
+    w1: FloatArray
+
+
 @njit(cache=True, error_model="numpy")
-def _evaluate(legs, corners, spans, element, w0, w1, parts, start, end):
+def _evaluate(path, parts, start, end):
     """Point and arc-length derivatives at start and end of all parts of the intervals, into start and end (n, 4, A)."""
     work = np.empty((2, 4, start.shape[2]))
     n = 0
-    for i in range(len(element)):
-        w_ref = 0.5 * (w0[i] + w1[i])
+    for i in range(len(path.element)):
+        w_ref = 0.5 * (path.w0[i] + path.w1[i])
         for p in range(parts[i]):
             for side in range(2):
                 out = start[n] if side == 0 else end[n]
-                w = w0[i] + (w1[i] - w0[i]) * (p + side) / parts[i]
-                element_point(legs, corners, spans, element[i], w, w_ref, work, out)
+                w = path.w0[i] + (path.w1[i] - path.w0[i]) * (p + side) / parts[i]
+                element_point(path.legs, path.corners, path.spans, path.element[i], w, w_ref, work, out)
                 to_arc_length(out)
             n += 1

@@ -11,9 +11,8 @@ On a circle the filtered point runs on another one, exactly rho [1 - sinc(v T1/2
 sin x / x; the second order is larger than that, by 0.9 % at a phase lag of 30 degrees.
 
 Where the curvature varies within the length that the filters cover, none of this is a bound (docs/papers.md, paper 001), nor is it
-needed:
-what the filters see at the constant speed v is the mean of the path with their kernel as weight. By a rule with two nodes that has
-the kernel's second and fourth moment mu2, mu4,
+needed: what the filters see at the constant speed v is the mean of the path with their kernel as weight. By a rule with two nodes that
+has the kernel's second and fourth moment mu2, mu4,
 
     D = p(s - v x) + p(s + v x) - 2 p(s),   error w |D|,   acceleration D/x^2,      x^2 = mu4/mu2,   w = mu2^2/(2 mu4).
 
@@ -28,11 +27,13 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.constraints.bounds import filter_error, phase_lag
 from planner.corners.fir import overlap_time
-from planner.fir.guide import Guide
+from planner.fir.guide import ChordGuide
+from planner.machine import Machine
 
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
-# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured afterwards.
+# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured
+# afterwards, and ten jobs hardly care (0.2: 0.01 % faster).
 MEAN_OVER = 0.02
 
 
@@ -53,31 +54,32 @@ def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> Float
 
 
 def filter_lengths(
-    guide: Guide, speed: FloatArray, acceleration: FloatArray, jerk: FloatArray, margins: FloatArray
+    guide: ChordGuide, speed: FloatArray, machine: Machine, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (G,) [s] for speeds (P,) on the chords and limits of the axes (A,): T1 = V/A and T1 T2 = V/J, each times its margin
-    (2, G), or both the same where V is too small to reach A."""
+    """T1 >= T2 (S,) [s] for speeds (R,) on the chords: T1 = V/A and T1 T2 = V/J with the axes' limits along them, each times its margin
+    (S, 2), or both the same where V is too small to reach A."""
     along = speed[:, None] * np.abs(guide.direction)
-    along[guide.length == 0] = 0.0
-    by_a = guide.largest((along / acceleration).max(axis=1)) * margins[0]
-    by_j = guide.largest((along / jerk).max(axis=1)) * margins[1]
+    by_a, by_j = (
+        guide.largest((along / machine.limits(q, guide.axes)).max(axis=1)) for q in ("acceleration", "jerk")
+    )
+    by_a, by_j = by_a * margin[:, 0], by_j * margin[:, 1]
     T1 = np.maximum(by_a, np.sqrt(by_j))
     return T1, by_j / T1
 
 
-def v_sc(guide: Guide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
-    """The paper's speed on each chord (P,) behind filters T1, T2 (G,) of the runs."""
-    T1, T2 = T1[guide.run], T2[guide.run]
+def v_sc(guide: ChordGuide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
+    """The paper's speed on each chord (R,) behind filters T1, T2 (S,) of the stretches."""
+    T1, T2 = T1[guide.stretch], T2[guide.stretch]
     by_filters = v_eps(guide.kappa, guide.tol, T1, T2), v_ph(guide.kappa, phi, T1, T2)
     return np.min([guide.feed, guide.v_acc, guide.v_jerk, *by_filters], axis=0)
 
 
 def first_speeds(
-    guide: Guide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
+    guide: ChordGuide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """Speeds (P,) up to `most` (P,) to begin with, too fast rather than too slow: what either the curvature beside a chord or the
+    """Speeds (R,) up to `most` (R,) to begin with, too fast rather than too slow: what either the curvature beside a chord or the
     mean of the path allows, and corners for as long as the gap takes."""
-    local = np.minimum(guide.v_acc, v_eps(guide.kappa, guide.tol, T1[guide.run], T2[guide.run]))
+    local = np.minimum(guide.v_acc, v_eps(guide.kappa, guide.tol, T1[guide.stretch], T2[guide.stretch]))
     v = np.minimum(most, local)
     bent = np.flatnonzero(local < most)
     v[bent] = np.maximum(v[bent], _v_mean(guide, bent, most[bent], acceleration, T1, T2))
@@ -85,14 +87,14 @@ def first_speeds(
 
 
 def _v_mean(
-    guide: Guide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
+    guide: ChordGuide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
     """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows (module text)."""
-    run = guide.run[at]
+    run = guide.stretch[at]
     T1, T2 = T1[run], T2[run]
     second, fourth = (T1**2 + T2**2) / 12.0, (T1**4 + T2**4) / 80.0 + T1**2 * T2**2 / 24.0
     x, w = np.sqrt(fourth / second), second**2 / (2.0 * fourth)
-    begin, end = guide.s[guide.first[run]], guide.s[guide.first[run + 1] - 1]
+    begin, end = guide.s[guide.first[run]], guide.s[guide.first[run + 1]]
     half = 0.5 * guide.length[at]
     here, middle = guide.s[at] + half, guide.point[at] + half[:, None] * guide.direction[at]
     v, open_ = most.copy(), np.arange(len(at))
@@ -100,7 +102,7 @@ def _v_mean(
         k = open_
         reach = np.minimum(
             v[k] * x[k], np.minimum(here[k] - begin[k], end[k] - here[k])
-        )  # the path ends at a run's ends
+        )  # the path ends at a stretch's ends
         D = guide_point(guide, here[k] - reach) + guide_point(guide, here[k] + reach) - 2.0 * middle[k]
         by_error = w[k] * np.linalg.norm(D, axis=1) / guide.tol[at[k]]
         over = np.maximum(by_error, (np.abs(D) / acceleration).max(axis=1) / x[k] ** 2)
@@ -112,15 +114,15 @@ def _v_mean(
 
 
 def _slower_corners(
-    guide: Guide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
+    guide: ChordGuide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """(P,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1 elsewhere."""
-    chord = np.flatnonzero((guide.corner >= 0) & (guide.length > 0))
+    """(R,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1 elsewhere."""
+    chord = np.flatnonzero(guide.corner >= 0)
     by = np.ones(len(guide))
     if not len(chord):
         return by
     first = np.flatnonzero(np.diff(guide.corner[chord], prepend=-2))
-    at, run = chord[first], guide.run[chord[first]]
+    at, run = chord[first], guide.stretch[chord[first]]
     last = np.append(chord[first[1:] - 1], chord[-1])
     V = np.sqrt(most[at] * most[last])
     gap = T1[run] + T2[run] - overlap_time(guide.whole[at], V, guide.sin_half[at], T1[run], T2[run])
@@ -131,6 +133,6 @@ def _slower_corners(
     return by
 
 
-def guide_point(guide: Guide, s: FloatArray) -> FloatArray:
+def guide_point(guide: ChordGuide, s: FloatArray) -> FloatArray:
     """Points (n, A) of the chords at lengths (n,)."""
     return np.stack([np.interp(s, guide.s, axis) for axis in guide.point.T], axis=1)

@@ -14,6 +14,7 @@ by superposition of the edges that still have an effect, on what the interval th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,127 +29,134 @@ ANCHOR_EVERY = 32
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Pieces:
+class Filtered:
     """L pieces of constant jerk, over the A axes and the course (column A), in S stretches.
 
-    t            : (L,) start of each piece [s]
-    position     : (L, A+1) there [mm]
-    velocity     : (L, A+1) [mm/s]
-    acceleration : (L, A+1) [mm/s2]
-    jerk         : (L, A+1) on the piece [mm/s3]
-    first        : (S+1,) first piece of each stretch
-    end          : (S,) when each stretch is over, its dwell too [s]
+    t     : (L,) start of each piece [s]
+    state : (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the piece [mm/s3]
+    first : (S+1,) first piece of each stretch
+    end   : (S,) when each stretch is over, its dwell too [s]
     """
 
     t: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
+    state: FloatArray
     first: Array
     end: FloatArray
 
     def __post_init__(self) -> None:
-        pieces = len(self.t)
-        freeze(self, "t", np.float64, (pieces,))
-        for name in ("position", "velocity", "acceleration", "jerk"):
-            freeze(self, name, np.float64, (pieces, None))
+        freeze(self, "t", np.float64, (None,))
+        freeze(self, "state", np.float64, (4, len(self.t), None))
         freeze(self, "first", np.int64, (len(self.end) + 1,))
         freeze(self, "end", np.float64, (None,))
 
     def __len__(self) -> int:
         return len(self.t)
 
+    @property
+    def begin(self) -> FloatArray:
+        """(S,) start of each stretch [s]."""
+        return self.t[self.first[:-1]]
 
-def superpose(command: Command) -> Pieces:
+    @property
+    def ends(self) -> FloatArray:
+        """(L,) end of each piece [s]."""
+        return np.append(self.t[1:], self.end[-1])
+
+
+class _Command(NamedTuple):
+    """The fields of a `Command`, for the kernels."""
+
+    first: Array
+    t: FloatArray
+    velocity: FloatArray
+    position: FloatArray
+    T1: FloatArray
+    T2: FloatArray
+    begin: FloatArray
+    dwell: FloatArray
+
+
+def superpose(command: Command) -> Filtered:
     """Filter a command."""
     most = 4 * len(command.t) + len(command.begin)
     t, state = np.empty(most), np.empty((4, most, command.velocity.shape[1]))
     first = np.zeros(len(command.begin) + 1, np.int64)
-    for_all = (command.t, command.velocity, command.position)
-    n = _superpose(
-        *for_all, command.first, command.T1, command.T2, command.begin, command.dwell, t, state, first
-    )
-    return Pieces(
-        t=t[:n],
-        position=state[0, :n],
-        velocity=state[1, :n],
-        acceleration=state[2, :n],
-        jerk=state[3, :n],
-        first=first,
-        end=command.end,
-    )
+    n = _superpose(_Command(*(getattr(command, name) for name in _Command._fields)), t, state, first)
+    return Filtered(t=t[:n], state=state[:, :n], first=first, end=command.end)
 
 
 @njit(cache=True, error_model="numpy")
-def _superpose(t, velocity, position, first, T1, T2, begin, dwell, t_out, state, first_out):
+def _superpose(command, t_out, state, first_out):
     """Filter all stretches; returns the number of pieces."""
+    t, velocity = command.t, command.velocity
     axes = velocity.shape[1]
-    now_p, now_v, now_a, now_j = np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)
+    now = np.zeros((4, axes))  # position, velocity, acceleration, jerk
     n = 0
-    for k in range(len(begin)):
-        low, high = first[k], first[k + 1]
-        age = (0.0, T2[k], T1[k], T1[k] + T2[k])
+    for k in range(len(command.begin)):
+        low, high, T1, T2 = command.first[k], command.first[k + 1], command.T1[k], command.T2[k]
+        age = (0.0, T2, T1, T1 + T2)
         passed = np.full(4, low)  # edges before passed[m] are at least age[m] old
-        now, since, emitted = 0.0, ANCHOR_EVERY, -1.0
+        at, since, emitted = 0.0, ANCHOR_EVERY, -1.0
         first_out[k] = n
         while passed[3] < high:
             after = np.inf
             for m in range(4):
                 if passed[m] < high:
                     after = min(after, t[passed[m]] + age[m])
+            h = after - at
             for c in range(axes):
-                h = after - now
-                now_p[c] += h * (now_v[c] + h * (now_a[c] / 2.0 + h * now_j[c] / 6.0))
-                now_v[c] += h * (now_a[c] + h * now_j[c] / 2.0)
-                now_a[c] += h * now_j[c]
-            now, short = after, emitted >= 0.0 and after - emitted < SHORTEST_PIECE
+                now[0, c] += h * (now[1, c] + h * (now[2, c] / 2.0 + h * now[3, c] / 6.0))
+                now[1, c] += h * (now[2, c] + h * now[3, c] / 2.0)
+                now[2, c] += h * now[3, c]
+            at, short = after, emitted >= 0.0 and after - emitted < SHORTEST_PIECE
             for m in range(4):
-                while passed[m] < high and t[passed[m]] + age[m] <= now:
+                while passed[m] < high and t[passed[m]] + age[m] <= at:
                     passed[m] += 1
             since += 1
             if passed[0] == passed[3] or since >= max(ANCHOR_EVERY, 2 * (passed[0] - passed[3])):
-                _anchor(t, velocity, position, low, passed, T1[k], T2[k], now, now_p, now_v, now_a)
+                _anchor(command, k, passed, at, now)
                 since = 0
             for c in range(axes):
-                now_j[c] = 0.0
+                now[3, c] = 0.0
                 for m in range(4):
                     if passed[m] > low:
                         sign = 1.0 if m == 0 or m == 3 else -1.0
-                        now_j[c] += sign * velocity[passed[m] - 1, c]
-                now_j[c] /= T1[k] * T2[k]
+                        now[3, c] += sign * velocity[passed[m] - 1, c]
+                now[3, c] /= T1 * T2
             if short:
                 n -= 1
             if passed[3] < high:
                 for c in range(axes):
-                    state[3, n, c] = now_j[c]
+                    state[3, n, c] = now[3, c]
                 if not short:
-                    t_out[n], emitted = begin[k] + now, now
-                    for c in range(axes):
-                        state[0, n, c], state[1, n, c], state[2, n, c] = now_p[c], now_v[c], now_a[c]
+                    t_out[n], emitted = command.begin[k] + at, at
+                    for m in range(3):
+                        for c in range(axes):
+                            state[m, n, c] = now[m, c]
                 n += 1
-        if dwell[k] > 0.0:
-            t_out[n] = begin[k] + now
+        if command.dwell[k] > 0.0:
+            t_out[n] = command.begin[k] + at
             for c in range(axes):
-                state[0, n, c] = position[high - 1, c]
+                state[0, n, c] = command.position[high - 1, c]
                 state[1, n, c] = state[2, n, c] = state[3, n, c] = 0.0
             n += 1
-    first_out[len(begin)] = n
+    first_out[len(command.begin)] = n
     return n
 
 
 @njit(cache=True, error_model="numpy")
-def _anchor(t, velocity, position, low, passed, T1, T2, now, now_p, now_v, now_a):
-    """Position, velocity and acceleration at `now` by superposition; passed (4,): edges that are 0, T2, T1, Td old."""
-    axes, delay = velocity.shape[1], T1 + T2
-    base = passed[3] - 1
+def _anchor(command, k, passed, at, now):
+    """Position, velocity and acceleration at `at` by superposition, into now; passed (4,): edges that are 0, T2, T1, Td old."""
+    t, velocity, position = command.t, command.velocity, command.position
+    low, T1, T2 = command.first[k], command.T1[k], command.T2[k]
+    axes, delay, base = velocity.shape[1], T1 + T2, passed[3] - 1
     for c in range(axes):
-        now_p[c], now_v[c], now_a[c] = position[low, c], 0.0, 0.0
+        now[0, c], now[1, c], now[2, c] = position[low, c], 0.0, 0.0
         if base >= low:
-            now_v[c] = velocity[base, c]
-            now_p[c] = position[base, c] + now_v[c] * (now - t[base] - delay / 2.0)
+            now[1, c] = velocity[base, c]
+            now[0, c] = position[base, c] + now[1, c] * (at - t[base] - delay / 2.0)
     for e in range(passed[3], passed[0]):
-        x = now - t[e]
+        x = at - t[e]
         if e < passed[2]:
             rest = max(delay - x, 0.0)
             h, s = rest / (T1 * T2), 1.0 - rest * rest / (2.0 * T1 * T2)
@@ -160,6 +168,6 @@ def _anchor(t, velocity, position, low, passed, T1, T2, now, now_p, now_v, now_a
             h, s, r = x / (T1 * T2), x * x / (2.0 * T1 * T2), x**3 / (6.0 * T1 * T2)
         for c in range(axes):
             step = velocity[e, c] - (velocity[e - 1, c] if e > low else 0.0)
-            now_p[c] += step * r
-            now_v[c] += step * s
-            now_a[c] += step * h
+            now[0, c] += step * r
+            now[1, c] += step * s
+            now[2, c] += step * h

@@ -22,7 +22,6 @@ from math import factorial
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
@@ -83,9 +82,7 @@ class Nurbs:
             )
         inner = self.knots[(self.knots > self.knots[p]) & (self.knots < self.knots[count])]
         if np.unique(inner, return_counts=True)[1].max(initial=0) > p:
-            raise InputError(
-                f"NURBS: an inner knot is there more than {p} times, the curve would be torn there"
-            )
+            raise InputError(f"NURBS: an inner knot occurs more than {p} times, which breaks the curve")
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -100,6 +97,8 @@ class Nurbs:
     @cached_property
     def _polynomials(self) -> FloatArray:
         """(p+1, m, A+1) coefficients of numerator and denominator on each span, highest power first."""
+        from scipy.interpolate import BSpline  # 0.3 s, and few programs have a NURBS
+
         homogeneous = np.column_stack([self.points * self.weights[:, None], self.weights])
         spline = BSpline(self.knots, homogeneous, self.degree)
         powers = range(self.degree, -1, -1)

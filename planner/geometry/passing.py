@@ -83,11 +83,8 @@ def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Arra
     """(T,) segment of the toolpath that each point (T, A) of a motion is at, moving at `feed` (T,) [mm/s]; None where that cannot be
     told: the motion leaves the path, or does not end where it ends."""
     chain = chain_of(toolpath)
-    piece, crossed = np.empty(len(point), np.int64), np.empty(len(chain.vertex))
-    point = np.ascontiguousarray(point, dtype=np.float64)
-    if not in_order(*chain[:5], point, feed, piece, crossed):
-        return None
-    return chain.segment[piece]
+    found, piece, _ = in_order(chain, np.ascontiguousarray(point, dtype=np.float64), feed)
+    return chain.segment[piece] if found else None
 
 
 @njit(cache=True, error_model="numpy")
@@ -106,16 +103,24 @@ def _from_chord(begin, end, point):
 
 
 @njit(cache=True, error_model="numpy")
-def in_order(vertex, at_vertex, budget, skipped, cap, point, feed, piece, crossed):
-    """Match points (n, A) with feeds (n,) with a chain; the first arguments are fields of `Chain`. False where that fails.
+def in_order(chain, point, feed):
+    """Match points (n, A) with feeds (n,) with a chain.
 
-    piece   : (n,) written: the piece of each point
-    crossed : (K+1,) written: where each vertex is passed, the point before plus the share of the chord behind it
+    Returns whether that succeeds; (n,) the piece of each point; (K+1,) where each vertex is passed, the point before plus the share of
+    the chord behind it.
     """
+    vertex, at_vertex, budget, skipped, cap = (
+        chain.vertex,
+        chain.at_vertex,
+        chain.budget,
+        chain.skipped,
+        chain.feed,
+    )
     count, pieces = len(point), len(budget)
     cost, new = np.empty(pieces), np.empty(pieces)
     first, begin = np.empty(count, np.int64), np.empty(count, np.int64)
     cells, used = np.empty(4 * count + 64, np.uint8), 0
+    piece, crossed = np.empty(count, np.int64), np.empty(pieces + 1)
     low, high = 0, 0  # the pieces that the point before can be at
     for n in range(count):
         before = point[max(n - 1, 0)]
@@ -151,12 +156,12 @@ def in_order(vertex, at_vertex, budget, skipped, cap, point, feed, piece, crosse
                 break
             wide = 2.0 * wide if wide > 1.0 else FIRST_WIDER
             if wide > WIDEST:
-                return False
+                return False, piece, crossed
         first[n], begin[n], used = low, used, cell
         low, high = lowest, highest
         cost, new = new, cost
     if high != pieces - 1:
-        return False
+        return False, piece, crossed
     i = high
     crossed[0], crossed[pieces] = 0.0, count - 1.0
     for n in range(count - 1, -1, -1):
@@ -169,4 +174,4 @@ def in_order(vertex, at_vertex, budget, skipped, cap, point, feed, piece, crosse
             bit = THROUGH
     for i in range(pieces):
         crossed[i + 1] = max(crossed[i + 1], crossed[i])
-    return True
+    return True, piece, crossed

@@ -12,7 +12,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.geometry.legs import Legs
-from planner.geometry.passing import CHORD_SHARE, chain_of, in_order
+from planner.geometry.passing import CHORD_SHARE, Chain, chain_of, in_order
 from planner.geometry.spline import Spline, span_point
 from planner.geometry.toolpath import Toolpath
 
@@ -29,8 +29,7 @@ def passed_places(toolpath: Toolpath, legs: Legs, spline: Spline) -> FloatArray:
     end = place[legs.first[spline.joint_last]] + spline.x_last
     low = np.clip(np.searchsorted(place, begin, side="right") - 1, 0, len(toolpath) - 1)
     high = np.clip(np.searchsorted(place, end, side="left") - 1, low, len(toolpath) - 1)
-    chain = chain_of(toolpath)
-    _pass_runs(spline.spans, spline.first, low, high, *chain[:5], chain.first, place)
+    _pass_runs(spline.spans, spline.first, (low, high), chain_of(toolpath), place)
     return place
 
 
@@ -48,8 +47,14 @@ def _chords(spans, i, tolerance, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _pass_runs(spans, run_first, low, high, vertex, at_vertex, budget, skipped, feed, first, place):
-    """Write into place (M+1,) where the runs (Q,) pass the starts of the segments low+1 .. high; the fields of `Chain`."""
+def _pass_runs(spans, run_first, segments, chain, place):
+    """Write into place (M+1,) where the runs (Q,) pass the starts of their segments but the first.
+
+    run_first : (Q+1,) first span of each run
+    segments  : (Q,) first and (Q,) last segment of each run
+    """
+    low, high = segments
+    vertex, at_vertex, budget, skipped, feed, segment_of, first = chain
     axes = vertex.shape[1]
     out = np.empty((4, axes))
     for q in range(len(low)):
@@ -69,10 +74,16 @@ def _pass_runs(spans, run_first, low, high, vertex, at_vertex, budget, skipped, 
                 span_point(spans, i, tau, out)
                 point[n], at[n] = out[0], spans[i].begin + tau * spans[i].width
                 n += 1
-        piece, crossed, still = np.empty(count, np.int64), np.empty(b - a + 1), np.zeros(count)
-        matched = in_order(
-            vertex[a : b + 1], at_vertex[a : b + 1], budget[a:b], skipped[a:b], feed[a:b], point, still, piece, crossed
-        )  # fmt: skip
+        part_of_chain = Chain(
+            vertex[a : b + 1],
+            at_vertex[a : b + 1],
+            budget[a:b],
+            skipped[a:b],
+            feed[a:b],
+            segment_of[a:b],
+            first,
+        )
+        matched, _, crossed = in_order(part_of_chain, point, np.zeros(count))
         if not matched:
             continue
         for segment in range(low[q] + 1, high[q] + 1):

@@ -166,7 +166,7 @@ class Job:
         segment = segments_at(toolpath, trajectory.position, trajectory.feed)
         if segment is None:
             self.note(
-                "the motion leaves the programmed path: lines and blocks of the trajectory are where the method means to be"
+                "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
             )
             return trajectory
         return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
@@ -228,12 +228,12 @@ class Job:
         shaped = trajectory is None or isinstance(self.motion_of.get(trajectory), ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
             can = (
-                "--shaped does"
+                "give --shaped"
                 if method in (OPTIMAL, SECOND_ORDER)
-                else f"{OPTIMAL} and {SECOND_ORDER} can: --shaped"
+                else f"{OPTIMAL} and {SECOND_ORDER} do with --shaped"
             )
             self.note(
-                f"method {method} does not shape its set points for the machine's vibration modes; {can}"
+                f"method {method} does not shape its setpoints for the machine's vibration modes; {can}"
             )
 
 
@@ -381,6 +381,6 @@ def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
     less = (planned.tolerance < programmed.tolerance) & ~stops
     first = programmed.line[np.flatnonzero(stops | less)[0] - 1]
     return (
-        f"samples {made.machine.dt * 1e3:g} ms apart: corners planned with less of the tolerance {less.sum()}, full stops instead of "
-        f"corners {stops.sum()}, the first at the end of line {first}"
+        f"samples {made.machine.dt * 1e3:g} ms apart: {less.sum()} corners are planned with less of the tolerance, and "
+        f"{stops.sum()} are full stops; the first is at the end of line {first}"
     )

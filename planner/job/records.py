@@ -113,7 +113,7 @@ class PriceList:
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known
     saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE` more "tolerance" [s]
     ranges    : least and most time that a new plan may save [s]
-    hints     : names whose saving is told by its range only; `saved` is its middle, and no more than a hint
+    hints     : names whose saving is told by its range only; `saved` is its middle, and a hint only
     corners   : the corners with the largest savings; None where they are not known
     """
 

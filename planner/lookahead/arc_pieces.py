@@ -12,7 +12,6 @@ and on piece i starts with the velocity d_i - h_i (2 M_i + M_{i+1})/6 and has th
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from planner.base.arrays import Array, FloatArray
 
@@ -26,6 +25,8 @@ def spline_at_rest(
     position : (n + moves, A) points before and after every piece, move after move [mm]
     last     : (n + moves,) True at the last point of each move
     """
+    from scipy.linalg import solve_banded  # 0.2 s
+
     start = np.flatnonzero(~last)  # the points that a piece starts at
     h = np.zeros(len(position))
     h[start] = duration

@@ -1,4 +1,4 @@
-"""Corners at constant speed: how fast each may be, and the chain of stretches that a smooth path is with them.
+"""Corners at constant speed (paper 002): how fast each may be, and a smooth path as the chain of legs and corners for the look-ahead.
 
 At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k v^2 and the jerk r'''_k v^3, so that over a corner
 
@@ -21,12 +21,13 @@ from planner.constraints.assemble import feedrate_problem
 from planner.corners.allocation import filter_rate
 from planner.corners.elements import element_point, to_arc_length
 from planner.geometry.toolpath import Toolpath
+from planner.lookahead.look_ahead import LegLimits, Passage
+from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits
-from planner.lookahead.stretches import Stretches
 from planner.machine import Machine
 from planner.path.samples import PathSamples
 
-PARTS = 4  # of a grid interval, for its samples
+PARTS = 4  # of a grid interval, for its samples: peaks are then good to the fourth order (module text)
 # Limits along blocks that differ by less than this share are the same [-]: coordinates rounded to 1e-9 of a block's length.
 SAME = 1e-9
 QUANTITIES = ("acceleration", "jerk")
@@ -47,13 +48,14 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     """The largest speed at which each corner of a path can be run through from end to end."""
     axes = samples.path.toolpath.axes
     limits = np.array([machine.limits("acceleration", axes), machine.limits("jerk", axes)])
-    problem = feedrate_problem(samples, machine)
+    problem = feedrate_problem(samples, machine.with_own(()))
     interval = samples.intervals
     at = interval[samples.element[interval] < 0]
     joint = ~samples.element[at]
     bends = np.zeros((len(at), 2))
     which = np.zeros((len(at), 2), np.int64)
-    _bends(*samples.table, samples.element[at], samples.w0[at], samples.w1[at], limits, bends, which)
+    on = Intervals(*samples.table, samples.element[at], samples.w0[at], samples.w1[at])
+    _bends(on, limits, bends, which)
     ends = np.where(problem.feed_sq_max[at] <= problem.feed_sq_max[at + 1], at, at + 1)
     with np.errstate(divide="ignore"):
         bounds = np.stack(
@@ -72,10 +74,25 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     return CornerSpeeds(speed, names[limited_by])
 
 
-def stretches_of(
-    samples: PathSamples, machine: Machine, corner_speed: FloatArray
-) -> tuple[Stretches, FloatArray]:
-    """The chain of stretches of a sampled path, and where (M,) each begins [mm].
+class CornerChain(NamedTuple):
+    """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only the limits change.
+
+    legs    : what is free between two joints, each with what the corners beside it took of their legs
+    passage : of every joint
+    joint   : (n+1,) the path's joint if it is a corner, -1 otherwise
+    run     : (n,) which run between full stops a leg belongs to
+    begin   : (n,) where each leg begins, or the corner before it [mm]
+    """
+
+    legs: LegLimits
+    passage: Passage
+    joint: Array
+    run: Array
+    begin: FloatArray
+
+
+def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArray) -> CornerChain:
+    """The chain of legs and corners of a sampled path.
 
     corner_speed : (R+1,) largest speed of each joint's corner [mm/s]
 
@@ -90,22 +107,36 @@ def stretches_of(
     other = (np.abs(np.diff(limits)) > SAME * limits[:, 1:]).any(axis=0) & (joint[1:] < 0)
     change = (np.diff(run) != 0) | (np.diff(joint) != 0) | other
     first = np.insert(np.flatnonzero(change) + 1, 0, 0)
-    joint, run, (v, a, j) = joint[first], run[first], np.minimum.reduceat(limits, first, axis=1)
     begin = samples.s[at[first]]
+    length = samples.s[at[np.append(first[1:], len(at)) - 1] + 1] - begin
+    joint, run, limits = joint[first], run[first], np.minimum.reduceat(limits, first, axis=1)
     corner = joint >= 0
     bare = (corner[:-1] & corner[1:]) | ((np.diff(run) != 0) & (corner[:-1] | corner[1:]))
     if bare.any() or corner[0] or corner[-1]:
-        raise ValueError("stretches_of: corners must leave a part of every leg free")
-    return Stretches(
-        run=run,
-        joint=joint,
-        length=samples.s[at[np.append(first[1:], len(at)) - 1] + 1] - begin,
-        v=np.where(corner, corner_speed[joint], v),
-        a=a,
-        j=j,
-        d_in=np.where(corner, path.d_in[joint], 0.0),
-        d_out=np.where(corner, path.d_out[joint], 0.0),
-    ), begin
+        raise ValueError("corner_chain: corners must leave a part of every leg free")
+
+    leg = np.flatnonzero(~corner)
+    v, a, j = limits[:, leg]
+    before = np.insert(leg[1:] - 1, 0, 0)  # what is before each leg: a corner, or a leg
+    where = np.append(np.where(corner[before], joint[before], -1), -1)
+    turns = where >= 0
+    d_in, d_out = (np.where(turns, d[where], 0.0) for d in (path.d_in, path.d_out))
+    stop = np.append(np.insert(np.diff(run[leg]) != 0, 0, True), True)
+    beside = np.minimum(np.append(v, np.inf), np.insert(v, 0, np.inf))
+    passage = Passage(
+        kind=np.where(stop, JointKind.STOP, np.where(turns, JointKind.CONSTANT, JointKind.PASS)),
+        V=np.where(stop, 0.0, np.where(turns, np.minimum(corner_speed[where], beside), beside)),
+        p=d_in,
+        q=d_out,
+        r=np.where(turns, np.append(length[before], 0.0), 0.0),
+    )
+    return CornerChain(
+        legs=LegLimits(length=length[leg] + d_out[:-1] + d_in[1:], v=v, a=a, j=j),
+        passage=passage,
+        joint=where,
+        run=run[leg],
+        begin=np.where(turns[:-1], begin[before], begin[leg]),
+    )
 
 
 def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
@@ -117,18 +148,28 @@ def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
     return np.stack([v, a, j])
 
 
+class Intervals(NamedTuple):
+    """Grid intervals on corners: where the kernels evaluate the path (corners/elements.py)."""
+
+    legs: Array
+    corners: Array
+    spans: Array
+    element: Array
+    w0: FloatArray
+    w1: FloatArray
+
+
 @njit(cache=True, error_model="numpy")
-def _bends(legs, corners, spans, element, w0, w1, limits, bends, which):
-    """max_k |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and the axes k into which (n, 2)."""
+def _bends(on, limits, bends, which):
+    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and the axes k into which (n, 2)."""
     axes = limits.shape[1]
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     values = np.empty((2, axes, PARTS + 1))
-    for i in range(len(element)):
-        w_ref = 0.5 * (w0[i] + w1[i])
+    for i in range(len(on.element)):
+        w_ref = 0.5 * (on.w0[i] + on.w1[i])
         for p in range(PARTS + 1):
-            element_point(
-                legs, corners, spans, element[i], w0[i] + (w1[i] - w0[i]) * p / PARTS, w_ref, work, here
-            )
+            w = on.w0[i] + (on.w1[i] - on.w0[i]) * p / PARTS
+            element_point(on.legs, on.corners, on.spans, on.element[i], w, w_ref, work, here)
             to_arc_length(here)
             for k in range(axes):
                 values[0, k, p], values[1, k, p] = here[2, k], here[3, k]

@@ -22,11 +22,11 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.geometry.chords import arc_point
-from planner.geometry.legs import Legs as PathLegs
+from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Toolpath
 from planner.lookahead.arc_pieces import spline_at_rest
-from planner.lookahead.look_ahead import Legs, Passage
-from planner.lookahead.ramps import ENTRY, ZERO, corner_at, leg_end, leg_top, phase_times_of
+from planner.lookahead.look_ahead import LegLimits, Passage
+from planner.lookahead.ramps import ENTRY, PHASES, ZERO, corner_at, leg_end, leg_phases, phase_times_of
 
 # A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius.
 ARC_PIECE = 0.01
@@ -41,12 +41,11 @@ ARC_SHORTEST = 2e-5
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
 
-class Pieces(NamedTuple):
-    """L pieces of constant jerk.
+class Rows(NamedTuple):
+    """L pieces of constant jerk, as the kernels write them.
 
     joint    : (L,) the joint k that the piece is anchored at
     leg      : (L,) the leg it belongs to
-    segment  : (L,) the toolpath's segment
     duration : (L,) [s], > 0
     before   : (L, 4) c1 and its derivatives at the start
     after    : (L, 4) c2
@@ -54,43 +53,45 @@ class Pieces(NamedTuple):
 
     joint: Array
     leg: Array
-    segment: Array
     duration: FloatArray
     before: FloatArray
     after: FloatArray
 
 
-def pieces_of(passage: Passage, legs: Legs, path: PathLegs, dwell: FloatArray, turning: FloatArray) -> Pieces:
+class CornerPieces(NamedTuple):
+    """L pieces of constant jerk, and the toolpath's segment (L,) that each belongs to."""
+
+    rows: Rows
+    segment: Array
+
+
+def corner_pieces(passage: Passage, limits: LegLimits, path: Legs, dwell: FloatArray) -> CornerPieces:
     """The motion of a look-ahead.
 
-    path    : the same legs with their segments
-    dwell   : (n+1,) standstill at each joint [s]
-    turning : (n,) turning of legs that are arcs [rad/mm], 0 on straight ones
+    path  : the same legs with their segments
+    dwell : (n+1,) standstill at each joint [s]
     """
-    chosen = (passage.kind, passage.V, passage.p, passage.q)
-    limits = (legs.length, legs.v, legs.a, legs.j)
-    rows = _empty(0)
-    rows = _empty(_emit(*chosen, *limits, dwell, turning, *rows))
-    _emit(*chosen, *limits, dwell, turning, *rows)
-    cut = _empty(len(rows[0]) + len(path.offset))
-    segment = np.zeros(len(cut[0]), np.int64)
-    count = _cut(*rows, legs.length, path.first, path.offset, *cut, segment)
-    joint, leg, duration, before, after = (column[:count] for column in cut)
-    return Pieces(joint, leg, segment[:count], duration, before, after)
+    rows = _empty(_emit(passage.table, limits.table, dwell, _empty(0)))
+    _emit(passage.table, limits.table, dwell, rows)
+    cut = _empty(len(rows.leg) + len(path.offset))
+    segment = np.zeros(len(cut.leg), np.int64)
+    count = _cut(rows, limits.length, path.first, path.offset, cut, segment)
+    return CornerPieces(Rows(*(column[:count] for column in cut)), segment[:count])
 
 
 def along_axes(
-    pieces: Pieces, path: PathLegs, toolpath: Toolpath
+    pieces: CornerPieces, path: Legs, toolpath: Toolpath
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Position, velocity, acceleration and jerk (L, A) of the axes at the start of every piece."""
     vertex = np.vstack([path.table["start"], toolpath.end[-1:]])
     direction = path.table["direction"]
-    u1, u2 = direction[np.maximum(pieces.joint - 1, 0)], direction[np.minimum(pieces.joint, len(path) - 1)]
+    joint, before, after = pieces.rows.joint, pieces.rows.before, pieces.rows.after
+    u1, u2 = direction[np.maximum(joint - 1, 0)], direction[np.minimum(joint, len(path) - 1)]
     position, velocity, acceleration, jerk = (
-        pieces.before[:, c, None] * u1 + pieces.after[:, c, None] * u2 for c in range(4)
+        before[:, c, None] * u1 + after[:, c, None] * u2 for c in range(4)
     )
-    position += vertex[pieces.joint]
-    arc = (toolpath.arc[pieces.segment] >= 0) & (pieces.after[:, 1:] != 0.0).any(axis=1)  # not at standstill
+    position += vertex[joint]
+    arc = (toolpath.arc[pieces.segment] >= 0) & (after[:, 1:] != 0.0).any(axis=1)  # not at standstill
     for values, along in zip(
         (position, velocity, acceleration, jerk),
         _along_arcs(pieces, np.flatnonzero(arc), toolpath),
@@ -100,182 +101,157 @@ def along_axes(
     return position, velocity, acceleration, jerk
 
 
-def _along_arcs(pieces: Pieces, move: Array, toolpath: Toolpath) -> tuple[FloatArray, ...]:
+def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[FloatArray, ...]:
     """The same of the pieces `move`, which lie on arcs from rest to rest."""
-    leg, segment = pieces.leg[move], pieces.segment[move]
+    leg, segment = pieces.rows.leg[move], pieces.segment[move]
     ends = np.append(leg[1:] != leg[:-1], True)[: len(move)]
     at = np.arange(len(move)) + np.cumsum(ends) - ends  # with room for the end point of every arc
     # relative to the arc's centre, so that the rounding is that of the radius and not of the coordinates
     points = np.empty((len(move) + int(ends.sum()), len(toolpath.axes)))
-    points[at] = arc_point(toolpath, segment, pieces.after[move, 0])
+    points[at] = arc_point(toolpath, segment, pieces.rows.after[move, 0])
     points[at[ends] + 1] = arc_point(toolpath, segment[ends], toolpath.length[segment[ends]])
     last = np.ones(len(points), bool)
     last[at] = False
     position = points[at] + toolpath.arcs.center[toolpath.arc[segment]]
-    return position, *spline_at_rest(pieces.duration[move], points, last)
+    return position, *spline_at_rest(pieces.rows.duration[move], points, last)
 
 
-def _empty(rows: int) -> tuple[Array, Array, FloatArray, FloatArray, FloatArray]:
-    return (
-        np.zeros(rows, np.int64),
-        np.zeros(rows, np.int64),
-        np.zeros(rows),
-        np.zeros((rows, 4)),
-        np.zeros((rows, 4)),
+def _empty(count: int) -> Rows:
+    return Rows(
+        joint=np.zeros(count, np.int64),
+        leg=np.zeros(count, np.int64),
+        duration=np.zeros(count),
+        before=np.zeros((count, 4)),
+        after=np.zeros((count, 4)),
     )
 
 
 @njit(cache=True, error_model="numpy")
 def _advance(state, t):
-    """Move a cubic (4,) on by t, in place; its jerk stays."""
-    state[0] += t * (state[1] + t * (0.5 * state[2] + t * state[3] / 6.0))
-    state[1] += t * (state[2] + 0.5 * t * state[3])
-    state[2] += t * state[3]
+    """Move cubics (., 4) on by t, in place; their jerks stay."""
+    for m in range(len(state)):
+        state[m, 0] += t * (state[m, 1] + t * (0.5 * state[m, 2] + t * state[m, 3] / 6.0))
+        state[m, 1] += t * (state[m, 2] + 0.5 * t * state[m, 3])
+        state[m, 2] += t * state[m, 3]
 
 
 @njit(cache=True, error_model="numpy")
-def _clear(one, two):
-    for c in range(4):
-        one[c] = two[c] = 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _put(n, t, k, leg, one, two, joint, legs, duration, before, after):
-    """Write a piece unless it is shorter than `SHORTEST`, advance its cubics, return the next row."""
-    if t > SHORTEST and n < len(duration):
-        joint[n], legs[n], duration[n] = k, leg, t
+def _put(n, t, k, leg, state, rows):
+    """Write a piece unless it is shorter than `SHORTEST`, advance its cubics c1, c2 (2, 4), return the next row."""
+    if t > SHORTEST and n < len(rows.duration):
+        rows.joint[n], rows.leg[n], rows.duration[n] = k, leg, t
         for c in range(4):
-            before[n, c], after[n, c] = one[c], two[c]
-    _advance(one, t)
-    _advance(two, t)
+            rows.before[n, c], rows.after[n, c] = state[0, c], state[1, c]
+    _advance(state, t)
     return n + (t > SHORTEST)
 
 
 @njit(cache=True, error_model="numpy")
-def _emit(kind, V, p, q, length, v, a, j, dwell, turning, joint, legs, duration, before, after):
-    """Write all pieces into the columns, as far as they have room; returns how many there are."""
-    n, count = 0, len(length)
-    one, two = np.zeros(4), np.zeros(4)
-    phase, jerk = np.zeros(7), np.zeros(7)
+def _emit(ways, legs, dwell, rows):
+    """Write all pieces into the rows, as far as they have room; returns how many there are."""
+    n, count = 0, len(legs)
+    state, phases = np.zeros((2, 4)), np.zeros((2, PHASES))
     for k in range(count + 1):
-        A, reach, lasting = corner_at(kind[k], V[k], p[k], q[k])
-        _clear(one, two)
-        if lasting > 0.0 and kind[k] == ZERO:
-            T1, T2 = phase_times_of(V[k], p[k], q[k])
-            one[0], one[1] = -reach, V[k]
-            bend = V[k] / (T1 * T2)
+        way = ways[k]
+        A, reach, lasting = corner_at(way, way.V, True)
+        state[:] = 0.0
+        if lasting > 0.0 and way.kind == ZERO:
+            T1, T2 = phase_times_of(way.V, way.p, way.q)
+            state[0, 0], state[0, 1] = -reach, way.V
+            bend = way.V / (T1 * T2)
             for part in range(4):  # jerk +, half of the plateau; half of the plateau, jerk -
-                two[3] = bend if part == 0 else (-bend if part == 3 else 0.0)
-                one[3] = -two[3]
-                time = T2 if part in (0, 3) else 0.5 * (T1 - T2)
-                n = _put(n, time, k, k - 1 + part // 2, one, two, joint, legs, duration, before, after)
-        elif lasting > 0.0 and kind[k] == ENTRY:
-            one[0], one[1], one[2], one[3], two[3] = -reach, V[k], -A, A / lasting, A / lasting
+                state[1, 3] = bend if part == 0 else (-bend if part == 3 else 0.0)
+                state[0, 3] = -state[1, 3]
+                n = _put(n, T2 if part in (0, 3) else 0.5 * (T1 - T2), k, k - 1 + part // 2, state, rows)
+        elif lasting > 0.0 and way.kind == ENTRY:
+            state[0, 0], state[0, 1], state[0, 2] = -reach, way.V, -A
+            state[0, 3] = state[1, 3] = A / lasting
             for half in range(2):
-                n = _put(n, 0.5 * lasting, k, k - 1 + half, one, two, joint, legs, duration, before, after)
-        _clear(one, two)
-        n = _put(n, dwell[k], k, max(k - 1, 0), one, two, joint, legs, duration, before, after)
+                n = _put(n, 0.5 * lasting, k, k - 1 + half, state, rows)
+        state[:] = 0.0
+        n = _put(n, dwell[k], k, max(k - 1, 0), state, rows)
         if k == count:
             break
-        _phases(kind, V, p, q, k, length[k], v[k], a[k], j[k], phase, jerk)
-        two[0], two[1], two[2] = reach, V[k], A
-        if turning[k] > 0.0:
-            n = _emit_arc(n, k, turning[k], v[k], phase, jerk, one, two, joint, legs, duration, before, after)
+        other = leg_end(ways[k + 1], ways[k + 1].V, legs[k].j, False)
+        leg_phases(leg_end(way, way.V, legs[k].j, True), other, legs[k], phases)
+        state[1, 0], state[1, 1], state[1, 2] = reach, way.V, A
+        if legs[k].turning > 0.0:
+            n = _emit_arc(n, k, legs[k], phases, state, rows)
         else:
-            for f in range(7):
-                two[3] = jerk[f]
-                n = _put(n, phase[f], k, k, one, two, joint, legs, duration, before, after)
+            for f in range(PHASES):
+                state[1, 3] = phases[1, f]
+                n = _put(n, phases[0, f], k, k, state, rows)
     return n
 
 
 @njit(cache=True, error_model="numpy")
-def _emit_arc(n, k, turning, v, phase, jerk, one, two, joint, legs, duration, before, after):
+def _emit_arc(n, k, leg, phases, state, rows):
     """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their neighbour."""
+    two = state[1]
     pending, began = 0.0, two[0]
-    for f in range(7):
-        two[3] = jerk[f]
-        if phase[f] < ARC_SHORTEST:
-            _advance(two, phase[f])
-            pending += phase[f]
+    for f in range(PHASES):
+        phase, jerk = phases[0, f], phases[1, f]
+        two[3] = jerk
+        if phase < ARC_SHORTEST:
+            _advance(state, phase)
+            pending += phase
             continue
-        moved = phase[f] * (two[1] + phase[f] * (0.5 * two[2] + phase[f] * two[3] / 6.0))
-        accuracy = max(np.sqrt(abs(jerk[f]) / (3.0 * v)), abs(two[2]) / (2.45 * v)) / np.sqrt(ARC_ACCURACY)
-        parts = max(ARC_PARTS, 1 + int(max(turning * moved / ARC_PIECE, phase[f] * accuracy)))
-        parts = min(parts, int(phase[f] / ARC_SHORTEST))
+        moved = phase * (two[1] + phase * (0.5 * two[2] + phase * two[3] / 6.0))
+        accuracy = max(np.sqrt(abs(jerk) / (3.0 * leg.v)), abs(two[2]) / (2.45 * leg.v))
+        accuracy /= np.sqrt(ARC_ACCURACY)
+        parts = max(ARC_PARTS, 1 + int(max(leg.turning * moved / ARC_PIECE, phase * accuracy)))
+        parts = min(parts, int(phase / ARC_SHORTEST))
         for _ in range(parts):
-            n = _put(n, phase[f] / parts, k, k, one, two, joint, legs, duration, before, after)
-            if pending > 0.0 and n <= len(duration):
-                duration[n - 1] += pending
-                after[n - 1, 0] = began
+            n = _put(n, phase / parts, k, k, state, rows)
+            if pending > 0.0 and n <= len(rows.duration):
+                rows.duration[n - 1] += pending
+                rows.after[n - 1, 0] = began
             pending = 0.0
         began = two[0]
-    if n <= len(duration):
-        duration[n - 1] += pending
+    if n <= len(rows.duration):
+        rows.duration[n - 1] += pending
     return n
 
 
 @njit(cache=True, error_model="numpy")
-def _phases(kind, V, p, q, k, length, v, a, j, phase, jerk):
-    """Durations and jerks (7,) on leg k: two ramps with the cruise between them."""
-    one, other = leg_end(kind[k], V[k], p[k], q[k], j), leg_end(kind[k + 1], V[k + 1], p[k + 1], q[k + 1], j)
-    A1, A2 = corner_at(kind[k], V[k], p[k], q[k])[0], corner_at(kind[k + 1], V[k + 1], p[k + 1], q[k + 1])[0]
-    W, first, second, rest = leg_top(one, other, length, v, a, j)
-    for side in range(2):
-        x = first if side == 0 else second
-        A = A1 if side == 0 else A2
-        peak = min(a, np.sqrt(j * x))
-        held = x / a - a / j if x > a * a / j else 0.0
-        for part in range(3):
-            f = part if side == 0 else 6 - part
-            phase[f] = ((peak - A) / j, held, peak / j)[part]
-            jerk[f] = (j, 0.0, -j)[part]
-    phase[3], jerk[3] = (rest / W if rest > 0.0 else 0.0), 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _cut(
-    joint, legs, duration, before, after, length, first, offset,
-    out_joint, out_legs, out_duration, out_before, out_after, segment,
-):  # fmt: skip
+def _cut(rows, length, first, offset, out, segment):
     """Cut pieces where they pass the end of a segment inside their leg; returns the number of pieces."""
     n, m = 0, 0
-    one, two = np.zeros(4), np.zeros(4)
-    for i in range(len(duration)):
-        leg, left = legs[i], duration[i]
-        origin = length[leg] if joint[i] == leg + 1 else 0.0
+    state = np.zeros((2, 4))
+    for i in range(len(rows.duration)):
+        leg, left = rows.leg[i], rows.duration[i]
+        origin = length[leg] if rows.joint[i] == leg + 1 else 0.0
         for c in range(4):
-            one[c], two[c] = before[i, c], after[i, c]
+            state[0, c], state[1, c] = rows.before[i, c], rows.after[i, c]
         m = max(m, first[leg])
         while m + 1 < first[leg + 1]:
             border = offset[m + 1] - origin
-            if _along(one, two, left) <= border:
+            if _along(state, left) <= border:
                 break
             low, high = 0.0, left
             for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
-                if _along(one, two, middle) <= border:
+                if _along(state, middle) <= border:
                     low = middle
                 else:
                     high = middle
-            if _along(one, two, 0.0) <= border:
-                rows = n
-                n = _put(
-                    n, low, joint[i], leg, one, two, out_joint, out_legs, out_duration, out_before, out_after
-                )
-                if n > rows:
-                    segment[rows] = m
+            if _along(state, 0.0) <= border:
+                count = n
+                n = _put(n, low, rows.joint[i], leg, state, out)
+                if n > count:
+                    segment[count] = m
                     left -= low
             m += 1
-        rows = n
-        n = _put(n, left, joint[i], leg, one, two, out_joint, out_legs, out_duration, out_before, out_after)
-        if n > rows:
-            segment[rows] = m
+        count = n
+        n = _put(n, left, rows.joint[i], leg, state, out)
+        if n > count:
+            segment[count] = m
     return n
 
 
 @njit(cache=True, error_model="numpy")
-def _along(one, two, t):
+def _along(state, t):
     """c1 + c2 after t: the distance from the joint along the program."""
-    x, v = one[0] + two[0], one[1] + two[1]
-    a, j = one[2] + two[2], one[3] + two[3]
+    x, v = state[0, 0] + state[1, 0], state[0, 1] + state[1, 1]
+    a, j = state[0, 2] + state[1, 2], state[0, 3] + state[1, 3]
     return x + t * (v + t * (0.5 * a + t * j / 6.0))

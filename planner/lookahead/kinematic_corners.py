@@ -15,14 +15,15 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import error_rate, filter_rate
 from planner.corners.sharing import share_legs
 from planner.geometry.build import COLLINEAR_ANGLE
-from planner.geometry.legs import Legs as PathLegs
+from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.lookahead.look_ahead import Legs, Passage, capped, needed
-from planner.lookahead.ramps import Kind
+from planner.lookahead.look_ahead import LegLimits, Passage, capped, needed
+from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import Machine
 
@@ -30,10 +31,11 @@ from planner.machine import Machine
 # (corner_pieces.ARC_PIECE).
 ARC_LIMITS = 1.0 - 3e-4
 
-EASE_MIN = 1e-12  # speed^2 per length [mm/s2] that a corner counts with at least when a leg is shared
+# Speed^2 per length [mm/s2] that a corner counts with at least when a leg is shared: not 0, by which is divided; below any real one.
+EASE_MIN = 1e-12
 
 
-def leg_limits(path: PathLegs, toolpath: Toolpath, machine: Machine) -> Legs:
+def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     """Limits of the legs of a path of lines, and of arcs between full stops.
 
     The acceleration a is at most the tolerance over the rate at which filters err: a full stop is rounded by them.
@@ -43,30 +45,33 @@ def leg_limits(path: PathLegs, toolpath: Toolpath, machine: Machine) -> Legs:
         tolerance = toolpath.tolerance[path.first]
         a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_rate(machine))
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
-    return Legs(length=path.length, v=share * v, a=share * a, j=share * j)
+    turning = np.abs(path.table["rate"])
+    return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
 
 
 def candidates(
-    path: PathLegs, toolpath: Toolpath, legs: Legs, machine: Machine, start_stop: float
+    path: Legs, toolpath: Toolpath, legs: LegLimits, machine: Machine, start_stop: float
 ) -> list[Passage]:
     """Zero entry acceleration, entry deceleration and, if `start_stop` [mm/s] is not 0, a step of velocity at the vertex, as fast as
     tolerance, limits and the feeds of both legs allow. Joints without a corner are passed straight on by every candidate."""
     at = path.first
     turns = (toolpath.joint[at] == Joint.CORNER) & (toolpath.theta[at] >= COLLINEAR_ANGLE)
-    bare = np.where(turns | (toolpath.joint[at] == Joint.STOP), Kind.STOP, Kind.PASS)
+    bare = np.where(turns | (toolpath.joint[at] == Joint.STOP), JointKind.STOP, JointKind.PASS)
     k = np.flatnonzero(turns)
     u1, u2 = path.table["direction"][k - 1], path.table["direction"][k]
     feed = np.minimum(np.append(legs.v, np.inf), np.insert(legs.v, 0, np.inf))
     ways = [
-        (Kind.ZERO, *_zero_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
-        (Kind.ENTRY, *_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
+        (JointKind.ZERO, *_zero_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
+        (JointKind.ENTRY, *_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
     ]
     if start_stop > 0:
-        ways.append((Kind.PASS, *_velocity_step(u1, u2, toolpath.tolerance[at[k]], machine.dt, start_stop)))
+        ways.append(
+            (JointKind.PASS, *_velocity_step(u1, u2, toolpath.tolerance[at[k]], machine.dt, start_stop))
+        )
     return [_candidate(bare, feed, k, *way) for way in ways]
 
 
-def fitted(passage: Passage, legs: Legs) -> Passage:
+def fitted(passage: Passage, legs: LegLimits) -> Passage:
     """A candidate slowed down to what its legs have room for; a leg is shared where both of its corners would be equally fast."""
     longest = np.minimum(np.append(legs.length, np.inf), np.insert(legs.length, 0, np.inf))
     wanted = np.minimum(needed(passage, legs), longest)
@@ -75,10 +80,10 @@ def fitted(passage: Passage, legs: Legs) -> Passage:
 
 
 def _candidate(
-    bare: Array, feed: FloatArray, k: Array, kind: Kind, V: FloatArray, p: FloatArray, q: FloatArray
+    bare: Array, feed: FloatArray, k: Array, kind: JointKind, V: FloatArray, p: FloatArray, q: FloatArray
 ) -> Passage:
     """One kind at the corners k with speeds V and parameters p, q."""
-    kinds, speed = bare.copy(), np.where(bare == Kind.PASS, feed, 0.0)
+    kinds, speed = bare.copy(), np.where(bare == JointKind.PASS, feed, 0.0)
     first, second = np.zeros(len(bare)), np.zeros(len(bare))
     kinds[k], speed[k], first[k], second[k] = kind, np.minimum(V, feed[k]), p, q
     return Passage(kind=kinds, V=speed, p=first, q=second)
@@ -92,7 +97,7 @@ def _zero_entry(
     twice = np.linalg.norm(across, axis=1)  # 2 s
     eta = corner.ratio_min(machine.limits("jerk", axes), across)
     alpha = corner.ratio_min(machine.limits("acceleration", axes), across)
-    alpha = np.minimum(alpha, np.minimum(machine.normal_acceleration or np.inf, tol / (2.0 * rate)) / twice)
+    alpha = np.minimum(alpha, np.minimum(normal_limit.largest(machine), tol / (2.0 * rate)) / twice)
     bow = rate * twice * np.minimum(alpha, np.cbrt(6.0 * tol * eta**2 / twice))
     return corner.speed_from_middle((tol - bow) / twice, alpha, eta), alpha, eta
 
@@ -114,5 +119,5 @@ def _entry(
     rate = error_rate(machine)
     twice = np.linalg.norm(u2 - u1, axis=1)
     a, J = corner.entry_limits(u1, u2, machine.limits("acceleration", axes), machine.limits("jerk", axes))
-    a = np.minimum(a, np.minimum(2.0 * (machine.normal_acceleration or np.inf) / twice, tol / (2.0 * rate)))
+    a = np.minimum(a, np.minimum(2.0 * normal_limit.largest(machine) / twice, tol / (2.0 * rate)))
     return corner.entry_speed_from_middle((tol - rate * a) / twice, a, J), a, J

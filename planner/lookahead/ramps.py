@@ -15,36 +15,65 @@ From V' over D (measured from where the ramp would have begun) a motion reaches 
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.kernels import njit
 from planner.corners.kinematic import entry_acceleration, phase_times
+from planner.lookahead.rest_to_rest import PHASES
 
 ROUNDING = 1e-15  # of a leg's length [-]
-# What is left of a leg between two ramps is run at constant speed if it is at most this share of the leg [-]: faster still would save
-# less than this share of the leg's time, for four pieces of microseconds.
+# What is left of a leg between two ramps is run at constant speed if it is at most this fraction of the leg [-]: faster still would
+# save less than this fraction of the leg's time, for four pieces of microseconds.
 SMALL_REST = 1e-6
-NEWTON_STEPS = 100  # safeguarded by bisection
+NEWTON_STEPS = 100  # safeguarded by bisection: never reached, as a bisection to the last digit takes 60
 
 
-class Kind(IntEnum):
-    """What happens at a joint; p and q are the parameters of the kind (corners/kinematic.py)."""
+class JointKind(IntEnum):
+    """What happens at a joint; p, q and r are the parameters of the kind."""
 
     STOP = 0  # a full stop
     PASS = 1  # the vertex itself is passed at a speed: straight on, or with a step of velocity
-    ZERO = 2  # corner with zero entry acceleration: p = alpha, q = eta
-    ENTRY = 3  # corner with entry deceleration: p = a, q = J
+    ZERO = 2  # corner with zero entry acceleration: p = alpha, q = eta (corners/kinematic.py)
+    ENTRY = 3  # corner with entry deceleration: p = a, q = J (corners/kinematic.py)
+    CONSTANT = (
+        4  # corner at constant speed, r [mm] long, that takes p and q [mm] of the legs before and behind
+    )
 
 
-STOP, PASS, ZERO, ENTRY = (int(kind) for kind in Kind)  # numba reads plain integers
+STOP, PASS, ZERO, ENTRY, CONSTANT = (int(kind) for kind in JointKind)  # numba reads plain integers
+
+# The kernels' records of a leg and of a way to pass a joint (look_ahead.LegLimits, look_ahead.Passage).
+LEG = np.dtype([(name, np.float64) for name in ("length", "v", "a", "j", "turning")])
+WAY = np.dtype([("kind", np.int64), *((name, np.float64) for name in ("V", "p", "q", "r"))])
+
+
+class End(NamedTuple):
+    """One end of a leg, where the corner at it is over.
+
+    corner : length that the corner takes of the leg [mm]
+    A      : acceleration away from the corner [mm/s2]
+    start  : V' [mm/s]
+    pre    : [mm]
+    top    : W = V + A^2/(2j), the lowest speed without acceleration [mm/s]
+    ramp   : length of the ramp up to it [mm]
+    """
+
+    corner: float
+    A: float
+    start: float
+    pre: float
+    top: float
+    ramp: float
+
 
 phase_times_of = njit(cache=True, error_model="numpy")(phase_times)
 entry_acceleration_of = njit(cache=True, error_model="numpy")(entry_acceleration)
 
 
 @njit(cache=True, error_model="numpy")
-def reach(start, distance, a, j):
+def gain_max(start, distance, a, j):
     """By how much the speed can grow at most [mm/s] over a distance [mm] from `start`, with zero acceleration at both ends."""
     if distance >= (2.0 * start + a * a / j) * a / j:
         mean = start + 0.5 * a * a / j  # x^2/2 + mean x = a distance - start a^2/j
@@ -72,46 +101,49 @@ def ramp(start, gain, a, j):
 
 
 @njit(cache=True, error_model="numpy")
-def corner_at(kind, V, p, q):
-    """Start deceleration A [mm/s2], length l [mm] and duration [s] of a corner at the speed V."""
-    if V <= 0.0 or kind in (STOP, PASS):
+def corner_at(way, V, behind):
+    """Start deceleration A [mm/s2], the length [mm] that it takes of the leg before or `behind`, and duration [s] of a corner at V."""
+    if V <= 0.0 or way.kind in (STOP, PASS):
         return 0.0, 0.0, 0.0
-    if kind == ZERO:
-        T1, T2 = phase_times_of(V, p, q)
+    if way.kind == CONSTANT:
+        return 0.0, way.q if behind else way.p, way.r / V
+    if way.kind == ZERO:
+        T1, T2 = phase_times_of(V, way.p, way.q)
         return 0.0, 0.5 * V * (T1 + T2), T1 + T2
-    A = entry_acceleration_of(V, p, q)
+    A = entry_acceleration_of(V, way.p, way.q)
     return A, 2.0 * V * V / (3.0 * A), 2.0 * V / A
 
 
 @njit(cache=True, error_model="numpy")
-def leg_end(kind, V, p, q, j):
-    """One end of a leg with jerk j: corner length l, V' and `pre`, the speed W = V + A^2/(2j) and the length of the ramp up to it."""
-    A, length, _ = corner_at(kind, V, p, q)
+def leg_end(way, V, j, behind):
+    """The `End` of a leg with jerk j at a joint passed at V; `behind` the joint, or before it."""
+    A, length, _ = corner_at(way, V, behind)
     lost, time = 0.5 * A * A / j, A / j
     pre = time * (V - lost) + A * time * time / 6.0
-    return length, V - lost, pre, V + lost, time * V + A * time * time / 3.0
+    return End(length, A, V - lost, pre, V + lost, time * V + A * time * time / 3.0)
 
 
 @njit(cache=True, error_model="numpy")
-def leg_top(one, other, length, v, a, j):
+def leg_top(one, other, leg):
     """Highest speed on a leg, how far it is above each end's V', and the length that is left to be run at it [mm].
 
-    The ends are as of `leg_end`. The unknown is how far the speed is above the higher end, not the speed itself: a gain of 1e-10 mm/s
-    is lost in the rounding of 100 mm/s, but takes 2e-8 s at 1e6 mm/s3.
+    The unknown is how far the speed is above the higher end, not the speed itself: a gain of 1e-10 mm/s is lost in the rounding of
+    100 mm/s, but takes 2e-8 s at 1e6 mm/s3.
     """
-    D = max(length - one[0] - other[0], 0.0) + one[2] + other[2]
-    floor = max(one[3], other[3])
-    first, second = max(floor - one[1], 0.0), max(floor - other[1], 0.0)
-    high = max(v - floor, 0.0)
-    rest = D - ramp(one[1], first + high, a, j)[0] - ramp(other[1], second + high, a, j)[0]
+    a, j = leg.a, leg.j
+    D = max(leg.length - one.corner - other.corner, 0.0) + one.pre + other.pre
+    floor = max(one.top, other.top)
+    first, second = max(floor - one.start, 0.0), max(floor - other.start, 0.0)
+    high = max(leg.v - floor, 0.0)
+    rest = D - ramp(one.start, first + high, a, j)[0] - ramp(other.start, second + high, a, j)[0]
     if rest >= 0.0:
-        return v, first + high, second + high, rest
-    rest = D - ramp(one[1], first, a, j)[0] - ramp(other[1], second, a, j)[0]
-    if rest <= SMALL_REST * length:
+        return leg.v, first + high, second + high, rest
+    rest = D - ramp(one.start, first, a, j)[0] - ramp(other.start, second, a, j)[0]
+    if rest <= SMALL_REST * leg.length:
         return floor, first, second, max(rest, 0.0)
     low, gain = 0.0, 0.5 * high
     for _ in range(NEWTON_STEPS):
-        ramp1, ramp2 = ramp(one[1], first + gain, a, j), ramp(other[1], second + gain, a, j)
+        ramp1, ramp2 = ramp(one.start, first + gain, a, j), ramp(other.start, second + gain, a, j)
         miss = ramp1[0] + ramp2[0] - D
         if miss > 0.0:
             high = gain
@@ -128,7 +160,24 @@ def leg_top(one, other, length, v, a, j):
 
 
 @njit(cache=True, error_model="numpy")
-def leg_time(one, other, A1, A2, length, v, a, j):
-    W, first, second, rest = leg_top(one, other, length, v, a, j)
-    time = ramp(one[1], first, a, j)[1] + ramp(other[1], second, a, j)[1] - (A1 + A2) / j
-    return time + (rest / W if W > 0.0 else 0.0)
+def leg_time(one, other, leg):
+    """Shortest time [s] of a leg between its ends."""
+    W, first, second, rest = leg_top(one, other, leg)
+    time = ramp(one.start, first, leg.a, leg.j)[1] + ramp(other.start, second, leg.a, leg.j)[1]
+    return time - (one.A + other.A) / leg.j + (rest / W if rest > 0.0 else 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def leg_phases(one, other, leg, out):
+    """Durations [s] and jerks [mm/s3] of a leg's phases, into out (2, 7)."""
+    W, first, second, rest = leg_top(one, other, leg)
+    a, j = leg.a, leg.j
+    for side in range(2):
+        x, A = (first, one.A) if side == 0 else (second, other.A)
+        peak = min(a, np.sqrt(j * x))
+        held = x / a - a / j if x > a * a / j else 0.0
+        for part in range(3):
+            f = part if side == 0 else PHASES - 1 - part
+            out[0, f] = ((peak - A) / j, held, peak / j)[part]
+            out[1, f] = (j, 0.0, -j)[part]
+    out[0, 3], out[1, 3] = (rest / W if rest > 0.0 else 0.0), 0.0

@@ -3,19 +3,18 @@
 Along a block of length L with limits v, a, j on speed, acceleration and jerk along the path, the fastest move is symmetric:
 
     peak speed p = min(v, p_L),   p_L from   p^2/a + p a/j = L   (a is reached),   or   (j L^2 / 4)^(1/3)   (it is not: p_L < a^2/j)
-    T = L/p + p/a + a/j   for p >= a^2/j,      L/p + 2 sqrt(p/j)   below.
+    T = L/p + p/a + a/j   for p >= a^2/j,      L/p + 2 sqrt(p/j)   below:
 
-`rest_to_rest_times` is this closed form, for a whole program at once; `rest_to_rest_phases` asks ruckig for the motion itself.
+jerk j for A/j, none for p/A - A/j and -j for A/j with the largest acceleration A = min(a, sqrt(p j)), the cruise, and the same
+backwards. The tests compare it with ruckig.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.errors import NotSolvedError
+from planner.constraints import normal_limit
 from planner.corners.allocation import error_rate
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -26,50 +25,29 @@ PHASES = 7  # a jerk-limited move from rest to rest
 
 def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> FloatArray:
     """Shortest times (n,) [s] from rest to rest over `length` (n,) [mm] with limits v, a, j (n,)."""
-    threshold = a**2 / j  # the speed at which a trapezoid of acceleration becomes a triangle
-    without = np.cbrt(j * length**2 / 4)
-    with_plateau = (np.sqrt(threshold**2 + 4 * a * length) - threshold) / 2
-    peak = np.minimum(v, np.where(without < threshold, without, with_plateau))
-    return length / peak + np.where(peak < threshold, 2 * np.sqrt(peak / j), peak / a + a / j)
+    peak = _peak(length, v, a, j)
+    return length / peak + np.where(peak < a**2 / j, 2 * np.sqrt(peak / j), peak / a + a / j)
 
 
 def rest_to_rest_phases(
-    length: FloatArray,
-    v: FloatArray,
-    a: FloatArray,
-    j: FloatArray,
-    progress: Callable[[float], None] | None = None,
+    length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Durations [s] and jerks [mm/s3], each (n, 7), of the moves that ruckig makes of the same data.
+    """Durations [s] and jerks [mm/s3], each (n, 7), of the same moves."""
+    peak = _peak(length, v, a, j)
+    largest = np.minimum(a, np.sqrt(peak * j))
+    rise = largest / j
+    held = np.maximum(peak / largest - rise, 0.0)
+    cruise = np.where(peak < v, 0.0, np.maximum(length / peak - 2 * rise - held, 0.0))
+    duration = np.stack([rise, held, rise, cruise, rise, held, rise], axis=1)
+    return duration, j[:, None] * np.array([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0])
 
-    Raises NotSolvedError if ruckig does not return a finished move.
-    """
-    import ruckig
 
-    solver = ruckig.Ruckig(1)
-    move = ruckig.InputParameter(1)
-    found = ruckig.Trajectory(1)
-    duration, jerk = np.empty((len(length), PHASES)), np.empty((len(length), PHASES))
-    for k in range(len(length)):
-        # In units of the block (length 1, jerk 1): ruckig's own epsilons are absolute and lose moves of a micrometre.
-        unit = (length[k] / j[k]) ** (1 / 3)
-        move.target_position = [1.0]
-        move.max_velocity = [v[k] * unit / length[k]]
-        move.max_acceleration = [a[k] * unit**2 / length[k]]
-        move.max_jerk = [1.0]
-        result = solver.calculate(move, found)
-        if result != ruckig.Result.Working:
-            raise NotSolvedError(
-                f"ruckig ended with {result.name} on a block of {length[k]:g} mm (v {v[k]:g}, a {a[k]:g}, j {j[k]:g}); "
-                "check the machine's limits for values many orders of magnitude apart"
-            )
-        profile = found.profiles[0][0]
-        duration[k], jerk[k] = profile.t, profile.j
-        duration[k] *= unit
-        jerk[k] *= j[k]
-        if progress is not None and k % 4096 == 0:
-            progress(k / len(length))
-    return duration, jerk
+def _peak(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> FloatArray:
+    """Largest speed (n,) [mm/s] of the moves."""
+    threshold = a**2 / j  # the speed at which a trapezoid of acceleration becomes a triangle
+    without = np.cbrt(j * length**2 / 4)
+    with_plateau = (np.sqrt(threshold**2 + 4 * a * length) - threshold) / 2
+    return np.minimum(v, np.where(without < threshold, without, with_plateau))
 
 
 def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -91,11 +69,11 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     v_all, a_all, j_all = (machine.limits(q, axes).min() for q in ("velocity", "acceleration", "jerk"))
     half = np.sqrt(0.5)
     budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
-    normal = np.minimum(half * a_all, np.minimum(budget, machine.normal_acceleration or np.inf))
+    across = np.minimum(half * a_all, np.minimum(budget, normal_limit.largest(machine)))
     v[curved] = np.min(
         [
             np.full(len(kappa), v_all),
-            np.sqrt(normal / kappa),
+            np.sqrt(across / kappa),
             np.cbrt(half * j_all / (2 * kappa**2)),
             j_all / (3 * kappa * a_all),
         ],

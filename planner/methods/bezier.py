@@ -5,7 +5,7 @@
 2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes' limits, jerk included, allow
    from its one end to the other (lookahead/constant_speed_corners.py).
 3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop at its vertex where that
-   is faster (lookahead/stretches.py); on arcs the limits are constant.
+   is faster (lookahead/look_ahead.py); on arcs the limits are constant.
 4. What the samples of a corner may have missed is made good by slowing down, as in method `optimal`; usually nothing.
 """
 
@@ -24,8 +24,9 @@ from planner.geometry.toolpath import Joint
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable
-from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, stretches_of
-from planner.lookahead.stretches import better_stopped, largest_speeds, phases
+from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, corner_chain
+from planner.lookahead.look_ahead import look_ahead, moves, swept
+from planner.lookahead.ramps import JointKind
 from planner.machine import Machine
 from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion
@@ -66,11 +67,12 @@ class BezierMethod(Method):
             samples = sample_path(path, shares)
         with job.stage("solve"):
             limits = constant_speeds(samples, shares)
-            chain, _ = stretches_of(samples, machine, limits.speed)
-            stops = better_stopped(chain)
+            chain = corner_chain(samples, machine, limits.speed)
+            chosen, _ = look_ahead(chain.legs, [chain.passage])
+            stops = chain.joint[(chain.joint >= 0) & (chosen.kind == JointKind.STOP)]
         with job.stage("geometry"):
-            path = _stopped(path, chain.joint[stops])
-            samples = sample_path(path, shares) if stops.any() else samples
+            path = _stopped(path, stops)
+            samples = sample_path(path, shares) if len(stops) else samples
         with job.stage("solve"):
             motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
         motion = job.behind_filters(motion)
@@ -83,7 +85,7 @@ class BezierMethod(Method):
             corner=self.corner.name,
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=f"{len(rounded)} corners are run through, {int(stops.sum())} are faster as full stops",
+            sentence=f"{len(rounded)} corners are run through, {len(stops)} are faster as full stops",
             grid_points=len(samples),
             rounded=rounded,
         )
@@ -101,10 +103,11 @@ def _stopped(path: SmoothPath, joint: Array) -> SmoothPath:
 
 def _motion(samples: PathSamples, machine: Machine, speed: FloatArray) -> Motion:
     """The motion with the corners at most at the speeds (R+1,)."""
-    chain, begin = stretches_of(samples, machine, speed)
-    V = largest_speeds(chain)
-    duration, jerk = phases(chain, V)
-    return Motion(samples=samples, law=law_of_moves(samples, chain.run, begin, V[:-1], duration, jerk))
+    chain = corner_chain(samples, machine, speed)
+    passage = swept(chain.legs, chain.passage)
+    duration, jerk = moves(passage, chain.legs)
+    law = law_of_moves(samples, chain.run, chain.begin, passage.V[:-1], duration, jerk)
+    return Motion(samples=samples, law=law)
 
 
 def _corner_table(motion: Motion, limits: CornerSpeeds) -> CornerTable:

@@ -2,10 +2,10 @@
 
 1. Arcs become chords. Between full stops the filters are chosen anew (fir/design.py), unless `profile_filters` says which.
 2. At sharp corners the command waits for the gap that eq. 15 leaves of the filters' delay; through curves it flows without a gap,
-   at a speed at which the filters stay within the tolerance (fir/schedule.py).
+   at a speed at which the filters stay within the tolerance (fir/rules.py).
 3. The filtered motion is made exactly, in pieces of constant jerk (fir/superpose.py).
 4. Its deviation from the path, its accelerations and its jerks are measured exactly, and where one is too large the command slows
-   down (fir/audit.py, fir/settle.py): what the filters promise for isolated pulses, |a| <= V/T1 and |j| <= V/(T1 T2), holds for
+   down (fir/measure.py, fir/slow_down.py): what the filters promise for isolated pulses, |a| <= V/T1 and |j| <= V/(T1 T2), holds for
    no chain of pulses (up to 2 V/T1 and 4 V/(T1 T2), docs/papers.md), and eq. 14 not for short ones.
 
 These filters make the setpoints. Filters that the machine has behind its setpoints (`[fir]`) come after them, as with every method.
@@ -20,13 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.feedrate.solution import Status
-from planner.fir.course import Course, course_of
+from planner.fir.course import StraightCourse, course_of
 from planner.fir.design import plain_plan
 from planner.fir.filtered import axes_of, check_profile_filters, reached
 from planner.fir.schedule import Schedule
-from planner.fir.search import fastest
-from planner.fir.settle import make
-from planner.fir.superpose import Pieces
+from planner.fir.search import fastest_schedule
+from planner.fir.superpose import Filtered, superpose
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.motion.axis_motion import AxisMotion
@@ -56,35 +55,32 @@ class FirMethod(Method):
         with job.stage("geometry"):
             course = course_of(job.toolpath, job.machine, self.profile_filters)
         with job.stage("solve"):
-            if self.plain:
-                schedule = plain_plan(course, job.machine)
-            else:
-                course, schedule = fastest(course, job.machine)
-            pieces = make(course, job.machine, schedule).pieces
-            motion = motion_of(course, pieces)
+            schedule = (plain_plan if self.plain else fastest_schedule)(course, job.machine)
+            filtered = superpose(schedule.command())
+            motion = motion_of(schedule.course, filtered)
         return job.plan(
             job.deliver(motion if self.plain else job.behind_filters(motion)),
             method="fir-plain" if self.plain else "fir",
             corner="fir",
             solver="pulses",
             status=Status.ACCEPTABLE,
-            sentence=_sentence(course, schedule),
-            grid_points=len(pieces),
+            sentence=_sentence(schedule),
+            grid_points=len(filtered),
         )
 
 
-def motion_of(course: Course, pieces: Pieces) -> AxisMotion:
+def motion_of(course: StraightCourse, motion: Filtered) -> AxisMotion:
     """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the course."""
     ends = course.joint_at[course.first]
-    stretch = np.repeat(np.arange(course.stretches), np.diff(pieces.first))
-    segment = np.searchsorted(np.cumsum(course.lines.length), reached(pieces), side="right")
+    stretch = np.repeat(np.arange(course.stretches), np.diff(motion.first))
+    segment = np.searchsorted(np.cumsum(course.lines.length), reached(motion), side="right")
     segment = np.clip(segment, ends[stretch], ends[stretch + 1] - 1)
-    return axes_of(pieces, segment, 0, course.lines, course.point[0])
+    return axes_of(motion, segment, 0, course.lines, course.point[0])
 
 
-def _sentence(course: Course, plan: Schedule) -> str:
-    waits = int((plan.gap(course)[course.inner] > 0).sum())
-    turns = int((course.sin_half > 0).sum())
+def _sentence(plan: Schedule) -> str:
+    waits = int((plan.gap()[plan.course.inner] > 0).sum())
+    turns = int((plan.course.sin_half > 0).sum())
     longest = plan.T1 + plan.T2
     return (
         f"{waits} of {turns} corners are waited at, the others run through; filters of {1e3 * longest.min():.3g} to "

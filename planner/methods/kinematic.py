@@ -18,25 +18,23 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
+from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import (
     error_rate,
-    normal_acceleration_max,
-    normal_acceleration_of_axes,
 )
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
-from planner.geometry.legs import Legs as PathLegs
-from planner.geometry.legs import legs_of
+from planner.geometry.legs import Legs, legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable
-from planner.lookahead.corner_pieces import along_axes, pieces_of
+from planner.lookahead.corner_pieces import along_axes, corner_pieces
 from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
-from planner.lookahead.look_ahead import Legs, Passage, look_ahead
-from planner.lookahead.ramps import Kind
+from planner.lookahead.look_ahead import LegLimits, Passage, look_ahead
+from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
@@ -122,8 +120,8 @@ class _Course:
     """
 
     lines: Toolpath
-    path: PathLegs
-    legs: Legs
+    path: Legs
+    legs: LegLimits
     free: list[Passage]
     fitting: list[Passage]
     passage: Passage
@@ -162,11 +160,9 @@ def _slower_than_stops(course: _Course, toolpath: Toolpath, machine: Machine) ->
 
 
 def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
-    pieces = pieces_of(
-        course.passage, course.legs, course.path, course.lines.dwell[course.path.first], _turning(course)
-    )
+    pieces = corner_pieces(course.passage, course.legs, course.path, course.lines.dwell[course.path.first])
     position, velocity, acceleration, jerk = along_axes(pieces, course.path, course.lines)
-    end = np.cumsum(pieces.duration)
+    end = np.cumsum(pieces.rows.duration)
     return AxisMotion(
         axes=axes,
         t=np.insert(end[:-1], 0, 0.0),
@@ -180,17 +176,12 @@ def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
     )
 
 
-def _turning(course: _Course) -> FloatArray:
-    """(n,) turning of the legs [rad/mm], 0 on straight ones."""
-    return np.abs(course.path.table["rate"])
-
-
 def _corner_table(course: _Course, machine: Machine) -> CornerTable:
     """The corners that are run through, at their apexes."""
     kind, V, p, q = (getattr(course.passage, name) for name in ("kind", "V", "p", "q"))
-    k = np.flatnonzero((kind == Kind.ZERO) | (kind == Kind.ENTRY))
+    k = np.flatnonzero((kind == JointKind.ZERO) | (kind == JointKind.ENTRY))
     lines, at, u = course.lines, course.path.first[k], course.path.table["direction"]
-    V, p, q, zero = V[k], p[k], q[k], kind[k] == Kind.ZERO
+    V, p, q, zero = V[k], p[k], q[k], kind[k] == JointKind.ZERO
     theta, tol = lines.theta[at], lines.tolerance[at]
     s, c = np.sin(theta / 2), np.cos(theta / 2)
     T1, _ = corner.phase_times(V, p, q)
@@ -198,9 +189,8 @@ def _corner_table(course: _Course, machine: Machine) -> CornerTable:
     middle = np.where(zero, corner.middle(V, p, q), length / 8)
     normal = np.where(zero, 2 * s * V / T1, s * corner.entry_acceleration(V, p, q))
     speed = c * V * np.where(zero, 1.0, 0.5)
-    reachable = normal_acceleration_of_axes(machine.limits("acceleration", lines.axes), u[k - 1], u[k])
-    reachable = np.minimum(reachable, machine.normal_acceleration or np.inf)
-    largest = normal_acceleration_max(tol, 2 * s * middle, reachable, error_rate(machine))
+    reachable = normal_limit.at_corners(machine, lines.axes, u[k - 1], u[k])
+    largest = normal_limit.within_budget(tol, 2 * s * middle, reachable, error_rate(machine))
     return CornerTable(
         line=lines.line[at - 1],
         theta=theta,
@@ -230,7 +220,7 @@ def _sentence(course: _Course) -> str:
     turns, kind = course.turns, course.passage.kind
     if not turns.any():
         return "there is no corner between full stops; every stretch is run in the shortest time"
-    stops, steps = (int((turns & (kind == which)).sum()) for which in (Kind.STOP, Kind.PASS))
+    stops, steps = (int((turns & (kind == which)).sum()) for which in (JointKind.STOP, JointKind.PASS))
     text = f"{int(turns.sum()) - stops} corners are run through"
     text += f", {steps} of them with a step of velocity, which breaks acceleration and jerk" if steps else ""
     return text + (f", {stops} are full stops because that is faster" if stops else "")

@@ -6,12 +6,12 @@ Corners are rounded, tangent joints with a jump of the curvature too: a jump wou
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from planner.base.names import AUTO
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
-from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
@@ -30,13 +30,13 @@ class OptimalMethod(Method):
     """Time-optimal planning with jerk limits on rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
-    solver : a solver of third order
-    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job lets pay
-    shaped : deliver set points that leave the machine's vibration modes at rest (optimal/shaped.py)
+    solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver
+    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job allows
+    shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
-    solver: JerkLimited = field(default_factory=JerkLimited)
+    solver: str | ThirdOrderSolver = OWN
     rounds: int | None = None
     shaped: bool = False
 
@@ -54,7 +54,7 @@ class OptimalMethod(Method):
         settings = Settings(
             method="optimal",
             corner=self.corner,
-            order=ThirdOrder(self.solver),
+            order=ThirdOrder(third_order_solver(self.solver)),
             bezier=BezierCorner(sigma2=SIGMA2),
             rounds=self.rounds,
         )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from planner.base.errors import InputError
 from planner.base.names import (
+    BEZIER,
     METHODS,
     SINGLE_CORNERS,
     method_name,
@@ -16,6 +18,8 @@ from planner.base.names import (
     solver_name,
     users_of,
 )
+from planner.constraints.own import OwnLimit
+from planner.corners.smooth import CornerShape
 from planner.job.job import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
@@ -33,10 +37,11 @@ def plan(
     *,
     method: str | Method = "optimal",
     geometry: str | None = None,
-    corner: str | None = None,
+    corner: str | CornerShape | None = None,
     solver: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
+    limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
     progress: Progress | None = None,
     log: Log | None = None,
@@ -49,11 +54,14 @@ def plan(
     geometry  : how the path is smoothed, for "optimal" and "second-order": "spline" (one spline from stop to stop), "corners" (each
                 corner by itself) or "auto" (splines, or corners where they take less time); None for "auto", or for "corners" where
                 `corner` is given
-    corner    : the shape of single corners: "bezier", "fir" or "kinematic"; None for "bezier"
-    solver    : "reachability" or "toppra", for "second-order" only; None for "reachability"
+    corner    : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
+    solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
+                the first of them
     rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for as many
                 as the size of the job allows
     shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
+    limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order" keep them,
+                the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
     progress  : called with the stage's name and the fraction done (0 to 1)
     log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
@@ -73,6 +81,8 @@ def plan(
         )
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    if limits:
+        machine = machine.with_own((*machine.own, *limits))
     if isinstance(program, Program):
         return method.plan(program, machine, tolerance, progress, log)
     reading = Stages(progress)
@@ -86,7 +96,7 @@ def make_method(
     name: str,
     *,
     geometry: str | None = None,
-    corner: str | None = None,
+    corner: str | CornerShape | None = None,
     solver: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
@@ -98,7 +108,7 @@ def make_method(
     entry = METHODS[method_name(name)]
     settings: dict[str, Any] = dict(entry.settings)
     if entry.shapes:
-        kind, shape = smoothing(geometry, corner)
+        kind, shape = _smoothing(geometry, corner)
         if rounds is not None and rounds < 0:
             raise InputError(f"{rounds} rounds; it must be 0 or more")
         settings |= {"corner": shape or kind, "rounds": rounds, "shaped": shaped}
@@ -110,8 +120,16 @@ def make_method(
     return made
 
 
-def _check_used(method: str | Method, **given: str | int | None) -> None:
+def _check_used(
+    method: str | Method,
+    *,
+    geometry: str | None,
+    corner: str | CornerShape | None,
+    rounds: int | None,
+    **others: str | int | None,
+) -> None:
     """Raise InputError for a setting that the method would ignore."""
+    given = {"geometry": geometry, "corner": corner, "rounds": rounds} | others
     for setting, value in given.items():
         if value is None:
             continue
@@ -124,12 +142,19 @@ def _check_used(method: str | Method, **given: str | int | None) -> None:
                 f"{setting} = {value}: method {method} does not use it; it is for {' and '.join(users_of(setting))}"
             )
         if setting == "solver" and value not in METHODS[method].solvers:
-            raise InputError(f"solver = {value}: method {method} has {', '.join(METHODS[method].solvers)}")
-    if given["rounds"] is not None:
-        kind, shape = smoothing(_text(given["geometry"]), _text(given["corner"]))
+            raise InputError(
+                f"solver = {value}: method {method} does not use it; it has {', '.join(METHODS[method].solvers)}"
+            )
+    if rounds is not None:
+        kind, shape = _smoothing(geometry, corner)
         if kind == SINGLE_CORNERS:
-            raise InputError(f"rounds = {given['rounds']}: they reshape splines, and corner {shape} has none")
+            raise InputError(f"rounds = {rounds}: they reshape splines; {shape} corners have none")
 
 
-def _text(value: str | int | None) -> str | None:
-    return None if value is None else str(value)
+def _smoothing(
+    geometry: str | None, corner: str | CornerShape | None
+) -> tuple[str, str | CornerShape | None]:
+    """The geometry and the corner shape that are meant. Raises InputError for names that do not go together."""
+    if corner is None or isinstance(corner, str):
+        return smoothing(geometry, corner)
+    return smoothing(geometry, BEZIER)[0], corner  # a shape of one's own goes where the usual one goes

@@ -11,16 +11,13 @@ from dataclasses import dataclass
 
 from planner.base.names import AUTO
 from planner.corners.smooth import CornerShape
-from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolver
-from planner.feedrate.toppra_adapter import ToppraSolver
+from planner.feedrate.solvers import REACHABILITY, second_order_solver
 from planner.job.job import Job, Method
 from planner.job.plan import Plan
 from planner.optimal.loop import Settings, fastest_plan
 from planner.optimal.order import SecondOrder
 from planner.optimal.shaped import shaped_plan
-
-SOLVERS: dict[str, FeedrateSolver] = {"reachability": Reachability(), "toppra": ToppraSolver()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,19 +26,18 @@ class SecondOrderMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
-    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job lets pay
-    shaped : deliver set points that leave the machine's vibration modes at rest (optimal/shaped.py)
+    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job allows
+    shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
-    solver: str | FeedrateSolver = "reachability"
+    solver: str | FeedrateSolver = REACHABILITY
     rounds: int | None = None
     shaped: bool = False
 
     ways = ((0.5, 1.0), (0.1, 1.0))
 
     def plan_job(self, job: Job) -> Plan:
-        solver = SOLVERS[self.solver] if isinstance(self.solver, str) else self.solver
-        order = SecondOrder(solver, to_tighten=self.shaped)
+        order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)
         settings = Settings(method="second-order", corner=self.corner, order=order, rounds=self.rounds)
         return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)

@@ -1,4 +1,4 @@
-"""Method `stop`: every block from rest to rest, jerk-limited through ruckig. The baseline the papers compare with."""
+"""Method `stop`: every block from rest to rest, jerk-limited, in closed form. The baseline the papers compare with."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.errors import NotSolvedError
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.solution import Status
@@ -28,25 +27,17 @@ class StopMethod(Method):
         with job.stage("geometry"):
             exact = job.toolpath.with_joints(slice(None), Joint.STOP)
             samples = sample_path(round_corners(exact, machine, BezierCorner()), machine)
-        status, sentence = Status.OPTIMAL, "every block runs from rest to rest in the shortest time"
-        made = None
-        try:
-            with job.stage("solve") as report:
-                limits = block_limits(exact, machine)
-                lengths = np.diff(samples.s[np.append(samples.piece[:-1], len(samples) - 1)])
-                duration, jerk = rest_to_rest_phases(lengths, *limits, progress=report)
-        except NotSolvedError as fault:
-            status, sentence = Status.NUMERICAL_ERROR, str(fault)
-        else:
-            made = job.deliver(
-                job.behind_filters(Motion(samples=samples, law=law_of_phases(samples, duration, jerk)))
-            )
+        with job.stage("solve"):
+            lengths = np.diff(samples.s[np.append(samples.piece[:-1], len(samples) - 1)])
+            law = law_of_phases(samples, *rest_to_rest_phases(lengths, *block_limits(exact, machine)))
+            motion = Motion(samples=samples, law=law)
+        made = job.deliver(job.behind_filters(motion))
         return job.plan(
             made,
             method="stop",
             corner=None,
-            solver="ruckig",
-            status=status,
-            sentence=sentence,
+            solver="closed form",
+            status=Status.OPTIMAL,
+            sentence="every block runs from rest to rest in the shortest time",
             grid_points=len(samples),
         )

@@ -4,11 +4,11 @@ All other methods round the path first and then find the feed. Here the motion o
 nothing is given away between the two. What is found is the best motion near the one from which the search starts, with no certificate
 that there is no better one elsewhere. It takes about a second per corner where the others take milliseconds, hence `LEGS_MAX`.
 
-1. The path falls into courses between full stops, each a problem of its own (tube/course.py).
+1. The path is divided into runs between full stops; each is a problem of its own (tube/run.py).
 2. Methods of `starts` make motions from which the search begins (tube/guess.py): the first one's, and where that does not lead to a
    faster one the next one's.
 3. ipopt finds the motion; it is integrated exactly and slowed down by what rounding exceeds (tube/motion.py).
-4. Where no search ends faster than the first start, its motion stays, course by course (tube/splice.py): the plan is never slower.
+4. Where no search ends faster than the first start, its motion stays, run by run (tube/splice.py): the plan is never slower.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from planner.motion.passing import passing_times, standstills
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.nc.program import Program
-from planner.tube.course import Course, courses_of
 from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of
 from planner.tube.nlp import TubeNLP
+from planner.tube.run import TubeRun, tube_runs_of
 from planner.tube.splice import Part, Spliced
 
 # A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
@@ -60,16 +60,16 @@ class TubeMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
-            courses = list(courses_of(job.toolpath, job.machine))
-            _check_size(courses, job.program)
+            runs = list(tube_runs_of(job.toolpath, job.machine))
+            _check_size(runs, job.program)
         with job.stage("start"):
             starts = _Starts(self.starts, job)
             first = next(iter(starts), None)
         found: list[_Found] = []
         with job.stage("solve") as report:
-            for k, course in enumerate(courses if first else ()):
-                found.append(self._search(k, course, starts))
-                report((k + 1) / len(courses))
+            for k, run in enumerate(runs if first else ()):
+                found.append(self._search(k, run, starts))
+                report((k + 1) / len(runs))
         if first is None:
             failed = starts.failed[0]
             return self._plan(job, None, failed.status, f"no motion to start from: {failed.sentence}", 0)
@@ -91,30 +91,30 @@ class TubeMethod(Method):
             grid_points=grid_points,
         )
 
-    def _search(self, k: int, course: Course, starts: _Starts) -> _Found:
-        """What the search along course k leads to from one start after the other, until it is faster than the first start."""
+    def _search(self, k: int, run: TubeRun, starts: _Starts) -> _Found:
+        """What the search along run k leads to from one start after the other, until it is faster than the first start."""
         least, why = np.inf, []
         for start in starts:
             least = min(least, start.lasting(k)) if start is starts.made[0] else least
-            guess = guess_from(course, *start.window(k, course))
-            solution = self.solver.solve(course, guess)
+            guess = guess_from(run, *start.window(k, run))
+            solution = self.solver.solve(run, guess)
             if solution.h is None or solution.place is None:
                 why.append(solution.sentence)
                 continue
-            steps = steps_of(course, guess, solution)
+            steps = steps_of(run, guess, solution)
             if steps.h.sum() >= least:
                 why.append("the search did not end faster than its start")
                 continue
             place = (solution.place[:-1] + solution.place[1:]) / 2
-            return _Found(course, solution.status, solution.sentence, steps, place)
-        return _Found(course, Status.ACCEPTABLE, why[0])
+            return _Found(run, solution.status, solution.sentence, steps, place)
+        return _Found(run, Status.ACCEPTABLE, why[0])
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """How the search along a course ended; the steps and the places of their middles [mm], None where the start stays."""
+    """How the search along a run ended; the steps and the places of their middles [mm], None where the start stays."""
 
-    course: Course
+    run: TubeRun
     status: Status
     sentence: str
     steps: Steps | None = None
@@ -122,7 +122,7 @@ class _Found:
 
 
 class _Start:
-    """A motion from which the search begins, and where in it the courses are."""
+    """A motion from which the search begins, and where in it the runs are."""
 
     def __init__(self, plan: Plan, motion: MotionInTime, job: Job):
         acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
@@ -135,11 +135,11 @@ class _Start:
         self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
 
     def lasting(self, k: int) -> float:
-        """Time along course k [s]."""
+        """Time along run k [s]."""
         return float(self.arrival[k + 1] - self.departure[k])
 
     def part(self, k: int) -> Part:
-        """The motion along course k, with the standstill before it, and the one at the end of the job."""
+        """The motion along run k, with the standstill before it, and the one at the end of the job."""
         begin = self.arrival[k] if k else 0.0
         last = k + 2 == len(self.arrival)
         return Part(
@@ -148,19 +148,19 @@ class _Start:
             end=self.motion.end if last else float(self.arrival[k + 1]),
         )
 
-    def window(self, k: int, course: Course) -> tuple[Trajectory, FloatArray]:
-        """The motion along course k, and when it passes the course's vertices (R+1,) [s]."""
+    def window(self, k: int, run: TubeRun) -> tuple[Trajectory, FloatArray]:
+        """The motion along run k, and when it passes the run's vertices (R+1,) [s]."""
         begin, end = self.departure[k], self.arrival[k + 1]
         inside = np.searchsorted(self.seen.t, [begin, end])
         window = slice(inside[0], inside[1] + 1)
         columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
         part = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
-        t = np.clip(self.times[course.first], begin, end)
+        t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
         # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
         seen = np.append(np.diff(t) > 0, True)
         seen[1:-1] &= t[1:-1] < end
-        return part, np.interp(course.offset, course.offset[seen], t[seen])
+        return part, np.interp(run.offset, run.offset[seen], t[seen])
 
 
 class _Starts:
@@ -183,8 +183,8 @@ class _Starts:
             yield self.made[-1]
 
 
-def _check_size(courses: list[Course], program: Program) -> None:
-    legs = sum(float(np.maximum(np.ceil(course.length / course.step_max), 1.0).sum()) for course in courses)
+def _check_size(runs: list[TubeRun], program: Program) -> None:
+    legs = sum(float(np.maximum(np.ceil(run.length / run.step_max), 1.0).sum()) for run in runs)
     if legs > LEGS_MAX:
         raise InputError(
             f"{legs:.0f} lines and parts of arcs; method tube is for short jobs and takes at most {LEGS_MAX}: split the program, "
@@ -194,7 +194,7 @@ def _check_size(courses: list[Course], program: Program) -> None:
 
 
 def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered, list[int], str]:
-    """The motions found, and the start's where there are none; on which courses it stays, and why on those where one was found: a
+    """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
     motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
     start = first.plan.trajectory, first.plan.verdict
     assert start[0] is not None
@@ -220,14 +220,12 @@ def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered,
 
 
 def _missed(job: Job, motion: MotionInTime, found: list[_Found]) -> set[int]:
-    """The courses on which chords between samples miss vertices by more than the tolerance."""
+    """The runs on which chords between samples miss vertices by more than the tolerance."""
     machine, toolpath = job.real
     _, far = missed(motion, toolpath, machine.dt)
     over = np.flatnonzero(far > toolpath.tolerance)
     return {
-        k
-        for k, one in enumerate(found)
-        if ((over > one.course.first[0]) & (over < one.course.first[-1])).any()
+        k for k, one in enumerate(found) if ((over > one.run.first[0]) & (over < one.run.first[-1])).any()
     }
 
 
@@ -241,21 +239,21 @@ def _said(job: Job, first: _Start, found: list[_Found], kept: list[int], why: st
     text += f"; {start.method}{f' with corner {start.corner}' if start.corner else ''}, its start, took "
     text += f"{start.trajectory.cycle_time:.6g} s"
     if kept:
-        course = found[kept[0]].course
+        run = found[kept[0]].run
         why = why or found[kept[0]].sentence
         text += (
-            f" and stays on {len(kept)} of {len(found)} stretches between full stops, the first on lines "
-            f"{_lines(course, job.toolpath)}: {why}"
+            f" and stays on {len(kept)} of {len(found)} runs between full stops, the first on lines "
+            f"{_lines(run, job.toolpath)}: {why}"
         )
     return worst.status if worst and not kept else Status.ACCEPTABLE, text
 
 
 def _part(toolpath: Toolpath, found: _Found) -> Part:
-    """The steps along a course as a motion, with the dwell before it, and the one at the end of the job."""
-    course, steps = found.course, found.steps
+    """The steps along a run as a motion, with the dwell before it, and the one at the end of the job."""
+    run, steps = found.run, found.steps
     assert steps is not None
     assert found.place is not None
-    first, last = course.first[0], course.first[-1]
+    first, last = run.first[0], run.first[-1]
     before = toolpath.dwell[first]
     behind = toolpath.dwell[last] if last == len(toolpath) else 0.0
     standing = int(before > 0)  # a step without motion before the others
@@ -267,7 +265,7 @@ def _part(toolpath: Toolpath, found: _Found) -> Part:
         whole = np.zeros((standing + len(steps.h), len(toolpath.axes)))
         if name == "position":
             whole += toolpath.start[first]
-        whole[standing:, course.axis] = getattr(steps, name)
+        whole[standing:, run.axis] = getattr(steps, name)
         columns[name] = whole
     t = np.append(0.0, np.cumsum(np.append([before] * standing, steps.h)))
     motion = AxisMotion(
@@ -281,5 +279,5 @@ def _part(toolpath: Toolpath, found: _Found) -> Part:
     return Part(motion=motion, begin=0.0, end=motion.end)
 
 
-def _lines(course: Course, toolpath: Toolpath) -> str:
-    return f"{toolpath.line[course.first[0]]} to {toolpath.line[course.first[-1] - 1]}"
+def _lines(run: TubeRun, toolpath: Toolpath) -> str:
+    return f"{toolpath.line[run.first[0]]} to {toolpath.line[run.first[-1] - 1]}"

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,18 @@ GAUSS_X, GAUSS_W = (
     (1.0 + np.polynomial.legendre.leggauss(5)[0]) / 2.0,
     np.polynomial.legendre.leggauss(5)[1] / 2.0,
 )
+
+
+class _Pieces(NamedTuple):
+    """The fields of `AxisMotion` that the kernel samples, and the arc lengths s (L+1,) at the starts of its pieces and at the end."""
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    s: FloatArray
+    end: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,23 +96,16 @@ class AxisMotion:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
-        samples, axes = len(times), len(self.axes)
-        columns = np.empty((4, samples, axes))
-        s, feed, piece = np.empty(samples), np.empty(samples), np.empty(samples, np.int64)
-        _sample(
-            times,
-            self.t,
-            self.end,
-            self.position,
-            self.velocity,
-            self.acceleration,
-            self.jerk,
-            self.s,
-            columns,
-            s,
-            feed,
-            piece,
+        pieces = _Pieces(
+            t=self.t,
+            position=self.position,
+            velocity=self.velocity,
+            acceleration=self.acceleration,
+            jerk=self.jerk,
+            s=self.s,
+            end=float(self.end),
         )
+        columns, s, feed, piece = _sample(pieces, times)
         return Trajectory(
             axes=self.axes,
             dt=dt,
@@ -190,8 +196,12 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(times, t, end, position, velocity, acceleration, jerk, s, columns, s_out, feed, piece):
-    """Write position and derivatives at ascending times (T,) into columns (4, T, A), and s, feed and piece (T,)."""
+def _sample(pieces, times):
+    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,)."""
+    t, position, velocity, acceleration, jerk, s, end = pieces
+    samples, axes = len(times), position.shape[1]
+    columns = np.empty((4, samples, axes))
+    s_out, feed, piece = np.empty(samples), np.empty(samples), np.empty(samples, np.int64)
     last = len(t) - 1
     m = last_not_after(t, times[0], 0, last)
     for n in range(len(times)):
@@ -199,7 +209,7 @@ def _sample(times, t, end, position, velocity, acceleration, jerk, s, columns, s
             m += 1
         over = times[n] >= end
         tau, speed_sq = min(times[n], end) - t[m], 0.0
-        for k in range(position.shape[1]):
+        for k in range(axes):
             p, v, a, j = position[m, k], velocity[m, k], acceleration[m, k], jerk[m, k]
             columns[0, n, k] = p + tau * (v + tau * (a / 2.0 + tau * j / 6.0))
             columns[1, n, k] = 0.0 if over else v + tau * (a + tau * j / 2.0)
@@ -209,3 +219,4 @@ def _sample(times, t, end, position, velocity, acceleration, jerk, s, columns, s
         here = s[m] + _arc_length(velocity[m], acceleration[m], jerk[m], tau)
         s_out[n] = min(here, s[m + 1])
         feed[n], piece[n] = np.sqrt(speed_sq), m
+    return columns, s_out, feed, piece

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -153,25 +153,9 @@ def _sample_times(end: float, dt: float) -> FloatArray:
 def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     samples, law = motion.samples, motion.law
     toolpath = samples.path.toolpath
-    *columns, point, parameter = _sample(
-        samples.table.legs,
-        samples.table.corners,
-        samples.table.spans,
-        times,
-        law.t,
-        law.s,
-        law.feed,
-        law.acc_s,
-        law.jerk_s,
-        law.run,
-        law.end,
-        samples.piece,
-        samples.s,
-        samples.element,
-        samples.w0,
-        samples.w1,
-        samples.position,
-    )
+    timed = _Law(law.t, law.s, law.feed, law.acc_s, law.jerk_s, law.run, float(law.end))
+    grid = _Grid(samples.piece, samples.s, samples.element, samples.w0, samples.w1)
+    *columns, point, parameter = _sample(samples.table, timed, grid, times, samples.position.shape[1])
     names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
     segment = _segment(samples, point, parameter)
     return Trajectory(
@@ -197,12 +181,45 @@ def _segment(samples: PathSamples, point: Array, parameter: FloatArray) -> Array
     return segment
 
 
+class _Law(NamedTuple):
+    """The fields of `TimeLaw`."""
+
+    t: FloatArray
+    s: FloatArray
+    feed: FloatArray
+    acc_s: FloatArray
+    jerk_s: FloatArray
+    run: Array
+    end: float
+
+
+class _Grid(NamedTuple):
+    """The fields of `PathSamples` that say where its intervals are on the elements of the path."""
+
+    piece: Array
+    s: FloatArray
+    element: Array
+    w0: FloatArray
+    w1: FloatArray
+
+
+class _Interval(NamedTuple):
+    """An interval of the grid: parameters w0 .. w1 of an element, over an arc length h [mm]."""
+
+    element: int
+    w0: float
+    w1: float
+    h: float
+
+
 @njit(cache=True, error_model="numpy")
-def _invert(legs, corners, spans, element, w0, w1, h, work, out, c):
+def _invert(table, on, work, out, c):
     """Quintic c (6,) with w = w0 + (w1 - w0) sum c_n q^n, q = ds/h, matching w(s) and two derivatives at both ends.
 
     Returns whether it is accurate to `LENGTH_ROUNDING` in the middle, where it is worst as a rule, and at its quarters.
     """
+    legs, corners, spans = table
+    element, w0, w1, h = on
     c[:] = 0.0
     c[1] = 1.0
     if is_straight(legs, element):
@@ -235,9 +252,11 @@ def _horner(c, q):
 
 
 @njit(cache=True, error_model="numpy")
-def _refine(legs, corners, spans, element, w0, w1, w, ds, h, work, out):
+def _refine(table, on, w, ds, work, out):
     """Solve for the arc length ds from w0, starting from w: the inverse function's series to second order, and halves of what encloses
     the solution where that leads outside it (where an interval is a whole span it may)."""
+    legs, corners, spans = table
+    element, w0, w1, h = on
     w_ref = 0.5 * (w0 + w1)
     low, high = w0, w1
     w = min(max(w, w0), w1)
@@ -265,17 +284,20 @@ def _refine(legs, corners, spans, element, w0, w1, w, ds, h, work, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(
-    legs, corners, spans, times, t, s_law, feed, acc_s, jerk_s, run, end, piece, s, element, w0, w1, position
-):  # fmt: skip
-    """Positions and derivatives at ascending times (T,); also the grid point whose interval each lies in, and its parameter there."""
-    count, axes = len(times), position.shape[1]
+def _sample(table, law, grid, times, axes):
+    """Position and derivatives (T, A), s and feed (T,) at ascending times; also the grid point whose interval each lies in, and its
+    parameter there."""
+    legs, corners, spans = table
+    t, s_law, feed, acc_s, jerk_s, run, end = law
+    piece, s, element, w0, w1 = grid
+    count = len(times)
     out_position, out_velocity = np.empty((count, axes)), np.empty((count, axes))
     out_acceleration, out_jerk = np.empty((count, axes)), np.empty((count, axes))
     out_s, out_feed = np.empty(count), np.empty(count)
     point, parameter = np.empty(count, np.int64), np.empty(count)
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     inverse, inverse_of, exact = np.zeros(6), -1, False
+    on = _Interval(element[0], w0[0], w1[0], 0.0)
     m = last_not_after(t, times[0], 0, len(t) - 1)
     i = 0
     for n in range(count):
@@ -300,11 +322,12 @@ def _sample(
         h = s[i + 1] - s[i]
         ds = min(max(s_here - s[i], 0.0), h)
         if inverse_of != i:
-            exact = _invert(legs, corners, spans, element[i], w0[i], w1[i], h, work, here, inverse)
+            on = _Interval(element[i], w0[i], w1[i], h)
+            exact = _invert(table, on, work, here, inverse)
             inverse_of = i
         w = w0[i] + (w1[i] - w0[i]) * _horner(inverse, ds / h)
         if not exact:
-            w = _refine(legs, corners, spans, element[i], w0[i], w1[i], w, ds, h, work, here)
+            w = _refine(table, on, w, ds, work, here)
         parameter[n] = w
         element_point(legs, corners, spans, element[i], w, 0.5 * (w0[i] + w1[i]), work, here)
         to_arc_length(here)

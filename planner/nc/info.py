@@ -2,7 +2,7 @@
 
 Inspecting never stops at the first fault: what can be read is read, so for a program with faults the figures
 describe only that. A corner is the turn between the end of one feed move and the start of the next, at the
-tangents; moves that go nowhere are passed over, and a rapid, dwell or stop between two moves separates them.
+tangents; moves of length zero are passed over, and a rapid, dwell or stop between two moves separates them.
 """
 
 from __future__ import annotations

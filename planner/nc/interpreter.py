@@ -93,10 +93,10 @@ class Interpreter:
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
-        moves = np.flatnonzero(self.store.kind[: self.store.blocks] <= Kind.ARC)
+        moves = np.flatnonzero(self.store.block.kind[: self.store.blocks] <= Kind.ARC)
         if not len(moves):
             return
-        line = int(self.store.line[moves[0]])
+        line = int(self.store.block.line[moves[0]])
         before = slice(0, self.words.first[np.searchsorted(self.words.line, line, side="right")])
         code = np.rint(10.0 * self.words.value[before])
         if not ((self.words.letter[before] == ord("G")) & ((code == 200.0) | (code == 210.0))).any():

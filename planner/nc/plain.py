@@ -8,8 +8,11 @@ interpreter, which says what is wrong.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.block import NUMBER_MAX
@@ -25,30 +28,55 @@ _REFUSED[[ord(letter) for letter in LETTERS_REFUSED if letter != "O"]] = True
 _RAPID, _LINE = int(Kind.RAPID), int(Kind.LINE)
 
 
+class _Rows(NamedTuple):
+    """The fields of `Words` that the loop reads."""
+
+    letter: Array
+    value: FloatArray
+    line: Array
+    first: Array
+
+
+class _Fixed(NamedTuple):
+    """The fields of `State` that plain rows do not change."""
+
+    absolute: bool
+    unit: float
+    path_control: int
+    tolerance: float
+    offset: FloatArray
+
+
+class _Counts(NamedTuple):
+    """What plain rows change besides the position: how far they are read and stored, and the modal motion and feed."""
+
+    row: int
+    blocks: int
+    events: int
+    refusals: int
+    motion: int
+    feed: float
+
+
 def run_plain(words: Words, row: int, state: State, store: Store) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
-    row, store.blocks, store.events, store.refusals, state.motion, state.feed = _run(
-        words.letter, words.value, words.line, words.first, row, len(words.line),
-        state.motion, state.absolute, state.unit, state.feed, int(state.path_control), state.tolerance,
-        state.position, state.offset,
-        store.kind, store.end, store.feed, store.line, store.path_control, store.tolerance, store.blocks,
-        store.event_block, store.event_line, store.event_letter, store.event_value, store.events,
-        _REFUSED, store.refused_word, store.refusals,
-    )  # fmt: skip
-    return row
+    rows = _Rows(words.letter, words.value, words.line, words.first)
+    fixed = _Fixed(state.absolute, state.unit, int(state.path_control), state.tolerance, state.offset)
+    begin = _Counts(row, store.blocks, store.events, store.refusals, state.motion, state.feed)
+    end = _run(rows, begin, fixed, state.position, store.block, store.event, store.refused_word, _REFUSED)
+    store.blocks, store.events, store.refusals = end.blocks, end.events, end.refusals
+    state.motion, state.feed = end.motion, end.feed
+    return int(end.row)
 
 
 @njit(cache=True)
-def _run(
-    letter, value, line, first, row, rows,
-    motion, absolute, unit, feed, path_control, tolerance,
-    position, offset,
-    block_kind, block_end, block_feed, block_line, block_path_control, block_tolerance, blocks,
-    event_block, event_line, event_letter, event_value, events,
-    is_refused, refused_word, refusals,
-):  # fmt: skip  # pragma: no cover - compiled
+def _run(rows, begin, fixed, position, block, event, refused_word, is_refused):  # pragma: no cover - compiled
+    """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
+    letter, value, line, first = rows
+    absolute, unit, path_control, tolerance, offset = fixed
+    row, blocks, events, refusals, motion, feed = begin
     given = np.empty(3)
-    while row < rows:
+    while row < len(line):
         code, new_feed, speed, moves, is_plain = -1, -1.0, -1.0, False, True
         for axis in range(3):
             given[axis] = np.nan
@@ -80,21 +108,21 @@ def _run(
 
         motion, feed, refusals = code, new_feed, refused
         if speed >= 0:
-            event_block[events], event_line[events] = blocks, line[row]
-            event_letter[events], event_value[events] = _S, speed
+            event.block[events], event.line[events] = blocks, line[row]
+            event.letter[events], event.value[events] = _S, speed
             events += 1
         if moves:
             for axis in range(3):
                 if not np.isnan(given[axis]):
                     step = given[axis] * unit
                     position[axis] = step + (offset[axis] if absolute else position[axis])
-            block_kind[blocks] = _LINE if motion == 1 else _RAPID
+            block.kind[blocks] = _LINE if motion == 1 else _RAPID
             for axis in range(3):  # a slice assignment costs 3 s of compilation for its error message
-                block_end[blocks, axis] = position[axis]
-            block_feed[blocks] = feed if motion == 1 else np.inf
-            block_line[blocks] = line[row]
-            block_path_control[blocks] = path_control
-            block_tolerance[blocks] = tolerance
+                block.end[blocks, axis] = position[axis]
+            block.feed[blocks] = feed if motion == 1 else np.inf
+            block.line[blocks] = line[row]
+            block.path_control[blocks] = path_control
+            block.tolerance[blocks] = tolerance
             blocks += 1
         row += 1
-    return row, blocks, events, refusals, motion, feed
+    return _Counts(row, blocks, events, refusals, motion, feed)

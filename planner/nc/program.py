@@ -1,7 +1,7 @@
-"""The record that reading an NC program yields: blocks in arrays, all modal state resolved, in mm, s and rad.
+"""The record of an NC program: its blocks in arrays, all modal state resolved, in mm, s and rad.
 
-One row per *block that moves or dwells*. A source line can give several blocks (G28 through an intermediate point) or none.
-Arcs keep their extra data in rows of their own, so that memory follows what is there.
+There is one row for each *block that moves or dwells*. A source line can give several blocks (G28 through an intermediate point) or
+none. The data of arcs stand in rows of their own, so that memory grows with what is there.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class PathControl(IntEnum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Event:
-    """A word without influence on the motion (M3, S, T, M8 ...), kept with its place in the program."""
+    """A word without influence on the motion (M3, S, T, M8 ...), with its place in the program."""
 
     block: int  # it happens before this block; equal to the number of blocks at the end of the program
     line: int  # 1-based source line
@@ -46,20 +46,20 @@ class Event:
 class Program:
     """An NC program: B blocks over A axes.
 
-    source       : file name, for messages
+    source       : name of the file, for messages
     axes         : axis letters, ("x", "y", "z")
     start        : (A,) machine position before the first block [mm]
     kind         : (B,) `Kind`
     end          : (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
     feed         : (B,) programmed feed [mm/s]; inf for RAPID, DWELL and STOP
     dwell        : (B,) standstill [s], > 0 for DWELL only
-    line         : (B,) 1-based source line
+    line         : (B,) source line, from 1
     path_control : (B,) `PathControl` in force at the end of the block
-    tolerance    : (B,) P of G64 [mm]; NaN where the program gives none
+    tolerance    : (B,) P of G64 [mm]; NaN where the program sets none
     arc_block    : (K,) block index of each arc, ascending
-    arc_center   : (K, A) centre in the plane; the axial coordinate is the start's [mm]
-    arc_normal   : (K,) index of the axis normal to the arc's plane: 2 for G17, 1 for G18, 0 for G19
-    arc_sweep    : (K,) signed angle [rad], counter-clockwise about the normal axis positive, full turns included
+    arc_center   : (K, A) centre in the plane; the axial coordinate is that of the start [mm]
+    arc_normal   : (K,) index of the axis normal to the plane of the arc: 2 for G17, 1 for G18, 0 for G19
+    arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
     events       : words without influence on the motion
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
     """

@@ -1,5 +1,6 @@
-"""Reading an NC program or a plotter file (HPGL): text to `Program`, or an `InputError` that names file, line, column, the word and
-what to do. Which of the two a text is, its content says, and its name where the content does not."""
+"""Reading an NC program or a plotter file (HPGL): from text to `Program`, or an `InputError` that names file, line, column, the word,
+and what to do. The content of a text says which of the two it is, and its name if the content does not.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +21,11 @@ from planner.nc.program import Program
 def read_program(path: str | Path, machine: Machine | None = None, *, block_delete: bool = True) -> Program:
     """Read an NC program or a plotter file.
 
-    machine      : gives tool lengths, G28/G30 positions, work offsets, the first path control and what plotter files need;
+    machine      : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
                    None for zeros and blending
     block_delete : leave out the lines that start with "/"
 
-    Raises InputError for a file that cannot be read and for the first construct that is not supported or not valid.
+    Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.
     """
     return parse_program(load(path), machine, source=str(path), block_delete=block_delete)
 
@@ -41,9 +42,11 @@ def parse_program(
 def interpret(
     text: bytes | str, machine: Machine | None, *, source: str, block_delete: bool
 ) -> tuple[Program, Sequence[Fault]]:
-    """Run a program to its end past everything that is not supported; the faults in the order of the lines.
+    """Run a program to its end, past everything that is not supported.
 
-    A program in another language is one fault, and none of it is run. Raises InputError for an empty or binary text.
+    Returns the program and the faults, in the order of the lines. A program in another language is one fault, and nothing of it is run.
+
+    Raises InputError for an empty or binary text.
     """
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
     _check_text(data, source)

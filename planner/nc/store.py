@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,48 +15,78 @@ from planner.nc.program import Kind, Program
 from planner.nc.state import State
 
 
-class Store:
-    """Blocks and events so far. The arrays have room to spare; `blocks` and `events` say how much is used.
+class BlockColumns(NamedTuple):
+    """The blocks of a program, fields of `Program`, with room to spare."""
 
-    The compiled loop over plain rows writes into the arrays directly and sets the counts.
+    kind: Array  # uint8
+    end: FloatArray  # (., 3)
+    feed: FloatArray
+    line: Array  # int32
+    path_control: Array  # uint8
+    tolerance: FloatArray
+
+    @classmethod
+    def of_size(cls, rows: int) -> BlockColumns:
+        return cls(
+            kind=np.empty(rows, dtype=np.uint8),
+            end=np.empty((rows, 3)),
+            feed=np.empty(rows),
+            line=np.empty(rows, dtype=np.int32),
+            path_control=np.empty(rows, dtype=np.uint8),
+            tolerance=np.empty(rows),
+        )
+
+
+class EventColumns(NamedTuple):
+    """The events of a program, fields of `EventTable`, with room to spare."""
+
+    block: Array  # int64
+    line: Array  # int32
+    letter: Array  # uint8
+    value: FloatArray
+
+    @classmethod
+    def of_size(cls, rows: int) -> EventColumns:
+        return cls(
+            block=np.empty(rows, dtype=np.int64),
+            line=np.empty(rows, dtype=np.int32),
+            letter=np.empty(rows, dtype=np.uint8),
+            value=np.empty(rows),
+        )
+
+
+class Store:
+    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used.
+
+    The compiled loop over plain rows writes into the columns directly and sets the counts.
     """
 
     def __init__(self, rows: int, words: int):
         self.blocks = 0
         self.events = 0
         self.refusals = 0
-        self.kind = np.empty(rows, dtype=np.uint8)
-        self.end = np.empty((rows, 3))
-        self.feed = np.empty(rows)
-        self.line = np.empty(rows, dtype=np.int32)
-        self.path_control = np.empty(rows, dtype=np.uint8)
-        self.tolerance = np.empty(rows)
-        self.event_block = np.empty(rows, dtype=np.int64)
-        self.event_line = np.empty(rows, dtype=np.int32)
-        self.event_letter = np.empty(rows, dtype=np.uint8)
-        self.event_value = np.empty(rows)
+        self.block = BlockColumns.of_size(rows)
+        self.event = EventColumns.of_size(rows)
         self.refused_word = np.empty(words, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
 
     def make_room(self, rows: int) -> None:
         """Make sure that `rows` more blocks and `rows` more events fit."""
-        if self.blocks + rows > len(self.kind):
-            for name in ("kind", "end", "feed", "line", "path_control", "tolerance"):
-                setattr(self, name, _grown(getattr(self, name), self.blocks + rows))
-        if self.events + rows > len(self.event_block):
-            for name in ("event_block", "event_line", "event_letter", "event_value"):
-                setattr(self, name, _grown(getattr(self, name), self.events + rows))
+        if self.blocks + rows > len(self.block.kind):
+            self.block = BlockColumns(*(_grown(column, self.blocks + rows) for column in self.block))
+        if self.events + rows > len(self.event.block):
+            self.event = EventColumns(*(_grown(column, self.events + rows) for column in self.event))
 
     def add(self, kind: Kind, line: int, state: State) -> None:
         """Append a block that ends at the state's position."""
-        k = self.blocks
-        self.kind[k] = kind
-        self.end[k] = state.position
-        self.feed[k] = state.feed if kind in (Kind.LINE, Kind.ARC) else np.inf
-        self.line[k] = line
-        self.path_control[k] = state.path_control
-        self.tolerance[k] = state.tolerance
+        block, k = self.block, self.blocks
+        block.kind[k] = kind
+        block.end[k] = state.position
+        block.feed[k] = state.feed if kind in (Kind.LINE, Kind.ARC) else np.inf
+        block.line[k] = line
+        block.path_control[k] = state.path_control
+        block.tolerance[k] = state.tolerance
         self.blocks += 1
 
     def add_arc(self, arc: Arc, line: int, state: State) -> None:
@@ -69,11 +100,11 @@ class Store:
         self.add(Kind.DWELL if seconds > 0 else Kind.STOP, line, state)
 
     def add_event(self, letter: str, value: float, line: int) -> None:
-        k = self.events
-        self.event_block[k] = self.blocks
-        self.event_line[k] = line
-        self.event_letter[k] = ord(letter)
-        self.event_value[k] = value
+        event, k = self.event, self.events
+        event.block[k] = self.blocks
+        event.line[k] = line
+        event.letter[k] = ord(letter)
+        event.value[k] = value
         self.events += 1
 
     def finish(self, source: str, notes: Sequence[str]) -> Program:
@@ -86,22 +117,22 @@ class Store:
             source=source,
             axes=LINEAR_AXES,
             start=np.zeros(3),
-            kind=self.kind[used].copy(),
-            end=self.end[used].copy(),
-            feed=self.feed[used].copy(),
+            kind=self.block.kind[used].copy(),
+            end=self.block.end[used].copy(),
+            feed=self.block.feed[used].copy(),
             dwell=dwell,
-            line=self.line[used].copy(),
-            path_control=self.path_control[used].copy(),
-            tolerance=self.tolerance[used].copy(),
+            line=self.block.line[used].copy(),
+            path_control=self.block.path_control[used].copy(),
+            tolerance=self.block.tolerance[used].copy(),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
             arc_center=np.array([arc[1] for arc in self.arcs]).reshape(-1, 3),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
             events=EventTable(
-                block=self.event_block[seen].copy(),
-                line=self.event_line[seen].copy(),
-                letter=self.event_letter[seen].copy(),
-                value=self.event_value[seen].copy(),
+                block=self.event.block[seen].copy(),
+                line=self.event.line[seen].copy(),
+                letter=self.event.letter[seen].copy(),
+                value=self.event.value[seen].copy(),
             ),
             notes=tuple(notes),
         )

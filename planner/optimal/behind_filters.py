@@ -1,11 +1,11 @@
-"""Corners taken slowly enough for the filters behind: what `optimal` and `second-order` do before `behind.kept` has the last word.
+"""Corners taken slowly enough for the filters behind the setpoints, before delivery/filters.py slows down whole runs.
 
-A filtered motion passes a vertex by the mean of where the motion was within Td: the longer the motion takes for the corner itself, the
-less its way in and out counts. So it is the feed close to a place where the filtered motion leaves the tolerance that is limited, and
-nothing else: braking and speeding up stay as steep as the axes allow. The feedrate problem is solved again with that bound, its square
-smaller than the feed was by as much as the error has to be, until nothing is left.
+A filtered motion passes a vertex at the mean of its positions within Td: the longer the motion takes for the corner itself, the less
+the way in and out counts. Therefore only the feed close to a place where the filtered motion leaves the tolerance is limited; the
+motion brakes and speeds up as steeply as the axes allow. The feedrate problem is solved again with that bound, feed squared reduced in
+proportion to the error, until no such place is left.
 
-Along arcs, where curvature and feed are constant, the closed form says it beforehand (constraints/assemble.py).
+Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand (constraints/assemble.py).
 """
 
 from __future__ import annotations
@@ -23,14 +23,16 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.optimal.tighten import within_limits
 
-ROUNDS = 10
+ROUNDS = 10  # at most; pentagon and zig-zag behind 20/13 and 50/30 ms take 1 to 7
 # The feed is limited this far on both sides of a place [tolerances]. Pentagon at 20/13 and 50/30 ms with 0.3, 1, 2, 4: 1.030, 1.033,
 # 1.055, 1.102 s and 1.177, 1.195, 1.221, 1.307 s: the shorter, the more it is like waiting at the vertex.
 REACH = 0.3
-POWER = 1.0  # of the factor that the error has to fall by, on the square of the feed
+# The error of a corner goes with the square of its feed, so that the square changes by the factor by which the error has to; in a round
+# by no more than these [-], since braking and speeding up around the corner change that factor.
+CHANGE_MIN, CHANGE_MAX = 0.1, 2.0
 AIM = 0.01  # of the tolerance: what the search leaves unused [-]; it ends where no feed may grow by more than WORTH [-]
 WORTH = 0.05
-CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-]
+CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-], or the motion would stand where it cannot go on
 BOUND = "filter_error"
 
 
@@ -79,7 +81,7 @@ def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> t
 def _change(places: Places, path: FloatArray) -> FloatArray:
     """(N+1,) by what the square of the feed at every vertex may change."""
     room = np.maximum(1.0 - AIM - path, ROOM_LEAST)
-    return np.clip((room / np.maximum(places.near - path, room / 4.0)) ** POWER, 0.1, 2.0)
+    return np.clip(room / np.maximum(places.near - path, room / 4.0), CHANGE_MIN, CHANGE_MAX)
 
 
 def _zones(
@@ -111,7 +113,7 @@ def _elsewhere(
         _zones(problem, motion, behind, places.time[contour]), places.less[contour], strict=True
     ):
         less[a:b] = np.minimum(less[a:b], by)
-    return np.where(less < 1.0, np.minimum(bound, now * less**POWER), bound)
+    return np.where(less < 1.0, np.minimum(bound, now * less), bound)
 
 
 def _limited(

@@ -1,9 +1,9 @@
-"""Single corners instead of splines, between the full stops where they are faster.
+"""Single corners instead of splines, on the runs between full stops where they are faster.
 
-How long corners take at least is known from the motion without jerk limits on a coarse grid; where that is more than what the splines
-take, there is nothing to compare. The others are planned, which takes a grid point of their own grid at least, of which corners of a
-few um need 200 each where jerks are low: stretches are compared in the order of what they could gain by point, up to
-`COMPARED_POINTS`, and the rest is said.
+The motion without jerk limits on a coarse grid gives a lower bound on the time of single corners. If the bound is above the time of the
+splines, there is nothing to compare. Otherwise the corners are planned. That takes at least the points of their own grid, of which
+corners of a few um need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up to
+`COMPARED_POINTS`, and the notes say which runs were left out.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The geometries a motion can run on, by name: rounded corners, each by itself, or splines in their place.
 
-A run of corners of which one place gets no spline, because the curve leaves the tolerance there, has no certificate or has a cusp
-where the path turns back within the tolerance, would keep its single corners as a whole. The motion stops there instead, and the run
-is two. Stops change the runs around them, which may then get no spline elsewhere: this is repeated, `STOP_ROUNDS` times at most, and
-the last time such a place is fenced off by two full stops, and keeps its single corners alone.
+A run of corners may have a place where no spline fits: the curve leaves the tolerance there, has no certificate, or has a cusp because
+the path turns back within the tolerance. Instead of giving up the spline for the whole run, the motion gets a full stop there, which
+divides the run in two. The stops change the runs around them, which may then have no spline elsewhere; this is repeated `STOP_ROUNDS`
+times at most. The last time such a place is fenced off by two full stops, and only the corners between them stay single.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@
   tighten   where the motion exceeds a limit between grid points, allow less and solve again      tighten.py
   filters   the same where it leaves the tolerance behind the machine's own filters               behind_filters.py
   deliver   setpoints at the interpolation period, judged by the verifier                         job/job.py, verify/
-  compare   full stops, other corner shapes, method kinematic, where they may be faster           compare_plans.py
+  compare   full stops, fir corners, method kinematic, where they may be faster                   compare_plans.py
 
 Methods `optimal` (third order: with jerk limits) and `second-order` (second order: without) run the same loop with another `Order`.
 
@@ -24,10 +24,10 @@ What is tried more than once:
   corners between full stops     "auto", a bound on their time is lower    2                 solve         splines stay where faster
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
   finer grid                     up to FINE_POINTS points                  1                 finer solve   the faster one
-  tighter limits in places       excess above 1e-5 between points          6                 solve         stretches slower by the rest
+  tighter limits in places       excess above 1e-5 between points          3                 solve         stretches slower by the rest
   less feed in places            filters leave the tolerance               10                solve         waiting, slower stretches
   the whole slower               excess below 0.5 % in the verdict         3                 verdict       the verdict stands
-  another plan                   "auto", a bound on its time is lower      5                 a plan        the fastest that passes
+  another plan                   "auto", a bound on its time is lower      3                 a plan        the fastest that passes
 
 Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
 certificate fails are tightened (smoothing/relax.py). Around the loop, a job is planned again with less tolerance where chords between
@@ -62,9 +62,9 @@ from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# Rounds of reshaping: all of them together take about as long as this many grid points once, ...
+# Budget of reshaping: rounds x grid points <= WORK, ...
 WORK = 150_000
-# ... there are no more than this, and none after so many that together gained less than this [-].
+# ... at most ROUNDS_MAX rounds, and none after ROUNDS_SEEN rounds that together gained less than GAIN_MIN of the time [-].
 ROUNDS_MAX = 40
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
 LESS, MORE = 0.7, 3.0  # factors on a run's force after a gain and after a loss
@@ -86,7 +86,7 @@ class Settings:
     corner : "auto", "spline", the name of a corner shape, or a shape
     order  : which limits are kept, and the solver for them
     bezier : the corner of "bezier", and where there is no spline
-    rounds : of reshaping; None for as many as the size of the job lets pay
+    rounds : of reshaping; None for as many as the size of the job allows
     """
 
     method: str
@@ -97,8 +97,8 @@ class Settings:
 
 
 def fastest_plan(job: Job, settings: Settings) -> Plan:
-    """The plan on a smooth path, or with "auto" another one that passes its verdict in less time, or while that does not; its sentence
-    says which."""
+    """The plan on a smooth path; with "auto" another plan if that takes less time or passes while the smooth one fails. The sentence of
+    the plan says which."""
     smooth = best = plan_on_path(job, settings)
     if settings.corner != AUTO or not settings.order.jerk_limited:
         return smooth
@@ -107,11 +107,12 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
         best = better(best, stopped, "full stops at all blocks take less time", job.tell)
     if smooth.grid_points <= RIVAL_POINTS:
         for name in chances(best, job, settings.order):
-            cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
-            best = better(best, cornered, f"{name} corners take less time", job.tell)
             if name == "kinematic":
                 kinematic = KinematicMethod().plan_job(job.afresh())
                 best = better(best, kinematic, "method kinematic takes less time", job.tell)
+            else:
+                cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
+                best = better(best, cornered, f"{name} corners take less time", job.tell)
     if counted_time(best) == np.inf:
         kinematic = KinematicMethod().plan_job(job.afresh())
         best = better(best, kinematic, "method kinematic keeps all limits in less time", job.tell)
@@ -233,8 +234,8 @@ def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> 
 
 
 def _delivered(job: Job, motion: Motion, not_limited: tuple[str, ...]) -> Delivered:
-    """Set points and verdict of a motion, which is a little slower where the verdict finds next to nothing too much; every verdict is
-    at times from which nothing was fed back."""
+    """Setpoints and verdict of a motion. If the verdict finds a tiny excess the motion is slowed down, and judged at other times, from
+    which nothing was fed back."""
     made = job.deliver(motion, not_limited)
     for again in range(SEEN_ROUNDS):
         gentler = without_seen_excess(motion, made[1], again)

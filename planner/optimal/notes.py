@@ -1,4 +1,4 @@
-"""What a motion on a smooth path gave up, in short sentences, each with its first place and how often."""
+"""What a motion on a smooth path gave up, in short sentences, each with its first line and a count."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
 
 
 def not_compared_note(rounded: SmoothPath, left: Array, points: FloatArray) -> tuple[str, ...]:
-    """That single corners were not compared on some stretches between full stops (optimal/compare_corners.py).
+    """That single corners were not compared on some runs between full stops (optimal/compare_corners.py).
 
     left   : (L,) these stretches
     points : (G,) of the grid that each stretch would have
@@ -56,7 +56,7 @@ def not_compared_note(rounded: SmoothPath, left: Array, points: FloatArray) -> t
     stops = np.flatnonzero(rounded.joint == Joint.STOP)
     line = _line(rounded, int(rounded.legs.first[stops[left[0] + 1]]))
     return (
-        f"line {line}: single corners were not compared on {len(left)} stretches between full stops, of which the first ends "
+        f"line {line}: single corners were not compared on {len(left)} runs between full stops, of which the first ends "
         f"here: their grids would have some {points[left].sum():.2g} points",
     )
 

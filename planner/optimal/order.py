@@ -1,14 +1,13 @@
-"""The feedrate problem on one path, of third order (with jerk limits) or of second order (without), solved on a grid of its own.
+"""The feedrate problem on one path, of third order (with jerk limits) or second order (without), solved on a grid of its own.
 
-The grid is made for the motion: with jerk limits the second-order problem is solved first, since it says where straight stretches
-need points (feedrate/grid.py); without, the points where the profile switches on straight stretches are added and the problem is
+The grid is made for the motion. With jerk limits the second-order problem is solved first, because it says where straight legs need
+points (feedrate/grid.py). Without jerk limits the points where the profile switches on straight legs are added and the problem is
 solved once more, so that every switch falls on a point.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -17,21 +16,12 @@ from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.grid import add_switching_points, refine_for_jerk
-from planner.feedrate.solution import FeedrateSolution, FeedrateSolver
+from planner.feedrate.solution import FeedrateSolver
+from planner.feedrate.solvers import ThirdOrderSolver
 from planner.job.job import Job
 from planner.machine import Machine
 from planner.optimal.on_path import OnPath
 from planner.path.samples import RESOLUTION, PathSamples, sample_path
-
-
-class ThirdOrderSolver(Protocol):
-    """A solver with jerk limits; its repr is its row label in every table."""
-
-    def solve(
-        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
-    ) -> FeedrateSolution:
-        """Solve all pieces of the problem; failures are a status. `progress` is called with the fraction done."""
-        ...
 
 
 class Order(Protocol):

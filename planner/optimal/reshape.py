@@ -1,21 +1,22 @@
-"""A round of reshaping: splines that give way, within the tolerance, where their time-optimal motion pays most for its limits.
+"""A round of reshaping: splines give way, within the tolerance, where limits cost their time-optimal motion most.
 
-Let x(t) be the time-optimal motion along a spline and lambda its multipliers, those of the axis jerks for instance. With the spline's
-parameter as a function of time held fixed, a small change of the control points changes the optimal time by
+Let x(t) be the time-optimal motion along a spline and lambda its multipliers, those of the axis jerks for instance. If the parameter of
+the spline is kept as a function of time, a small change of the control points changes the optimal time by
 
     dT = sum over grid points and axes of  |lambda| d(|jerk| / limit)  +  the same of accelerations, velocities and feed,
 
-which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape, a convex quadratic in the control points because the
-motion is linear in them. A round minimises it, with a pull towards the present shape,
+which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape. This sum is a convex quadratic in the control points,
+because the motion is linear in them. A round minimises it, with a pull towards the present shape,
 
     sum |lambda|/2 (jerk/limit)^2 + ...  +  force/2 integral ((jerk - jerk_now)/limit)^2 dt,
 
-inside the tube (smoothing/). The feedrate problem is solved on the new path; the runs that got faster keep their new shape and are
-pulled less in the next round, the others keep the old one and are pulled more (optimal/loop.py). Where nothing can be gained to first
-order any more, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance. The
-multipliers jump from round to round, as limits take turns; their running mean over the rounds serves better. Without jerk limits the
-profile has corners, at which another limit takes over as soon as the shape gives way: there the mean takes in what holds the shapes
-that failed, too.
+inside the corridor (smoothing/). The feedrate problem is then solved on the new path. Runs that got faster keep their new shape and are
+pulled less in the next round; the others keep their old shape and are pulled more (optimal/loop.py). When nothing can be gained to
+first order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+
+The multipliers jump from round to round, because limits take turns; their running mean over the rounds works better. Without jerk
+limits the profile has corners, at which another limit takes over as soon as the shape gives way; there the mean also includes the
+multipliers of the shapes that failed.
 """
 
 from __future__ import annotations
@@ -102,6 +103,7 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     v = np.sqrt(solution.feed_sq)
     duration, jerk = solution.duration[on], solution.jerk_s[on]
     acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
+    axes = problem.machine_axes
     motion = SplineMotion(
         interval=interval,
         span=within,
@@ -112,7 +114,7 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
         duration=duration,
         price=_prices(problem, solution, on),
     )
-    H, Q = motion_bands(laid, motion, np.stack([problem.acceleration, _jerk_scale(planned)]))
+    H, Q = motion_bands(laid, motion, np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]]))
     return H, Q
 
 
@@ -134,8 +136,8 @@ def _jerk_scale(planned: OnPath) -> FloatArray:
 def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> FloatArray:
     """(I, 2, A, 3) weights of squared velocity, acceleration and jerk at both ends of the intervals `on` (module text) [s]."""
     assert solution.multipliers is not None
-    axes = len(problem.axes)
-    rows = np.abs(solution.multipliers.rows[on])
+    axes = problem.machine_axes
+    rows = np.abs(solution.multipliers.rows[on, :axes])
     slower = [problem.limit_scale[point][:, None] for point in (on, on + 1)]  # squares of shares of limits
     price = np.zeros((len(on), 2, axes, 3))
     price[:, 0, :, 1], price[:, 1, :, 1] = (0.5 * rows[:, :, k] * slower[k // 3] ** 4 for k in (0, 3))
@@ -143,7 +145,7 @@ def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> 
     name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
     feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_limit[on]
     price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
-    for k, axis in enumerate(problem.axes):
+    for k, axis in enumerate(problem.axes[:axes]):
         at = name == f"velocity.{axis}"
         price[at, 0, k, 0] = feed[at] / problem.d1[on[at], k] ** 2
     return price

@@ -1,4 +1,4 @@
-"""The plan of a solution: what holds it and what its limits cost."""
+"""The plan of a solution: its active limits and what they cost."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def plan_of_solution(
 
 
 def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
-    """What the limits of a jerk-limited motion cost; None where the solver does not tell, or behind filters, of which the problem
-    knows only a part."""
-    if not best.solution.multipliers or machine.fir is not None:
+    """What the limits of a jerk-limited motion cost; None where the solver does not tell, behind filters, of which the problem knows
+    only a part, and with limits of one's own."""
+    if not best.solution.multipliers or machine.fir is not None or machine.own:
         return None
     by_site = None
     if best.shape is not None and len(best.path.spline):  # what the tube of the splines costs

@@ -1,10 +1,10 @@
-"""What a motion exceeds a limit by between grid points, and two ways to make up for it: tighter limits there, or less speed.
+"""Limits that a motion exceeds between grid points, and two ways to keep them: tighter limits there, or less speed.
 
-A solver keeps the limits at the grid points; between them a motion may exceed them, by less than 0.5 % as a rule. Slowing down by lam
-divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so that an excess says by what lam the motion has to be slower there.
+A solver keeps the limits at the grid points. Between them the motion may exceed a limit, usually by less than 0.5 %. Slowing down by
+lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so an excess says by which lam the motion has to be slower there.
 
-`tightened` asks for it where it is needed, by the problem's `limit_scale` around every excess: the solution is slower in these places
-only. What is left, whole runs between full stops are slowed down by; that always ends.
+`tightened` scales the limits around every excess (`limit_scale` of the problem) and solves again: the new motion is slower in these
+places only. Each run between full stops is then slowed down uniformly by the excess that remains, which always ends.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints import normal_limit
+from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import paced, runs_of
 from planner.geometry.toolpath import Toolpath
@@ -27,10 +29,11 @@ from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than the first of these [-], at most so often; for jobs of more grid points, where
-# the time it takes counts, by more than the second, once: it leaves less than half of the excess.
+# Tightening pays while a run is slowed down by more than the first of these [-], and not for long: the first round gains 4e-3 of the
+# time, the second 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid
+# points, where the time it takes counts, it is done once, above the second: that leaves less than half of the excess.
 TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 6, 50_000
+TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
@@ -38,7 +41,7 @@ SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
-ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, "normal_acceleration": 2, "jerk": 3}
+ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, normal_limit.NAME: 2, "jerk": 3}
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
@@ -61,11 +64,15 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
             most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
             worst = np.maximum(worst, most ** (1.0 / order))
+        for order, ratio in ratios(machine.own, seen):
+            worst = np.maximum(worst, ratio.reshape(times.shape).max(axis=1) ** (1.0 / order))
         factor[own] = worst
     for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
+        for order, ratio in ratios(machine.own, chunk):
+            worst = np.maximum(worst, ratio ** (1.0 / order))
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor

@@ -26,12 +26,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.constraints import normal_limit
 from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.path.calm import Calm, calm, quiet_way
 from planner.path.grid import Intervals, divide, evaluate, grade
+from planner.path.own_rows import own_rows
 from planner.path.rows import Joints, Longest, PathLimits, cut_path
 
 # Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is then 0.6e-3 to 3e-3
@@ -47,6 +49,8 @@ ARC_PERIOD = 0.5
 REST_PERIOD = 0.25
 # A spline passes a change of the feed within so many tolerances of where the program has it [-].
 NEAR = 2.0
+# Rounds of halving intervals for limits of one's own, down to a um: from 10^9 km at most.
+HALVINGS_OF_OWN = 60
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -131,8 +135,7 @@ def sample_path(
         delay = float((acceleration / jerk).min())
         longest = ARC_PERIOD * delay
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
-    if machine.normal_acceleration is not None:
-        acceleration = np.minimum(acceleration, machine.normal_acceleration)
+    acceleration = np.minimum(acceleration, normal_limit.largest(machine))
     where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
     if third_order:
         where_calm = calm(path, table, (velocity, acceleration, jerk))
@@ -143,7 +146,7 @@ def sample_path(
     if third_order:
         rows = grade(table.legs, rows)
     grid = Intervals(*(rows[name].copy() for name in ("curve", "w0", "w1", "segment", "last")))
-    return PathSamples(
+    samples = PathSamples(
         path=path,
         table=table,
         piece=np.concatenate([[0], np.flatnonzero(grid.last) + 1]),
@@ -153,6 +156,42 @@ def sample_path(
         w1=grid.w1,
         segment=grid.segment,
         **evaluate(table, grid, limits)._asdict(),
+    )
+    if machine.own:
+        for _ in range(HALVINGS_OF_OWN):
+            coarse = own_rows(samples, machine, resolution).coarse
+            if not coarse.any():
+                break
+            samples = _halved(samples, np.flatnonzero(coarse), limits)
+    return samples
+
+
+def _halved(samples: PathSamples, interval: Array, limits: PathLimits) -> PathSamples:
+    """The grid with the intervals (n,) halved in their parameter; the limits matter to the margin."""
+    after = interval + 1
+    middle = 0.5 * (samples.w0[interval] + samples.w1[interval])
+
+    def put(values: Array, new: Array) -> Array:
+        return np.insert(values, after, new, axis=0)
+
+    w1 = samples.w1.copy()
+    w1[interval] = middle
+    w0, w1 = put(samples.w0, middle), put(w1, samples.w1[interval])
+    element, segment = (put(column, column[interval]) for column in (samples.element, samples.segment))
+    piece = samples.piece + np.searchsorted(interval, samples.piece, side="left")
+    last = np.zeros(len(w0), dtype=bool)
+    last[piece[1:] - 1] = True
+    grid = Intervals(element, w0, w1, segment, last)
+    return replace(
+        samples,
+        path=samples.path,
+        table=samples.table,
+        piece=piece,
+        element=element,
+        w0=w0,
+        w1=w1,
+        segment=segment,
+        **evaluate(samples.table, grid, limits)._asdict(),
     )
 
 

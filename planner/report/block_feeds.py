@@ -51,7 +51,7 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
     duration = _block_times(joint, toolpath)
     highest = _highest_feeds(trajectory, toolpath, joint, duration)
     cut = np.flatnonzero(~toolpath.rapid)
-    run = _runs(highest[cut], duration[cut], RUN_PERIODS * machine.dt)
+    run = runs_of_feed(highest[cut], duration[cut], RUN_PERIODS * machine.dt)
     cap = np.zeros(len(cut))  # of each run
     np.maximum.at(cap, run, highest[cut])
     cap = cap[run]
@@ -61,7 +61,7 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
     return feeds
 
 
-def _runs(highest: FloatArray, duration: FloatArray, least: float) -> Array:
+def runs_of_feed(highest: FloatArray, duration: FloatArray, least: float) -> Array:
     """(n,) the run of each block, from 0; `least` [s] as the module says."""
     run = np.empty(len(highest), np.int64)
     count, lasted = 0, 0.0

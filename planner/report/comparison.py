@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,22 +19,28 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.base.errors import InputError
+from planner.base.errors import InputError, NotSolvedError
+from planner.base.names import METHODS
 from planner.base.units import MICROMETRE
-from planner.machine import LINEAR_AXES
+from planner.constraints import normal_limit
+from planner.machine import LINEAR_AXES, Machine, load_machine
+from planner.nc.program import Program
+from planner.nc.reader import read_program
 from planner.report.export import summary, verdict_summary, versions
 from planner.report.replace import check_file, replacing_file, starts_with
 from planner.report.tables import ratio_text
 
 if TYPE_CHECKING:
+    from planner.constraints.own import OwnLimit
+    from planner.job.job import Method
     from planner.job.plan import Plan
-    from planner.machine import Machine
+    from planner.job.stages import Progress
     from planner.verify import Verdict
 
 SUFFIXES = (".json", ".csv")
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
 AFTER_PLANNING = ("read", "sample", "verify")
-QUANTITIES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
+QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +80,58 @@ class Row:
     def passed(self) -> bool:
         """Whether its motion passed the verdict."""
         return self.outcome == "passed"
+
+
+def compare(
+    program: Program | str | Path,
+    machine: Machine | str | Path | None = None,
+    methods: Sequence[str | Method] | None = None,
+    *,
+    limits: Sequence[OwnLimit] = (),
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Plan a program with several methods and put them side by side, judged by the same verifier.
+
+    methods   : names, or methods with settings of your own; None for all that have names
+    the others : as in `planner.plan`
+
+    Raises InputError for a program or a machine that cannot be read; what a method cannot do is its row.
+    """
+    from planner.methods.registry import DEFAULT_MACHINE
+
+    if not isinstance(machine, Machine):
+        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    if limits:
+        machine = machine.with_own((*machine.own, *limits))
+    if not isinstance(program, Program):
+        program = read_program(program, machine)
+    chosen = METHODS if methods is None else methods
+    return [row_of(method, program, machine, tolerance, progress) for method in chosen]
+
+
+def row_of(
+    method: str | Method,
+    program: Program,
+    machine: Machine,
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+) -> Row:
+    """The row of a method, whatever comes of it."""
+    from planner import plan
+
+    label = method if isinstance(method, str) else _label(method)
+    try:
+        return row_of_plan(
+            label, plan(program, machine, method=method, tolerance=tolerance, progress=progress)
+        )
+    except (InputError, NotSolvedError) as fault:
+        return refused(label, fault)
+
+
+def _label(method: Method) -> str:
+    """A method's repr, which names its settings, or its class."""
+    return type(method).__name__ if type(method).__repr__ is object.__repr__ else repr(method)
 
 
 def row_of_plan(method: str, plan: Plan) -> Row:

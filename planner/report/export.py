@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 PLANNED = "planned.ngc"
 NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
-PACKAGES = ("numpy", "scipy", "numba", "toppra", "ruckig", "pyarrow")
+PACKAGES = ("numpy", "scipy", "numba", "toppra", "pyarrow")
 
 
 def write_plan(

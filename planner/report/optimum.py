@@ -21,7 +21,7 @@ SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in 
 MILLISECOND = 1e-3  # [s]
 OTHERS = "others"
 NOTHING = "nothing"
-HINT = "no more than a hint"
+HINT = "a hint only"
 
 
 def held_by_text(grid: GridHistory) -> str:
@@ -47,7 +47,7 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
     ranked = ranked[:LIMITS_SHOWN]
     told = ", ".join(f"{name} {_seconds(prices, name)}" for name in ranked) or NOTHING
     if set(ranked) & set(prices.hints):
-        told += f"; ranges are {HINT}"
+        told += "; ranges are hints only"
     rows = [(f"{100.0 * MORE_LIMIT:g} % more saves", told)]
     more = f"{MORE_TOLERANCE / MICROMETRE:g} µm more"
     if prices.tolerance is None:
@@ -58,7 +58,7 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
     elif saved >= least:
         told = f"saves {saved:.3g} s"
     elif saved <= -least:
-        told = f"costs {-saved:.3g} s: on short legs corners take from each other"
+        told = f"costs {-saved:.3g} s: corners that share a short leg take room from each other"
     else:
         told = f"saves {NOTHING} to speak of"
     rows.append((f"{more} tolerance", told))

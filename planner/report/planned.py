@@ -65,14 +65,14 @@ def planned_notes(plan: Plan, text: bytes) -> list[str]:
     """Notes on blocks for which a control gains nothing from the planned feeds."""
     assert plan.trajectory is not None
     if _is_source(plan, text):
-        return ["planned.ngc is the program as it was: no block is planned to be slower than its F word"]
+        return ["planned.ngc equals the program: no block is planned slower than its F word"]
     lasting = block_times(plan.trajectory, plan.toolpath)[~plan.toolpath.rapid]
     short = int((lasting < plan.machine.dt).sum())
     if short <= MANY_SHORT * len(lasting):
         return []
     return [
         f"planned.ngc: {short:,} of {len(lasting):,} blocks last less than a period of {plan.machine.dt * 1e3:g} ms; a control that "
-        "joins or looks ahead over such blocks is better off with the original: F words can only slow it down"
+        "joins or looks ahead over such blocks runs the original faster, because F words can only slow it down"
     ]
 
 

@@ -67,7 +67,7 @@ def profiles_figure(plan: Plan) -> Figure:
             rotary = axis not in LINEAR_AXES
             per = 1.0 / RAD_PER_DEG if rotary else 1e-3
             panel = next(row)
-            _profile(panel, t, values[:, k] * per, BLUE)
+            draw_profile(panel, t, values[:, k] * per, BLUE)
             length = "°" if rotary else "m"
             panel.set_ylabel(f"{symbol}$_{{\\rm {axis.upper()}}}$\n[{length}/s{power}]")
             _limit_lines(panel, values[:, k] * per, limits[k] * per)
@@ -96,7 +96,7 @@ def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
                 linewidth=0.7,
                 zorder=1,
             )
-    _profile(panel, t, trajectory.feed, BLUE)
+    draw_profile(panel, t, trajectory.feed, BLUE)
     panel.set_ylim(0.0, 1.08 * max(float(trajectory.feed.max()), 1e-9))
     top = panel.get_ylim()[1]
     if finite.any() and programmed[finite].min() > top:
@@ -118,7 +118,7 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     shown = [k for k in ranked if share[k] >= SHARE_MIN * share.sum()][: len(BANDS)]
     colour_of = np.full(len(share), len(shown))
     colour_of[shown] = np.arange(len(shown))
-    winner = _majority(t, colour_of[active], len(shown) + 1, plan.trajectory.cycle_time)
+    winner = majority(t, colour_of[active], len(shown) + 1, plan.trajectory.cycle_time)
     colours = [matplotlib.colors.to_rgb(c) for c in (*BANDS[: len(shown)], OTHERS)]
     panel.imshow(
         np.array(colours)[winner][None],
@@ -139,7 +139,7 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     ]
 
 
-def _majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
+def majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
     """For each of COLUMNS columns over [0, end], the kind (of intervals from t[i]) that fills most of it."""
     cuts = np.union1d(t, np.linspace(0.0, end, COLUMNS + 1))
     middle = 0.5 * (cuts[1:] + cuts[:-1])
@@ -149,7 +149,7 @@ def _majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
     return filled.reshape(COLUMNS, kinds).argmax(axis=1)
 
 
-def _profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> None:
+def draw_profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> None:
     """A curve; with many samples the band between the least and the largest value of each column."""
     if len(t) <= 4 * COLUMNS:
         panel.plot(t, values, color=colour)

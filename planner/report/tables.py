@@ -132,7 +132,7 @@ def info_table(info: ProgramInfo) -> Group:
     turns = ", ".join(f"{count:,} over {angle:g}°" for angle, count in info.corners.items() if count)
     table.add_row("corners", turns or "none")
     if info.zero_moves:
-        table.add_row("moves that go nowhere", f"{info.zero_moves:,}")
+        table.add_row("moves of length zero", f"{info.zero_moves:,}")
     if info.dwell:
         table.add_row("dwells", f"{info.dwell:g} s")
     if info.tools:

@@ -40,7 +40,7 @@ def toolpath_figure(plan: Plan) -> Figure:
     extent = np.ptp(motion, axis=0)
     view = _flat_view(extent)
     shown = view if view is not None else list(range(len(linear)))
-    keep = _one_per_pixel(motion[:, shown])
+    keep = one_per_pixel(motion[:, shown])
     points, feed = motion[keep][:, shown], trajectory.feed[keep]
     rapid = plan.program.kind[trajectory.block[keep]] == Kind.RAPID
     figure, axes = _canvas(np.ptp(points, axis=0), flat=view is not None)
@@ -102,7 +102,7 @@ def _flat_view(extent: FloatArray) -> list[int] | None:
     return [k for k in range(len(extent)) if k != thin]
 
 
-def _one_per_pixel(points: FloatArray) -> Array:
+def one_per_pixel(points: FloatArray) -> Array:
     """Indices of the first and the last point and of every point that enters another pixel (or voxel)."""
     pixel = max(float(np.ptp(points, axis=0).max()) / PIXELS, 1e-9)
     while True:
@@ -135,7 +135,7 @@ def _programmed(plan: Plan, linear: list[int]) -> FloatArray:
     order = np.argsort(np.concatenate([index for index, _ in pieces]), kind="stable")
     points = np.concatenate([piece for _, piece in pieces])[order]
     points = np.vstack([points, path.end[-1:]])[:, linear]
-    return points[_one_per_pixel(points)]
+    return points[one_per_pixel(points)]
 
 
 def _unseen(names: list[str], motion: FloatArray, shown: list[int]) -> str:

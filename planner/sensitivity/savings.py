@@ -96,7 +96,7 @@ class Thinned:
         slope = (float(near) - self.value) / SLOPE_STEP
         if not again.solved or not slope * price > 0.0:
             return None
-        gained = self.solution.cycle_time - again.cycle_time - self._opened(samples.path)
+        gained = self.solution.cycle_time - again.cycle_time - self.opened(samples.path)
         return price / slope * gained
 
     def _changed(self, change: Change, share: float) -> tuple[PathSamples, Machine, FloatArray]:
@@ -113,7 +113,7 @@ class Thinned:
         moved = dataclasses.replace(samples, path=dataclasses.replace(path, toolpath=toolpath))
         return moved, machine, self.scale
 
-    def _opened(self, path: SmoothPath) -> float:
+    def opened(self, path: SmoothPath) -> float:
         """Time on parts of legs that another rounding leaves free and this one does not: the grid has no intervals there [s]."""
         if not self.rounds_again:
             return 0.0
@@ -139,7 +139,9 @@ def thinned(
     """The thinned grid of a solution, small enough for `rows` changes, solved without any of them; None if it has no solution."""
     again = rounds_again(samples.path)
     kept = _kept(samples, solution, machine, elements=again)
-    piece, kept, sampled = _windows(samples.piece, kept, int(max(POINTS, len(samples) / 4) / (rows + 1)))
+    piece, kept, sampled = windows_of_grid(
+        samples.piece, kept, int(max(POINTS, len(samples) / 4) / (rows + 1))
+    )
     part = _subset(samples, piece, kept)
     scale = problem.limit_scale[kept]
     try:
@@ -199,7 +201,7 @@ def _kept(samples: PathSamples, solution: FeedrateSolution, machine: Machine, *,
     return np.flatnonzero(keep)
 
 
-def _windows(piece: Array, kept: Array, most: int) -> tuple[Array, Array, bool]:
+def windows_of_grid(piece: Array, kept: Array, most: int) -> tuple[Array, Array, bool]:
     """Pieces (G+1,) of a thinned grid and its points, at most so many in windows spread over all of them; True if that is not all."""
     start = np.searchsorted(kept, piece)
     if len(kept) <= most:

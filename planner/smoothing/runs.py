@@ -1,7 +1,7 @@
-"""Runs: which stretches of the path are replaced by one curve each.
+"""Runs: the parts of the path that are replaced by one curve each.
 
-A run goes from full stop to full stop, or from and to the middle parts of long straight legs, which stay as they are: no motion needs
-more than a way to brake, and room for the knots of a smooth end, to prepare for a corner.
+A run reaches from full stop to full stop, or from and to the middle of long straight legs, which stay as they are. A corner influences
+the motion only within one braking distance, plus the knots of a smooth end.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ Every step is a cubic in time with the control points
 
     c0 = p0,   c1 = p0 + h v0/3,   c2 = p1 - h v1/3,   c3 = p1
 
-and each of them has its place on the course, the nearest one, never going back.
+and each of them has its place on the run, the nearest one, never going back.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.motion.trajectory import Trajectory
-from planner.tube.course import Course
+from planner.tube.run import TubeRun
 
 # Twice as many find motions 2e-5 to 5e-5 faster in three times the time; half as many do not converge (corner of 90 degrees, pentagon).
 STEPS_PER_UNIT = 4.0
 STEPS_OF_LEG = 2.0
 # Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
 LONGEST, MOST_FOR_LENGTH = 8.0, 30
-# Steps on arcs are at most this share of what the problem allows them (course.py) [-], which leaves room to move.
+# Steps on arcs are at most this share of what the problem allows them (run.py) [-], which leaves room to move.
 ARC_STEP = 0.8
-# Gauss-Newton steps to the nearest place on an arc, from the place that the length run so far gives.
+# Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guess:
-    """N steps along a course, the N+1 nodes around them, A axes.
+    """N steps along a run, the N+1 nodes around them, A axes.
 
     leg   : (N,) leg of each step
     h     : (N,) duration [s], > 0
     state : (N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]
-    place : (N, 4) places of the control points along the course [mm], non-decreasing
+    place : (N, 4) places of the control points along the run [mm], non-decreasing
     """
 
     leg: Array
@@ -65,29 +65,27 @@ class Guess:
         return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
 
 
-def guess_from(course: Course, motion: Trajectory, vertex_time: FloatArray) -> Guess:
-    """Cut a motion along the course into steps. vertex_time: (R+1,) when it passes the vertices [s], strictly ascending."""
-    leg, nodes = _steps(course, motion, vertex_time)
-    of_axes = (getattr(motion, name)[:, course.axis] for name in ("position", "velocity", "acceleration"))
+def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> Guess:
+    """Cut a motion along the run into steps. vertex_time: (R+1,) when it passes the vertices [s], strictly ascending."""
+    leg, nodes = _steps(run, motion, vertex_time)
+    of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
     state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
     state[[0, -1], 1:] = 0.0
-    state[[0, -1], 0] = course.vertex[[0, -1]]
+    state[[0, -1], 0] = run.vertex[[0, -1]]
     h = np.diff(nodes)
-    place = _places(course, leg, h, state, np.interp(nodes, motion.t, motion.s))
+    place = _places(run, leg, h, state, np.interp(nodes, motion.t, motion.s))
     return Guess(leg=leg, h=h, state=state, place=place)
 
 
-def _steps(course: Course, motion: Trajectory, vertex_time: FloatArray) -> tuple[Array, FloatArray]:
+def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
-    unit = float(
-        min((course.acceleration / course.jerk).min(), np.cbrt(course.budget.min() / course.jerk.max()))
-    )
-    busy = np.minimum((np.abs(motion.jerk[:, course.axis]) / course.jerk).max(axis=1), 1.0)
+    unit = float(min((run.acceleration / run.jerk).min(), np.cbrt(run.budget.min() / run.jerk.max())))
+    busy = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
     lasting = np.diff(motion.t)
     spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * STEPS_PER_UNIT / unit
     least = STEPS_OF_LEG + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
-    least = np.maximum(least, course.length / (ARC_STEP * course.step_max))
-    steps, times = np.empty(len(course), np.int64), []
+    least = np.maximum(least, run.length / (ARC_STEP * run.step_max))
+    steps, times = np.empty(len(run), np.int64), []
     for r, (begin, end) in enumerate(pairwise(vertex_time)):
         inside = motion.t[(motion.t > begin) & (motion.t < end)]
         t = np.concatenate([[begin], inside, [end]])
@@ -96,28 +94,28 @@ def _steps(course: Course, motion: Trajectory, vertex_time: FloatArray) -> tuple
         share += least[r] * even - share[0]
         steps[r] = int(np.ceil(share[-1]))
         times.append(np.interp(share[-1] * np.arange(steps[r]) / steps[r], share, t))
-    return np.repeat(np.arange(len(course)), steps), np.append(np.concatenate(times), vertex_time[-1])
+    return np.repeat(np.arange(len(run)), steps), np.append(np.concatenate(times), vertex_time[-1])
 
 
 def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArray:
     return np.stack([np.interp(at, t, values) for values in column.T], axis=1)
 
 
-def _places(course: Course, leg: Array, h: FloatArray, state: FloatArray, run: FloatArray) -> FloatArray:
-    """(N, 4) places of the control points; run: (N+1,) length that the motion has run at the nodes [mm]."""
+def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelled: FloatArray) -> FloatArray:
+    """(N, 4) places of the control points; travelled: (N+1,) length that the motion has travelled at the nodes [mm]."""
     p, v = state[:, 0], state[:, 1]
     third = h[:, None] / 3
     controls = np.stack([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])
     last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
     begin = np.append(0, last[:-1] + 1)
-    of_run = course.length / (run[last + 1] - run[begin])
+    per_length = run.length / (travelled[last + 1] - travelled[begin])
     places = np.empty((len(leg), 4))
     for k, (control, share) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
-        there = (1 - share) * run[:-1] + share * run[1:]
-        x = (there - run[begin][leg]) * of_run[leg]
+        there = (1 - share) * travelled[:-1] + share * travelled[1:]
+        x = (there - travelled[begin][leg]) * per_length[leg]
         for _ in range(NEAREST_STEPS):
-            miss, along = control - course.points(leg, x), course.tangents(leg, x)
-            x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, course.length[leg])
+            miss, along = control - run.points(leg, x), run.tangents(leg, x)
+            x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, run.length[leg])
         places[:, k] = x
-    places[begin, 0], places[last, 3] = 0.0, course.length
-    return np.maximum.accumulate((places + course.offset[leg][:, None]).ravel()).reshape(-1, 4)
+    places[begin, 0], places[last, 3] = 0.0, run.length
+    return np.maximum.accumulate((places + run.offset[leg][:, None]).ravel()).reshape(-1, 4)

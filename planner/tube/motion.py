@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.tube.course import Course
 from planner.tube.guess import Guess
 from planner.tube.nlp import TubeSolution
+from planner.tube.run import TubeRun
 
 # Places in every step at which the normal acceleration is measured [share of the step]; between them it is above by less than 1e-6.
 MEASURED_AT = np.linspace(0.0, 1.0, 257)
@@ -36,13 +36,13 @@ class Steps:
     jerk: FloatArray
 
 
-def steps_of(course: Course, guess: Guess, solution: TubeSolution) -> Steps:
+def steps_of(run: TubeRun, guess: Guess, solution: TubeSolution) -> Steps:
     """The motion of a solution, on its end and within all limits."""
     assert solution.h is not None
     assert solution.jerk is not None
     h, jerk = solution.h, solution.jerk
-    steps = _integrated(course, h, jerk - _closing(course, h, jerk))
-    by = max(_excess(course, guess, steps), 1.0)
+    steps = integrated(run, h, jerk - closing_jerks(run, h, jerk))
+    by = max(_excess(run, guess, steps), 1.0)
     return Steps(
         h=h * by,
         position=steps.position,
@@ -52,11 +52,12 @@ def steps_of(course: Course, guess: Guess, solution: TubeSolution) -> Steps:
     )
 
 
-def _integrated(course: Course, h: FloatArray, jerk: FloatArray) -> Steps:
+def integrated(run: TubeRun, h: FloatArray, jerk: FloatArray) -> Steps:
+    """The motion from rest at the first vertex with jerks (N, A) [mm/s3], constant over steps of h (N,) [s]."""
     h = h[:, None]
     acceleration = _before(h * jerk)
     velocity = _before(h * (acceleration + h * jerk / 2))
-    position = course.vertex[0] + _before(h * (velocity + h * (acceleration / 2 + h * jerk / 6)))
+    position = run.vertex[0] + _before(h * (velocity + h * (acceleration / 2 + h * jerk / 6)))
     return Steps(h=h[:, 0], position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
@@ -65,20 +66,20 @@ def _before(change: FloatArray) -> FloatArray:
     return np.vstack([np.zeros((1, change.shape[1])), np.cumsum(change, axis=0)[:-1]])
 
 
-def _closing(course: Course, h: FloatArray, jerk: FloatArray) -> FloatArray:
+def closing_jerks(run: TubeRun, h: FloatArray, jerk: FloatArray) -> FloatArray:
     """(N, A) the smallest part of the jerks that carries the motion beyond its end."""
     rest = (h.sum() - np.cumsum(h)) / h.sum()  # after each step, in units of the whole time
     own = h / h.sum()
     to_end = np.stack(
         [own, own * (own / 2 + rest), own * (own**2 / 6 + rest * (own / 2 + rest / 2))]
     )  # of a, v, p, in those units
-    way = (course.vertex[-1] - course.vertex[0]) / h.sum() ** 3
+    way = (run.vertex[-1] - run.vertex[0]) / h.sum() ** 3
     missed = to_end @ jerk - np.stack([np.zeros_like(way), np.zeros_like(way), way])
     closing: FloatArray = np.linalg.lstsq(to_end, missed, rcond=None)[0]
     return closing
 
 
-def _excess(course: Course, guess: Guess, steps: Steps) -> float:
+def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
     """By what factor the motion has to be slowed down to keep all limits; <= 1 if it keeps them."""
     h, v, a, j = steps.h[:, None], steps.velocity, steps.acceleration, steps.jerk
     ordinates = np.concatenate(
@@ -86,16 +87,16 @@ def _excess(course: Course, guess: Guess, steps: Steps) -> float:
     )  # both bound the parabola; every step ends where the next one begins
     leg = guess.leg
     ratios = [
-        (np.abs(ordinates) / course.velocity).max(),
-        (np.linalg.norm(ordinates, axis=1) / np.tile(course.feed[leg], 2)).max(),
-        np.sqrt((np.abs(a) / course.acceleration).max()),
-        np.cbrt((np.abs(j) / course.jerk).max()),
+        (np.abs(ordinates) / run.velocity).max(),
+        (np.linalg.norm(ordinates, axis=1) / np.tile(run.feed[leg], 2)).max(),
+        np.sqrt((np.abs(a) / run.acceleration).max()),
+        np.cbrt((np.abs(j) / run.jerk).max()),
     ]
-    for share in MEASURED_AT if np.isfinite(course.normal_max).any() else ():
+    for share in MEASURED_AT if np.isfinite(run.across_max).any() else ():
         tau = share * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
         speed_sq = (along**2).sum(axis=1)
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2
         normal_sq = np.divide(across_sq, speed_sq, out=np.zeros(len(h)), where=speed_sq > 0)
-        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / course.normal_max[leg]).max())
+        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / run.across_max[leg]).max())
     return float(max(ratios))

@@ -1,8 +1,8 @@
 """The free optimum inside the tolerance: the motion of the axes itself is what is sought, its path included.
 
-A course of R legs is run in N steps of duration h_i and constant jerk j_i (a vector over the axes); nodes between them have position
-p_i, velocity v_i, acceleration a_i. The kinematics are exact, and every programmed vertex has a node. A step is a Bezier cubic with the
-control points
+The motion along a run of R legs has N steps of duration h_i and constant jerk j_i (a vector over the axes); nodes between them have
+position p_i, velocity v_i, acceleration a_i. The kinematics are exact, and every programmed vertex has a node. A step is a Bezier cubic
+with the control points
 
     c0 = p_i,   c1 = p_i + h v_i/3,   c2 = p_{i+1} - h v_{i+1}/3,   c3 = p_{i+1};     s0 <= s1 <= s2 <= s3 their places on the leg.
 
@@ -39,10 +39,11 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.packages import needed
 from planner.feedrate.solution import Status
-from planner.tube.course import Course
 from planner.tube.guess import Guess
 from planner.tube.numbers import acceleration_along, step_numbers
+from planner.tube.run import TubeRun
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
 # iterations on single corners; without it, the pentagon does not converge in 500. 1e-2 costs 5e-4.
@@ -50,7 +51,7 @@ PULL = 1e-4
 # Steps may become this much longer or shorter than they were guessed [-].
 LONGER = 4.0
 # The guess is slowed down by these factors in turn until one leads to an optimum [-]: at the guess itself the limits hold, and ipopt
-# begins between them with tiny steps. 1.2 settles 7 of the 8 courses tried (single corners, pentagon, arcs, spiral) in 47 to 295
+# begins between them with tiny steps. 1.2 settles 7 of the 8 runs tried (single corners, pentagon, arcs, spiral) in 47 to 295
 # iterations, 1.5 the eighth; that with ipopt's barrier parameter at BARRIER and decreasing monotonely. Adaptive ones drop early, hug
 # the limits and trickle (pentagon: more than 300 iterations instead of 112).
 SLOWER = (1.2, 1.5, 1.0)
@@ -99,7 +100,7 @@ class TubeSolution:
 
     h        : (N,) durations [s]
     jerk     : (N, A) [mm/s3]
-    place    : (N+1,) places of the nodes along the course [mm]
+    place    : (N+1,) places of the nodes along the run [mm]
     """
 
     status: Status
@@ -113,7 +114,7 @@ class TubeSolution:
 
 @dataclass(frozen=True, kw_only=True)
 class TubeNLP:
-    """The free optimum by ipopt. tol: relative tolerance of optimality [-]; max_iterations: per course and start."""
+    """The free optimum by ipopt. tol: relative tolerance of optimality [-]; max_iterations: per run and start."""
 
     tol: float = 1e-5
     max_iterations: int = 300
@@ -122,11 +123,11 @@ class TubeNLP:
         if not self.tol > 0:
             raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
 
-    def solve(self, course: Course, guess: Guess) -> TubeSolution:
+    def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
         """The best motion near the guess, never slower than it; a failure from every start is the status of the last."""
         iterations, took = 0, 0.0
         for slower in SLOWER:
-            found = self._solve(course, guess.slower(slower))
+            found = self._solve(run, guess.slower(slower))
             iterations, took = iterations + found.iterations, took + found.solve_time
             if found.h is not None and found.h.sum() > guess.h.sum() * (1.0 + NOT_SLOWER):
                 found = TubeSolution(status=STUCK[0], sentence=STUCK[1], iterations=0, solve_time=0.0)
@@ -134,24 +135,24 @@ class TubeNLP:
                 break
         return replace(found, iterations=iterations, solve_time=took)
 
-    def _solve(self, course: Course, guess: Guess) -> TubeSolution:
+    def _solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
         """Transcribe and solve; the whole formulation, from top to bottom."""
-        import casadi as ca
+        ca = needed("casadi", "method tube")
 
         began = time.perf_counter()
-        steps, axes, leg = len(guess), len(course.axis), guess.leg
+        steps, axes, leg = len(guess), len(run.axis), guess.leg
         at_vertex = np.flatnonzero(np.diff(leg)) + 1  # nodes
 
         # ---- scaling: units in which the mean step has length 1 and duration 1 ---------------------------------------------
-        second, length = guess.h.mean(), course.offset[-1] / steps
+        second, length = guess.h.mean(), run.offset[-1] / steps
         speed, acc, jerk = length / second, length / second**2, length / second**3
-        v_max, a_max, j_max = course.velocity / speed, course.acceleration / acc, course.jerk / jerk
+        v_max, a_max, j_max = run.velocity / speed, run.acceleration / acc, run.jerk / jerk
 
-        watched = len(WATCHED) if np.isfinite(course.normal_max).any() else 0
+        watched = len(WATCHED) if np.isfinite(run.across_max).any() else 0
 
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
-        part = (course.length / np.bincount(leg))[np.append(leg, leg[-1])]
+        part = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
         unit = ca.DM(part / length).T
         w_node, w_step = (
             ca.MX.sym("node", 3 * axes + 1, steps + 1),
@@ -204,13 +205,13 @@ class TubeNLP:
             (apart(p1, s3) / room_end**2, -np.inf, 1.0),
             (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_part, 0.0, np.inf),
         ]
-        if (course.feed > course.velocity.min()).any():
+        if (run.feed > run.velocity.min()).any():
             rows.append((ordinate / v_max, -1.0, 1.0))
-        if (course.feed < np.linalg.norm(course.velocity)).any():
+        if (run.feed < np.linalg.norm(run.velocity)).any():
             rows.append(
                 (ca.vertcat(ca.sumsqr(ordinate) / feed**2, ca.sumsqr(v1) / feed_end**2), -np.inf, 1.0)
             )
-        if (course.curvature > 0).any():
+        if (run.curvature > 0).any():
             rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
         along = ca.SX.sym("along", watched)  # u of the places that are watched, times the pace
         for k, q in enumerate(WATCHED[:watched]):
@@ -225,7 +226,7 @@ class TubeNLP:
             *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace),
         )
         of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
-        data = ca.DM(step_numbers(course, guess, part[:-1], length, speed, acc).T)
+        data = ca.DM(step_numbers(run, guess, part[:-1], length, speed, acc).T)
         constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
         row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
         row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
@@ -233,10 +234,10 @@ class TubeNLP:
         # ---- limits and boundary ----------------------------------------------------------------------------------------------
         node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
         node_min = -node_max
-        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (course.offset[leg] / part[:-1])[at_vertex]
+        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (run.offset[leg] / part[:-1])[at_vertex]
         for end in (0, -1):
             rest = np.concatenate(
-                [course.vertex[end] / length, np.zeros(2 * axes), [course.offset[end] / part[end]]]
+                [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / part[end]]]
             )
             node_min[end] = node_max[end] = rest
         longer = LONGER_WATCHED if watched else LONGER
@@ -249,7 +250,7 @@ class TubeNLP:
 
         # ---- initial guess ----------------------------------------------------------------------------------------------------
         p0, v0, a0 = guess.state[:, 0] / length, guess.state[:, 1] / speed, guess.state[:, 2] / acc
-        place = np.append(guess.place[:, 0], course.offset[-1]) / part
+        place = np.append(guess.place[:, 0], run.offset[-1]) / part
         node_start = np.column_stack([p0, v0, a0, place])
         step_start = np.column_stack(
             [

@@ -5,40 +5,40 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.tube.course import Course
 from planner.tube.guess import Guess
+from planner.tube.run import TubeRun
 
 # The tolerance is narrowed by this share [-], so that rounding stays inside it.
 ROUNDING = 1e-4
 
 
 def step_numbers(
-    course: Course, guess: Guess, part: FloatArray, length: float, speed: float, acc: float
+    run: TubeRun, guess: Guess, part: FloatArray, length: float, speed: float, acc: float
 ) -> FloatArray:
     """(N, 4 A + 11) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
     leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
-    room, feed = course.room[leg] * (1.0 - ROUNDING), course.feed[leg]
+    room, feed = run.room[leg] * (1.0 - ROUNDING), run.feed[leg]
     room_end, feed_end = room.copy(), feed.copy()
-    beside = np.minimum(course.room[:-1], course.room[1:])
-    room_end[last] = np.minimum(course.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
+    beside = np.minimum(run.room[:-1], run.room[1:])
+    room_end[last] = np.minimum(run.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
     feed_end[last] = np.minimum(feed[last], feed[last + 1])
-    fastest = np.linalg.norm(course.velocity)  # instead of inf, where nothing else limits
-    strongest = 2.0 * np.linalg.norm(course.acceleration)
+    fastest = np.linalg.norm(run.velocity)  # instead of inf, where nothing else limits
+    strongest = 2.0 * np.linalg.norm(run.acceleration)
     return np.column_stack(
         [
-            course.base[leg] / length,
-            course.drift[leg],
-            course.e1[leg],
-            course.e2[leg],
-            course.offset[leg] / length,
-            course.radius[leg] / length,
-            course.rate[leg] * length,
+            run.base[leg] / length,
+            run.drift[leg],
+            run.e1[leg],
+            run.e2[leg],
+            run.offset[leg] / length,
+            run.radius[leg] / length,
+            run.rate[leg] * length,
             room / length,
             room_end / length,
-            np.minimum(course.step_max[leg], course.offset[-1]) / length,
+            np.minimum(run.step_max[leg], run.offset[-1]) / length,
             np.minimum(feed, fastest) / speed,
             np.minimum(feed_end, fastest) / speed,
-            np.minimum(course.normal_max[leg], strongest) / acc,
+            np.minimum(run.across_max[leg], strongest) / acc,
             part / length,
             _pace(guess) / speed,
         ]

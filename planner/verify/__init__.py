@@ -7,6 +7,7 @@ sharp each check is:
     times.py      where it looks between the samples
     limits.py     velocity, acceleration, jerk per axis, feed, normal acceleration: on the columns and on differences of the
                   delivered positions
+    own.py        limits of one's own that the machine came with, by their laws
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
     contour.py    how far motion and path are apart, also where a motion was lost
     samples.py    periods, density and digits of the samples, their unit of time, rest at both ends

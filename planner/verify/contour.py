@@ -19,7 +19,7 @@ from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, line_of
 from planner.verify.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
-from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, Pieces, widened
+from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
 from planner.verify.verdict import LimitCheck
 
 WIDER = (4.0, 16.0, 64.0)  # times the budget
@@ -36,7 +36,7 @@ class Apart:
     """
 
     looks: list[Look]
-    pieces: Pieces
+    pieces: ProgramPieces
     widened: float = 1.0
 
     @property
@@ -141,7 +141,7 @@ class Apart:
         return said
 
 
-def apart(looks: list[Look], pieces: Pieces, read: Callable[[Pieces], list[Look]]) -> Apart:
+def apart(looks: list[Look], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Look]]) -> Apart:
     """The readings that measure the motion: `looks` if it fits in them, or those by `read` with wider budgets in which it does."""
     found = Apart(looks, pieces)
     if found.fits:
@@ -158,7 +158,7 @@ def apart(looks: list[Look], pieces: Pieces, read: Callable[[Pieces], list[Look]
     return found
 
 
-def lost_after(looks: list[Look], toolpath: Toolpath, pieces: Pieces, complete: bool) -> int | None:
+def lost_after(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, complete: bool) -> int | None:
     """NC line of the last block that the motion could be followed along before it was lost, or ended too early; None if it ran
     them all."""
     tallies = [look.seen.match.tally for look in looks]

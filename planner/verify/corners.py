@@ -145,26 +145,20 @@ class CornerCheck:
         }
 
     def sentence(self) -> str:
-        """Both in one line: "eq. 18-20 hold at 4 of 4 corners, at most 0.9993; passed 1.54 times as fast as eq. 20 lets ..."."""
+        """Both in one line: "eq. 18-20 hold at 4 of 4 corners, at most 0.9993; 1.54 times the speed of eq. 20 (median)"."""
         if not len(self):
-            return "none to look at: the program turns nowhere without a stop"
+            return "none: the program has no corner without a full stop"
         said = f"eq. 18-20 hold at {self.held:,} of {len(self):,} corners"
         if self.count:
             said += f", at most {_ratio(self.worst_ratio)}"
         stops, compared = int(self.stands.sum()), int(self.compared.sum())
         if compared:
-            of = (
-                ""
-                if compared == len(self)
-                else f" of the {compared:,} run through where it lies below the feed"
-            )
-            said += (
-                f"; passed {self.gains()[0]:.2f} times as fast as eq. 20 lets the paper's corner (median{of})"
-            )
+            of = "" if compared == len(self) else f" of {compared:,} corners where eq. 20 is below the feed"
+            said += f"; {self.gains()[0]:.2f} times the speed of eq. 20 (median{of})"
         elif stops < self.count:
-            said += "; eq. 20 lies above the programmed feed wherever one is run through"
-        said += f"; {stops:,} stopped at" if stops else ""
-        return said + (f"; {self.not_looked_at:,} could not be looked at" if self.not_looked_at else "")
+            said += "; eq. 20 is above the programmed feed at all corners without a stop"
+        said += f"; full stops at {stops:,}" if stops else ""
+        return said + (f"; {self.not_looked_at:,} could not be checked" if self.not_looked_at else "")
 
 
 def _ratio(value: float) -> str:

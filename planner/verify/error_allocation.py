@@ -47,11 +47,11 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
-from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS
+from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS, normal_limit
 from planner.verify.matching import NEAR_MISS
-from planner.verify.pieces import Pieces
+from planner.verify.pieces import ProgramPieces
 from planner.verify.stream import Limits
-from planner.verify.times import Motion
+from planner.verify.times import AnyMotion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
@@ -75,11 +75,11 @@ class _Reading:
 def check_corners(
     trajectory: Trajectory,
     looks: list[Look],
-    pieces: Pieces,
+    pieces: ProgramPieces,
     toolpath: Toolpath,
     machine: Machine,
     *,
-    motion: Motion | None,
+    motion: AnyMotion | None,
     limits: Limits,
     judged: bool,
 ) -> CornerCheck:
@@ -190,7 +190,7 @@ def _nearest_sample(
 
 
 def _nearest_point(
-    motion: Motion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
+    motion: AnyMotion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
 ) -> _Reading:
     """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method on (p - P).p' = 0."""
     time, readings = start, []
@@ -223,18 +223,18 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
         time=motion.t[rows],
         feed=feed,
         normal=normal,
-        allowed=_support(across, motion.axes, machine),
+        allowed=allowed_across(across, motion.axes, machine),
         distance=distance,
     )
 
 
-def _support(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
+def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
     """A(n) (C,) [mm/s2] for vectors (C, L) along n, of any length; where that is 0, the least over all directions."""
     limits = machine.limits("acceleration", axes)[_linear(axes)]
     size = np.linalg.norm(direction, axis=1)
     given = np.abs(direction) @ limits
     support = np.divide(given, size, out=np.full(len(size), limits.min()), where=size > 0)
-    return np.minimum(support, machine.normal_acceleration or np.inf)
+    return np.minimum(support, normal_limit(machine))
 
 
 def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatArray:
@@ -243,7 +243,7 @@ def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatAr
     across = (toolpath.tangent_start[corner] - toolpath.tangent_end[corner - 1])[:, linear]
     eps, filters = toolpath.tolerance[corner], machine.fir.time_constants if machine.fir else ()
     rate = machine.dt**2 / 8.0 + sum(T * T for T in filters) / 24.0
-    X = np.minimum(_support(across, toolpath.axes, machine), eps / (2.0 * rate))
+    X = np.minimum(allowed_across(across, toolpath.axes, machine), eps / (2.0 * rate))
     speed: FloatArray = np.sqrt(1.5 * X * (eps - rate * X)) / np.tan(toolpath.theta[corner] / 2.0)
     return speed
 

@@ -30,10 +30,10 @@ from planner.motion.trajectory import Trajectory
 from planner.verify import contour, findings
 from planner.verify import limits as rows
 from planner.verify.findings import Look
-from planner.verify.matching import follow, new_match
-from planner.verify.pieces import Pieces, kernel, reach
-from planner.verify.stream import Seen
-from planner.verify.times import Motion
+from planner.verify.matching import AtStop, Place, match_samples, new_match
+from planner.verify.pieces import ProgramPieces, kernel, reach_piece
+from planner.verify.stream import Observed
+from planner.verify.times import AnyMotion
 from planner.verify.verdict import AfterFilters
 
 NOTE = "after the filters"
@@ -95,7 +95,7 @@ def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray,
     return mean + origin, (x[behind:] - value) / T
 
 
-def motion_asked(motion: Motion, dt: float) -> At:
+def motion_asked(motion: AnyMotion, dt: float) -> At:
     """A motion that can be asked at any time."""
 
     def at(times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -133,7 +133,7 @@ def look_behind(
     end: float,
     filters: tuple[float, ...],
     dt: float,
-    pieces: Pieces,
+    pieces: ProgramPieces,
     each: Each | None = None,
 ) -> Look:
     """Match the filtered motion with the path.
@@ -142,14 +142,14 @@ def look_behind(
     """
     axes = pieces.vertex.shape[1]
     count = rows.GROUPS * axes + rows.ROWS_ALONE
-    seen = Seen(
+    seen = Observed(
         worst=np.zeros((count, 4)),
         time=np.zeros(count),
         at=np.zeros((count, axes)),
         piece=np.zeros(count, dtype=np.int64),
         match=new_match(pieces),
     )
-    no_limit = np.full(axes, np.inf)  # of accelerations next to a stop: the filtered motion need not rest
+    anywhere = AtStop(np.full(axes, np.inf), np.zeros(axes))  # the filtered motion need not rest
     carried_t, carried = np.empty(0), np.empty((0, axes))
     for new_t, new in filtered(at, end, filters, dt):
         t, position = np.concatenate([carried_t, new_t]), np.concatenate([carried, new])
@@ -157,7 +157,7 @@ def look_behind(
         if not skip:
             seen.first, seen.t_first = position[0].copy(), float(t[0])
         piece, feed_max = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-        follow(pieces, seen.match, t, position, skip, False, no_limit, np.zeros(axes), piece, feed_max)
+        match_samples(pieces, seen.match, t, position, skip, False, anywhere, Place(piece, feed_max))
         if each is not None:
             ratio = np.empty(len(t))
             _ratios(pieces, piece, position, ratio)
@@ -169,7 +169,11 @@ def look_behind(
 
 
 def after_filters(
-    trajectory: Trajectory, motion: Motion | None, toolpath: Toolpath, machine: Machine, pieces: Pieces
+    trajectory: Trajectory,
+    motion: AnyMotion | None,
+    toolpath: Toolpath,
+    machine: Machine,
+    pieces: ProgramPieces,
 ) -> AfterFilters | None:
     """What the machine's filters leave of the tolerance; None for a machine without.
 
@@ -180,7 +184,7 @@ def after_filters(
     at = motion_of_samples(trajectory) if motion is None else motion_asked(motion, machine.dt)
     end, lengths = trajectory.cycle_time if motion is None else motion.end, machine.fir.time_constants
 
-    def read(pieces: Pieces) -> list[Look]:
+    def read(pieces: ProgramPieces) -> list[Look]:
         return [look_behind(at, end, lengths, machine.dt, pieces)]
 
     looks = read(pieces)
@@ -199,8 +203,8 @@ def after_filters(
 
 
 @kernel()
-def _ratios(pieces: Pieces, piece: Array, position: FloatArray, ratio: FloatArray) -> None:
+def _ratios(pieces: ProgramPieces, piece: Array, position: FloatArray, ratio: FloatArray) -> None:
     """Distance of each position from its piece over the piece's budget, into `ratio` (n,)."""
     for k in range(len(piece)):
-        _, _, distance = reach(pieces, piece[k], position[k], 0.0)
+        _, _, distance = reach_piece(pieces, piece[k], position[k], 0.0)
         ratio[k] = distance / pieces.piece[piece[k]]["budget"]

@@ -11,8 +11,8 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.verify import limits as rows
 from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER
-from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, Pieces
-from planner.verify.stream import Limits, Seen
+from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
+from planner.verify.stream import Limits, Observed
 from planner.verify.verdict import LimitCheck
 
 QUANTITIES = ("velocity", "acceleration", "jerk")
@@ -28,7 +28,7 @@ STOP_ROUNDING = 1e-3
 class Look:
     """One reading of the motion: the delivered samples (note "") or the dense ones."""
 
-    seen: Seen
+    seen: Observed
     note: str
 
     def noted(self, text: str) -> str:
@@ -45,7 +45,11 @@ def measured(looks: list[Look], group: int) -> FloatArray:
 
 
 def limit_checks(
-    looks: list[Look], toolpath: Toolpath, machine: Machine, pieces: Pieces, not_limited: tuple[str, ...]
+    looks: list[Look],
+    toolpath: Toolpath,
+    machine: Machine,
+    pieces: ProgramPieces,
+    not_limited: tuple[str, ...],
 ) -> dict[str, LimitCheck]:
     """The worst of every limit, by name."""
     axes = toolpath.axes
@@ -58,13 +62,42 @@ def limit_checks(
         )
     ]
     table.append(("feed", "mm/s", rows.GROUPS * len(axes) + rows.FEED, np.inf))
-    if machine.normal_acceleration is not None:
-        row = rows.GROUPS * len(axes) + rows.NORMAL
-        table.append(("normal_acceleration", "mm/s2", row, machine.normal_acceleration))
-    return {
+    across = rows.normal_limit(machine)
+    if np.isfinite(across):
+        table.append((rows.NORMAL_NAME, "mm/s2", rows.GROUPS * len(axes) + rows.NORMAL, across))
+    checks = {
         name: _limit_check(name, unit, row, limit, looks, toolpath, pieces, not_limited)
         for name, unit, row, limit in table
     }
+    return checks | _own_checks(looks, toolpath, pieces, not_limited)
+
+
+def _own_checks(
+    looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, not_limited: tuple[str, ...]
+) -> dict[str, LimitCheck]:
+    """The worst of every limit of one's own that bounds anything (own.py)."""
+    checks = {}
+    for row in range(len(looks[0].seen.own.worst)):
+        if not any(look.seen.own.bounded[row] for look in looks):
+            continue
+        look = looks[int(np.argmax([each.seen.own.worst[row, 0] for each in looks]))]
+        own = look.seen.own
+        (ratio, value, limit_there, how), (name, unit) = own.worst[row], own.name(row)
+        checks[name] = LimitCheck(
+            name=name,
+            unit=unit,
+            ratio=float(ratio),
+            value=float(value),
+            limit=float(limit_there if ratio > 0 else own.least[row]),
+            time=float(own.time[row]),
+            position=own.at[row],
+            line=line_of(toolpath, pieces, own.piece[row]),
+            limited=name.split(".")[0] not in not_limited,
+            note=look.noted("differences of position" if how == rows.DIFFERENCE else "column")
+            if ratio > 0
+            else "",
+        )
+    return checks
 
 
 def _limit_check(
@@ -74,7 +107,7 @@ def _limit_check(
     limit: float,
     looks: list[Look],
     toolpath: Toolpath,
-    pieces: Pieces,
+    pieces: ProgramPieces,
     not_limited: tuple[str, ...],
 ) -> LimitCheck:
     look = max(looks, key=lambda each: each.seen.worst[row, 0])
@@ -94,7 +127,7 @@ def _limit_check(
     )
 
 
-def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: Pieces) -> list[str]:
+def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:
     """Columns that do not belong to the positions (formulas in `limits`)."""
     acceleration = np.maximum(1.0, measured(looks, rows.ACCELERATION)) * (1.0 + RATIO_ROUNDING)
     jerk = np.maximum(1.0, measured(looks, rows.JERK)) * (1.0 + RATIO_ROUNDING)
@@ -116,7 +149,7 @@ def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces:
     return said
 
 
-def chord_error(looks: list[Look]) -> float:
+def largest_chord_error(looks: list[Look]) -> float:
     """Largest bow over one delivered period [mm]."""
     return float(looks[0].seen.worst[rows.GROUPS * looks[0].seen.at.shape[1] + rows.CHORD, 1])
 
@@ -144,7 +177,7 @@ def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tu
     return worst, said
 
 
-def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array, bool, list[str]]:
+def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple[Array, bool, list[str]]:
     """Segments that are never visited, whether the rest is run in order, and what is wrong with it."""
     lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
     in_order, said = True, []
@@ -172,7 +205,7 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> tuple[Array,
     return np.unique(pieces.piece["segment"][lost]), in_order, said
 
 
-def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: Pieces) -> list[str]:
+def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:
     """Full stops that are run through, and dwells cut short."""
     joint = np.flatnonzero(pieces.joint["real"])
     said = []
@@ -217,5 +250,5 @@ def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
     return toolpath.start[i] if i < len(toolpath) else toolpath.end[-1]
 
 
-def line_of(toolpath: Toolpath, pieces: Pieces, piece: int) -> int:
+def line_of(toolpath: Toolpath, pieces: ProgramPieces, piece: int) -> int:
     return int(toolpath.line[pieces.piece["segment"][max(piece, 0)]])

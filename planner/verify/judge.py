@@ -16,13 +16,14 @@ from planner.verify.dense import Comparison
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES, Look
 from planner.verify.given import DERIVATIVES, Given
-from planner.verify.pieces import Pieces, pieces_of, widened
+from planner.verify.limits import NORMAL_NAME, normal_limit
+from planner.verify.pieces import ProgramPieces, program_pieces, widened
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits, watch
-from planner.verify.times import Motion, cells_per_period, look
+from planner.verify.times import AnyMotion, cells_per_period, look
 from planner.verify.verdict import Verdict
 
-NOT_LIMITED_NAMES = (*QUANTITIES, "feed", "normal_acceleration")
+NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
 WHOLE = Given()
 
 
@@ -31,7 +32,7 @@ def verify(
     toolpath: Toolpath,
     machine: Machine,
     *,
-    motion: Motion | None = None,
+    motion: AnyMotion | None = None,
     seed: int = 0,
     given: Given = WHOLE,
     not_limited: tuple[str, ...] = (),
@@ -39,22 +40,22 @@ def verify(
 ) -> Verdict:
     """Judge a delivered motion against the programmed path and the machine.
 
-    trajectory  : the delivered samples at dt; only its times, positions and their derivatives are looked at
-    toolpath    : the programmed path (lines, arcs, helices) with feeds, budgets and stops
-    motion      : what the samples were taken from, to be looked at between them, at times that are chosen here (times.py); None
-                  to judge the samples alone
-    seed        : of those times; a motion that was changed by what one verdict saw needs a verdict with another seed
-    given       : which columns of the trajectory were delivered, and to how many digits
-    not_limited : quantities that are reported but not part of passing, of `NOT_LIMITED_NAMES`
-    progress    : called now and then with the share that is done, 0 to 1
+    trajectory  : the delivered samples at dt; only its times, positions and their derivatives are used
+    toolpath    : the programmed path (lines, arcs, helices) with feeds, tolerances and stops
+    motion      : what the samples were taken from, to be judged between them too, at times chosen here (times.py); None to judge the
+                  samples alone
+    seed        : of those times; a motion that was changed because of a verdict needs a verdict with another seed
+    given       : which columns of the trajectory were delivered, and with how many digits
+    not_limited : quantities of `NOT_LIMITED_NAMES` that are reported and not judged
+    progress    : called now and then with the fraction done (0 to 1)
 
-    Raises InputError if the axes differ, the trajectory has no samples or its times can only be milliseconds, ValueError for an
-    unknown name in `not_limited` and for a toolpath that contradicts itself.
+    Raises InputError if the axes differ, if the trajectory has no samples, or if its times can only be milliseconds. Raises ValueError
+    for an unknown name in `not_limited`, and for a toolpath that contradicts itself.
     """
     _check_input(trajectory, toolpath, not_limited)
     if motion is None:
         samples.check_unit_of_time(trajectory, toolpath, machine)
-    pieces = pieces_of(toolpath)
+    pieces = program_pieces(toolpath)
     limits = _limits(machine, trajectory, given, not_limited)
     if limits.rounding.any():
         pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
@@ -64,7 +65,7 @@ def verify(
         acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
         cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
 
-    def read(pieces: Pieces, progress: Callable[[float], None] = lambda done: None) -> list[Look]:
+    def read(pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None) -> list[Look]:
         share = 0.5 if motion is not None else 1.0
         seen = watch(
             [trajectory],
@@ -125,7 +126,7 @@ def verify(
         contour_error_mm=contour_error,
         vertex_error_mm=vertex_error,
         end_error_mm=end_error,
-        chord_error_mm=findings.chord_error(looks),
+        chord_error_mm=findings.largest_chord_error(looks),
         order=order,
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
@@ -160,9 +161,11 @@ def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited:
         judged=np.array([name in given.columns for name in DERIVATIVES]),
         rounding=_rounding(trajectory, given, per_axis[1]),
         time_rounding=given.time_rounding,
-        normal_acceleration=machine.normal_acceleration or np.inf,
+        normal=normal_limit(machine),
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
+        axes=trajectory.axes,
+        own=machine.own,
     )
 
 

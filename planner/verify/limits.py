@@ -35,13 +35,16 @@ Only columns that were delivered are judged as columns, and compared with the po
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from planner.base.arrays import Array, FloatArray
+from planner.machine import Machine
 from planner.verify.pieces import RATIO_ROUNDING, kernel
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
 FEED_AT_REST = 1e-6  # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
 COLUMN, DIFFERENCE = 0, 1  # how a value was seen
+NORMAL_NAME = "normal_acceleration"
 
 # Rows of the tables: six groups of one row per axis, then three rows of their own.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
@@ -50,41 +53,70 @@ FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
 
 
+class Columns(NamedTuple):
+    """The samples: times (n,) [s], and positions and their derivatives (n, A); zeros where they were not delivered."""
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+
+class Allowed(NamedTuple):
+    """What samples are held against.
+
+    limits     : (3, A) velocity, acceleration, jerk
+    linear     : (A,) True on linear axes, which make up the feed
+    normal     : limit of the normal acceleration [mm/s2], or inf
+    judged     : (3,) True if velocity, acceleration, jerk were delivered
+    digits     : (A+1,) largest error of a position [mm], last of a time [s], by the digits they were written with
+    """
+
+    limits: FloatArray
+    linear: Array
+    normal: float
+    judged: Array
+    digits: FloatArray
+
+
+class Worst(NamedTuple):
+    """The worst so far of R = GROUPS A + ROWS_ALONE rows.
+
+    row    : (R, 4) ratio, value, limit, `COLUMN` or `DIFFERENCE`. The gaps are those of the module's text over h, h^2 and h, with the
+             limits in place of A, J.
+    sample : (R,) its index
+    """
+
+    row: FloatArray
+    sample: Array
+
+
+def normal_limit(machine: Machine) -> float:
+    """The machine's limit of the normal acceleration [mm/s2]; inf if it names none."""
+    return machine.normal_acceleration or math.inf
+
+
 @kernel()
 def scan(
-    t: FloatArray,
-    position: FloatArray,
-    velocity: FloatArray,
-    acceleration: FloatArray,
-    jerk: FloatArray,
+    columns: Columns,
     skip: int,
-    limits: FloatArray,
-    linear: Array,
-    normal_max: float,
-    judged: Array,
-    digits: FloatArray,
+    allowed: Allowed,
     feed_max: FloatArray,
     travelled: float,
-    worst: FloatArray,
-    sample: Array,
+    worst: Worst,
     work: FloatArray,
 ) -> float:
-    """Find the worst of samples `skip` to the last; up to three samples before them serve the differences.
+    """Write into `worst` what is worse in samples `skip` to the last; up to three samples before them serve the differences.
 
-    limits           : (3, A) velocity, acceleration, jerk
-    linear           : (A,) True on linear axes, which make up the feed
-    normal_max       : [mm/s2], or inf
-    judged           : (3,) True if velocity, acceleration, jerk were delivered
-    digits           : (A+1,) largest error of a position [mm], last of a time [s], by the digits they were written with
-    feed_max         : (n,) programmed feed at each sample [mm/s]
-    travelled        : path length run before [mm]
-    worst, sample    : (GROUPS A + ROWS_ALONE, 4) ratio, value, limit, `COLUMN` or `DIFFERENCE`, and the sample's index;
-                       written. The gaps are those of the module's text over h, h^2 and h, with the limits in place of A, J.
-
-    work             : (4, A, 4) room for d0 .. d3 and their rounding, now and at the sample before
+    feed_max  : (n,) programmed feed at each sample [mm/s]
+    travelled : path length run before [mm]
+    work      : (4, A, 4) room for d0 .. d3 and their rounding, now and at the sample before
 
     -> path length run at the last sample [mm]
     """
+    t, position, velocity, acceleration, jerk = columns
+    limits, linear, normal_max, judged, digits = allowed
     n, axes = position.shape
     alone = GROUPS * axes
     difference, error, before, error_before = work[0, 0], work[1, 0], work[2], work[3]
@@ -119,7 +151,6 @@ def scan(
                     value = max(abs(difference[order]) - error[order], 0.0)
                     _keep(
                         worst,
-                        sample,
                         (order - 1) * axes + axis,
                         value,
                         limits[order - 1, axis],
@@ -132,47 +163,47 @@ def scan(
                 continue
             if judged[0]:
                 value = abs(velocity[k, axis])
-                _keep(worst, sample, VELOCITY * axes + axis, value, limits[0, axis], k, COLUMN)
+                _keep(worst, VELOCITY * axes + axis, value, limits[0, axis], k, COLUMN)
             if judged[1]:
                 value = abs(acceleration[k, axis])
-                _keep(worst, sample, ACCELERATION * axes + axis, value, limits[1, axis], k, COLUMN)
+                _keep(worst, ACCELERATION * axes + axis, value, limits[1, axis], k, COLUMN)
             if judged[2]:
-                _keep(worst, sample, JERK * axes + axis, abs(jerk[k, axis]), limits[2, axis], k, COLUMN)
+                _keep(worst, JERK * axes + axis, abs(jerk[k, axis]), limits[2, axis], k, COLUMN)
             if k == first or not judged[0]:
                 continue
             mean = 0.5 * (velocity[k, axis] + velocity[k - 1, axis])
             gap = max(abs(difference[1] - mean) - error[1] - resolution * limits[0, axis], 0.0) / period
-            _keep(worst, sample, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
-            _keep(worst, sample, GAP_BY_JERK * axes + axis, gap / period, limits[2, axis] / 12.0, k, COLUMN)
+            _keep(worst, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
+            _keep(worst, GAP_BY_JERK * axes + axis, gap / period, limits[2, axis] / 12.0, k, COLUMN)
             if not judged[1]:
                 continue
             mean = 0.5 * (acceleration[k, axis] + acceleration[k - 1, axis])
             change = (velocity[k, axis] - velocity[k - 1, axis]) / period
             noise = resolution * (limits[0, axis] / period + limits[1, axis])
             gap = max(abs(change - mean) - noise, 0.0) / period
-            _keep(worst, sample, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
+            _keep(worst, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
         if k < skip:
             continue
         how = COLUMN if judged[0] and judged[1] else DIFFERENCE
         if how == COLUMN:
             feed, normal = _feed_and_normal(velocity, acceleration, k, linear)
-            _keep(worst, sample, alone + FEED, feed, feed_max[k], k, COLUMN)
-            _keep(worst, sample, alone + NORMAL, normal, normal_max, k, COLUMN)
+            _keep(worst, alone + FEED, feed, feed_max[k], k, COLUMN)
+            _keep(worst, alone + NORMAL, normal, normal_max, k, COLUMN)
         else:
             normal = 0.0
             if k - first >= 2:
                 normal, taken_off = _mean_normal(
                     t, position, before, error_before, k, linear, normal_max, most
                 )
-                _keep(worst, sample, alone + NORMAL, normal - taken_off, normal_max, k, DIFFERENCE)
+                _keep(worst, alone + NORMAL, normal - taken_off, normal_max, k, DIFFERENCE)
         if k > first:
-            allowed = max(feed_max[k], feed_max[k - 1])
+            most_feed = max(feed_max[k], feed_max[k - 1])
             rounding_sq = 0.0
             for axis in range(axes):
                 rounding_sq += error_before[axis, 1] ** 2 if linear[axis] else 0.0
             value = max(step / period - math.sqrt(rounding_sq), 0.0)
-            _keep(worst, sample, alone + FEED, value, allowed, k, DIFFERENCE)
-            _keep(worst, sample, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
+            _keep(worst, alone + FEED, value, most_feed, k, DIFFERENCE)
+            _keep(worst, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
     return travelled
 
 
@@ -234,7 +265,8 @@ def _mean_normal(
 
 
 @kernel(inline=True)
-def _keep(worst: FloatArray, sample: Array, row: int, value: float, limit: float, k: int, seen: int) -> None:
-    if value > worst[row, 0] * limit:  # false where the limit is inf
-        worst[row, 0], worst[row, 1], worst[row, 2], worst[row, 3] = value / limit, value, limit, seen
-        sample[row] = k
+def _keep(worst: Worst, row: int, value: float, limit: float, k: int, seen: int) -> None:
+    rows = worst.row
+    if value > rows[row, 0] * limit:  # false where the limit is inf
+        rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3] = value / limit, value, limit, seen
+        worst.sample[row] = k

@@ -41,10 +41,10 @@ from planner.verify.pieces import (
     CONTOUR_ROUNDING,
     PLACE_ROUNDING,
     RATIO_ROUNDING,
-    Pieces,
+    ProgramPieces,
     kernel,
-    reach,
     reach_chord,
+    reach_piece,
 )
 
 NEAR_MISS = 2.0  # errors up to this multiple of the budget are matched in place; beyond, a block is left out
@@ -81,7 +81,7 @@ class Match(NamedTuple):
     worst: FloatArray
 
 
-def new_match(pieces: Pieces) -> Match:
+def new_match(pieces: ProgramPieces) -> Match:
     """The state before the first sample."""
     vertices, axes = pieces.vertex.shape
     track, passed = np.zeros(vertices - 1, dtype=TRACK), np.zeros(vertices, dtype=PASSED)
@@ -97,25 +97,37 @@ def new_match(pieces: Pieces) -> Match:
     )
 
 
+class AtStop(NamedTuple):
+    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2], and errors of positions by their
+    digits [mm]."""
+
+    acceleration_max: FloatArray
+    rounding: FloatArray
+
+
+class Place(NamedTuple):
+    """Where each of n samples lies: its piece (n,), and the largest feed (n,) of those it can lie on [mm/s]."""
+
+    piece: Array
+    feed_max: FloatArray
+
+
 @kernel()
-def follow(
-    pieces: Pieces,
+def match_samples(
+    pieces: ProgramPieces,
     match: Match,
     t: FloatArray,
     position: FloatArray,
     skip: int,
     middles: bool,
-    acceleration_max: FloatArray,
-    rounding: FloatArray,
-    piece: Array,
-    feed_max: FloatArray,
+    at_stop: AtStop,
+    place: Place,
 ) -> None:
-    """Match samples `skip` to the last; those before belong to the previous call. The first call has skip = 0.
+    """Match samples `skip` to the last, in `match`, and write their places; those before belong to the previous call. The first call
+    has skip = 0.
 
-    middles          : the middle of every chord is a sample too
-    acceleration_max : (A,) [mm/s2]; how far and how fast a sample can be next to a stop
-    rounding         : (A,) largest error of a position by its digits [mm]
-    piece, feed_max  : (n,) written: the piece each sample lies on, and the largest feed of those it can lie on [mm/s]
+    t, position : (n,) [s], (n, A) [mm]
+    middles     : the middle of every chord is a sample too
     """
     n, axes = position.shape
     before, point = match.place[BEFORE], match.place[POINT]
@@ -134,17 +146,17 @@ def follow(
                 back = position[k, axis] - position[k - 1, axis] if k else 0.0
                 point[axis] = position[k, axis] - rest * back
             first = match.tally[FIRST]
-            piece[k], feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
+            place.piece[k], place.feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
             for i in range(first, match.tally[LAST] + 2):
                 if k and pieces.joint[i]["stop"]:
-                    _watch_stop(pieces, match, i, before, point, period, parts, acceleration_max, rounding)
+                    _watch_stop(pieces, match, i, period, parts, at_stop)
             for axis in range(axes):
                 before[axis] = point[axis]
 
 
 @kernel(inline=True)
 def _step(
-    pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
+    pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[int, float]:
     """Go on from `before` to `point`; return the piece it lies on and the largest feed of those it can lie on.
 
@@ -185,7 +197,7 @@ def _step(
 
 @kernel(inline=True)
 def _column(
-    pieces: Pieces,
+    pieces: ProgramPieces,
     match: Match,
     before: FloatArray,
     point: FloatArray,
@@ -213,7 +225,7 @@ def _column(
         track[i]["new"] = np.inf
         leave = np.inf
         if possible:
-            a, b, distance = reach(pieces, i, point, _allowed(pieces.piece[i]["budget"] * widen))
+            a, b, distance = reach_piece(pieces, i, point, _allowed(pieces.piece[i]["budget"] * widen))
             low = a if entry < np.inf else max(a, low_before)
             if low <= b:
                 track[i]["new"] = low
@@ -237,7 +249,7 @@ def _column(
 
 @kernel()
 def _stray(
-    pieces: Pieces, match: Match, before: FloatArray, point: FloatArray, time: float
+    pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[float, int, float]:
     """Far from where the program should be: take the first piece ahead that fits, or hold the place on the path, lost.
 
@@ -249,7 +261,7 @@ def _stray(
         if tally[SEARCHED] >= SEARCH_MAX:
             break
         tally[SEARCHED] += 1
-        a, b, distance = reach(pieces, ahead, point, _allowed(pieces.piece[ahead]["budget"]))
+        a, b, distance = reach_piece(pieces, ahead, point, _allowed(pieces.piece[ahead]["budget"]))
         if a > b:
             continue
         tally[JUMPS] += 1
@@ -288,21 +300,15 @@ def _commit(match: Match, first: int, last: int) -> None:
 
 @kernel()
 def _watch_stop(
-    pieces: Pieces,
-    match: Match,
-    i: int,
-    before: FloatArray,
-    point: FloatArray,
-    period: float,
-    parts: int,
-    acceleration_max: FloatArray,
-    rounding: FloatArray,
+    pieces: ProgramPieces, match: Match, i: int, period: float, parts: int, at_stop: AtStop
 ) -> None:
-    """What the chord from `before` to `point`, one of `parts` of a period, shows of the stop at vertex i.
+    """What the chord to the present sample, one of `parts` of a period, shows of the stop at vertex i.
 
     If the motion rests at the vertex at some time within a period h, then with |acceleration| <= a its chord over the period
     is at most a h^2 / 2 long, and the nearer end of the period is at most a (h/2)^2 / 2 away. Per axis, each.
     """
+    before, point = match.place[BEFORE], match.place[POINT]
+    acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
     slow, away_sq, still = 0.0, 0.0, True
     for axis in range(len(point)):
         move = abs(point[axis] - before[axis])

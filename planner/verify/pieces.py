@@ -62,7 +62,7 @@ def kernel(inline: bool = False) -> Callable[[Callable[..., Any]], Callable[...,
     return njit(cache=True, error_model="numpy", **settings)
 
 
-class Pieces(NamedTuple):
+class ProgramPieces(NamedTuple):
     """N pieces over A axes, the N+1 vertices around them, and the K arcs. Few arrays, since each costs at every call.
 
     vertex : (N+1, A) [mm]
@@ -83,7 +83,7 @@ CENTER, E1, E2, DRIFT = range(4)  # in `frame`
 RADIUS, RATE = range(2)  # in `turn`
 
 
-def pieces_of(toolpath: Toolpath) -> Pieces:
+def program_pieces(toolpath: Toolpath) -> ProgramPieces:
     """Cut the toolpath into pieces. A segment's budget is the larger of its two joints'.
 
     Raises ValueError if the toolpath contradicts itself: segments that do not meet, arcs that do not end where they say.
@@ -116,12 +116,12 @@ def pieces_of(toolpath: Toolpath) -> Pieces:
     joint["real"][at] = True
     joint["stop"][at] = toolpath.joint == Joint.STOP
     frame = np.stack([arcs.center, arcs.e1, arcs.e2, arcs.drift], axis=1)
-    return Pieces(
+    return ProgramPieces(
         vertex=vertex, joint=joint, piece=piece, frame=frame, turn=np.stack([arcs.radius, arcs.rate], axis=1)
     )
 
 
-def widened(pieces: Pieces, factor: float = 1.0, more: float = 0.0) -> Pieces:
+def widened(pieces: ProgramPieces, factor: float = 1.0, more: float = 0.0) -> ProgramPieces:
     """The same pieces and vertices with `factor` times their budgets and `more` [mm]."""
     piece, joint = pieces.piece.copy(), pieces.joint.copy()
     for table in (piece, joint):
@@ -156,7 +156,7 @@ def _check_consistent(toolpath: Toolpath, computed_start: FloatArray) -> None:
 
 
 @kernel(inline=True)
-def reach(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
+def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
     """Which part of piece i lies within `radius` of the point q (A,).
 
     -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
@@ -179,9 +179,9 @@ def reach(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, 
 
 @kernel(inline=True)
 def reach_chord(
-    begin: FloatArray, end: FloatArray, pieces: Pieces, i: int, radius: float
+    begin: FloatArray, end: FloatArray, pieces: ProgramPieces, i: int, radius: float
 ) -> tuple[float, float, float]:
-    """Which part of the chord from `begin` to `end` (A,), which may be a point, lies within `radius` of vertex i; as `reach`."""
+    """Which part of the chord from `begin` to `end` (A,), which may be a point, lies within `radius` of vertex i; as `reach_piece`."""
     vertex = pieces.vertex
     along, length_sq = 0.0, 0.0
     for n in range(len(begin)):
@@ -210,7 +210,7 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
 
 
 @kernel()
-def _reach_arc(pieces: Pieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
+def _reach_arc(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
     k, x0, x1 = pieces.piece[i]["arc"], pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     big, rate, frame = pieces.turn[k, RADIUS], pieces.turn[k, RATE], pieces.frame
     w1, w2, wd, d1, d2, dd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.motion.trajectory import Trajectory
-from planner.verify.limits import GROUPS, ROWS_ALONE, scan
-from planner.verify.matching import Match, follow, new_match
-from planner.verify.pieces import Pieces
+from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, Columns, Worst, scan
+from planner.verify.matching import AtStop, Match, Place, match_samples, new_match
+from planner.verify.own import Block, OwnSeen
+from planner.verify.pieces import ProgramPieces
 
 BLOCK_SAMPLES = 65_536  # read at a time: 8 MB for three axes
 CARRIED = 3  # samples before a block that its third differences need
@@ -36,13 +38,15 @@ class Limits:
     judged: Array
     rounding: FloatArray
     time_rounding: float
-    normal_acceleration: float
+    normal: float  # normal acceleration [mm/s2]
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited
     jerk_limited: bool
+    axes: tuple[str, ...] = ()
+    own: tuple[Any, ...] = ()  # limits of one's own (own.py)
 
 
 @dataclass(eq=False, kw_only=True)
-class Seen:
+class Observed:
     """What a motion showed: R = GROUPS A + ROWS_ALONE rows as in `limits`, and the state of the matching.
 
     worst (R, 4); time (R,) [s]; at (R, A) [mm]; piece (R,)
@@ -53,6 +57,7 @@ class Seen:
     at: FloatArray
     piece: Array
     match: Match
+    own: OwnSeen = field(default_factory=lambda: OwnSeen((), ()))
     samples: int = 0
     first: FloatArray = field(default_factory=lambda: np.empty(0))  # (A,) first and last position
     last: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -63,12 +68,12 @@ class Seen:
 
 def watch(
     chunks: Iterable[Trajectory],
-    pieces: Pieces,
+    pieces: ProgramPieces,
     limits: Limits,
     *,
     middles: bool,
     progress: Callable[[int], None],
-) -> Seen:
+) -> Observed:
     """Read all chunks, in order. Samples not later than those already read (overlap) are left out.
 
     middles  : match the middle of every chord too
@@ -76,12 +81,13 @@ def watch(
     """
     axes = pieces.vertex.shape[1]
     rows = GROUPS * axes + ROWS_ALONE
-    seen = Seen(
+    seen = Observed(
         worst=np.zeros((rows, 4)),
         time=np.zeros(rows),
         at=np.zeros((rows, axes)),
         piece=np.zeros(rows, dtype=np.int64),
         match=new_match(pieces),
+        own=OwnSeen(limits.own, limits.axes),
     )
     carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
     feed_max = np.empty(0)
@@ -90,7 +96,7 @@ def watch(
         begin = int(np.searchsorted(chunk.t, seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
             new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
-            data = [np.concatenate(pair) for pair in zip(carried, new, strict=True)]
+            data = Columns(*(np.concatenate(pair) for pair in zip(carried, new, strict=True)))
             feed_max = np.concatenate([feed_max, np.full(len(new[0]), np.inf)])
             travelled = _block(seen, data, feed_max, pieces, limits, middles, travelled)
             carried, feed_max = [column[-CARRIED:] for column in data], feed_max[-CARRIED:]
@@ -99,58 +105,49 @@ def watch(
 
 
 def _block(
-    seen: Seen,
-    data: list[FloatArray],
+    seen: Observed,
+    data: Columns,
     feed_max: FloatArray,
-    pieces: Pieces,
+    pieces: ProgramPieces,
     limits: Limits,
     middles: bool,
     travelled: float,
 ) -> float:
     """Take in one block, the carried samples first; writes feed_max, returns the path length run so far."""
-    t, position, velocity, acceleration, jerk = data
+    t, position = data.t, data.position
     skip = min(seen.samples, CARRIED)
     if not skip:
         seen.first, seen.t_first = position[0].copy(), float(t[0])
     seen.last, seen.t_last = position[-1].copy(), float(t[-1])
     seen.samples += len(t) - skip
-    rounding = np.append(limits.rounding, limits.time_rounding)
     periods = np.diff(t[max(skip - 1, 0) :])
     seen.gap_max = max(seen.gap_max, float(periods.max(initial=0.0)))
     piece = np.zeros(len(t), dtype=np.int64)
-    follow(
-        pieces,
-        seen.match,
-        t,
-        position,
-        skip,
-        middles,
-        limits.acceleration_at_stop,
-        limits.rounding,
-        piece,
-        feed_max,
+    at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
+    match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Place(piece, feed_max))
+    block = Block(
+        t=t,
+        position=position,
+        velocity=data.velocity,
+        acceleration=data.acceleration,
+        jerk=data.jerk,
+        piece=piece,
+        skip=skip,
+        travelled=travelled,
     )
+    seen.own.take(block, limits)
     worst = np.zeros_like(seen.worst)
     worst[:, 0] = seen.worst[:, 0]
     sample = np.full(len(worst), -1, dtype=np.int64)
-    travelled = scan(
-        t,
-        position,
-        velocity,
-        acceleration,
-        jerk,
-        skip,
-        limits.per_axis,
-        limits.linear,
-        limits.normal_acceleration,
-        limits.judged,
-        rounding,
-        feed_max,
-        travelled,
-        worst,
-        sample,
-        np.zeros((4, position.shape[1], 4)),
+    allowed = Allowed(
+        limits=limits.per_axis,
+        linear=limits.linear,
+        normal=limits.normal,
+        judged=limits.judged,
+        digits=np.append(limits.rounding, limits.time_rounding),
     )
+    work = np.zeros((4, position.shape[1], 4))
+    travelled = scan(data, skip, allowed, feed_max, travelled, Worst(worst, sample), work)
     new = np.flatnonzero(sample >= 0)
     seen.worst[new] = worst[new]
     seen.time[new] = t[sample[new]]

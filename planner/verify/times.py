@@ -29,7 +29,7 @@ SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the 
 CELLS = 100_000  # looked at together: 30 MB for three axes
 
 
-class Motion(Protocol):
+class AnyMotion(Protocol):
     """A motion that can be asked at any time."""
 
     @property
@@ -55,7 +55,7 @@ def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
     )  # neighbouring times are up to two cells apart
 
 
-def look(motion: Motion, dt: float, seed: int, per_period: int = PER_PERIOD) -> Iterator[Trajectory]:
+def look(motion: AnyMotion, dt: float, seed: int, per_period: int = PER_PERIOD) -> Iterator[Trajectory]:
     """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's period [s]."""
     draw = np.random.default_rng(seed)
     edges = np.concatenate([[0.0], motion.t, [motion.end]])

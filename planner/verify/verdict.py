@@ -13,16 +13,16 @@ from planner.verify.ringing import Ringing
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LimitCheck:
-    """The worst place of one quantity.
+    """The place where one quantity comes closest to its limit, or exceeds it most.
 
-    ratio    : worst value / limit; the limit holds up to 1 + RATIO_ROUNDING
+    ratio    : value / limit there [-]; the limit holds up to 1 + RATIO_ROUNDING
     value    : the quantity there, in `unit`
-    limit    : what is allowed there, in `unit`; inf where nothing limits
-    time     : when [s]
-    position : (A,) where [mm]
+    limit    : what is allowed there, in `unit`; inf where nothing limits it
+    time     : [s]
+    position : (A,) [mm]
     line     : NC line of the block there
-    limited  : False if it is reported only ("not limited by this method")
-    note     : how it was seen: "column", "differences of position", and "between the samples" for the dense motion
+    limited  : False if the quantity is reported only ("not limited by this method")
+    note     : how the value was obtained: "column", "differences of position", and "between the samples" for the dense motion
     """
 
     name: str
@@ -41,11 +41,11 @@ class LimitCheck:
 
     @property
     def broken(self) -> bool:
-        """The quantity is limited and beyond its limit."""
+        """True if the quantity is limited and exceeds its limit."""
         return self.limited and self.ratio > 1.0 + RATIO_ROUNDING
 
     def sentence(self, axes: tuple[str, ...]) -> str:
-        """What is there, of what is allowed, when and where: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at ..."."""
+        """Value, ratio, limit, time, place and line: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at ..."."""
         where = " ".join(f"{letter}{value:.6g}" for letter, value in zip(axes, self.position, strict=True))
         said = f"{self.name}: {self.value:.7g} {self.unit}, {self.ratio:.6g} of the limit {self.limit:.6g} {self.unit}"
         return f"{said} at t = {self.time:.6g} s, {where}, line {self.line}" + (
@@ -55,7 +55,7 @@ class LimitCheck:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AfterFilters:
-    """What the machine's own filters leave of the tolerance (filtered.py); fields as in `Verdict`."""
+    """Errors behind the filters of the machine (filtered.py); fields as in `Verdict`."""
 
     contour: LimitCheck
     vertex: LimitCheck
@@ -66,26 +66,26 @@ class AfterFilters:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Verdict:
-    """What `verify` found.
+    """The findings of `verify`.
 
-    passed           : every check holds (those "not limited" aside)
-    limits           : by name: velocity.x, acceleration.x, jerk.x ..., feed, normal_acceleration (if the machine limits it)
-    contour          : the motion's worst distance from the path as far as it could be followed, against the budget there
-    vertex           : the worst distance of a programmed vertex from the motion, of those that are known, against the budget there
+    passed           : True if every check holds, apart from quantities that are "not limited"
+    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration (if the machine limits it)
+    contour          : the largest distance of the motion from the path, as far as it could be followed, against the tolerance there
+    vertex           : the largest distance of a programmed vertex from the motion, of those that are known, against the tolerance there
     corners          : eq. 18-20 at the programmed corners
-    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if it
-                       could not be followed
+    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if the
+                       motion could not be followed
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
-    lost_after       : NC line of the last block along which the motion could be followed; None if it ran the whole program
-    end_error_mm     : distance of the first or last sample from the program's start or end, the larger [mm]
-    chord_error_mm   : largest bound |normal acceleration| dt^2 / 8 of the bow over one period [mm]; contained in the contour
-    order            : the blocks are run in the program's order, none is lost
-    lost             : indices of the program's blocks that the motion never visits
+    lost_after       : NC line of the last block along which the motion could be followed; None if it follows the whole program
+    end_error_mm     : distance of the first sample from the start of the program, or of the last from its end, the larger one [mm]
+    chord_error_mm   : largest bound |normal acceleration| dt^2 / 8 of the bow over one period [mm]; contained in the contour error
+    order            : True if the blocks are passed in the order of the program, and none is left out
+    lost             : indices of blocks that the motion never visits
     lost_lines       : their NC lines
-    faults           : one sentence per failure: what, by how much, when, where, NC line
-    after_filters    : the motion behind the machine's filters, judged likewise; None for a machine without
+    faults           : one sentence for each failure: what, by how much, when, where, NC line
+    after_filters    : errors of the motion behind the filters of the machine; None for a machine without filters
     ringing          : what each vibration mode of the machine does; reported, not judged
-    notes            : what could not be judged sharply, and why
+    notes            : what could not be judged exactly, and why
     """
 
     passed: bool
@@ -107,7 +107,7 @@ class Verdict:
     notes: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
-        """The part of `summary.json` that is called `verdict`."""
+        """The part `verdict` of `summary.json`."""
         after = self.after_filters
         behind = (
             {}

@@ -305,6 +305,7 @@ def test_numbers_in_csv_read_back_exactly() -> None:
 # ------------------------------------------------------------------------------------------ the real thing
 
 
+@pytest.mark.slow
 def test_real_methods_on_a_real_job(job: Path) -> None:
     """Same job for all: whatever passes ends within the tolerance, nothing is slower than stopping."""
     result = run(job, "--method", "optimal,kinematic,fir,stop", "--tolerance", "0.05", "--json")

@@ -26,7 +26,7 @@ def run(*arguments: object) -> Result:
         (["--method", "bezier", "--corner", "bezier"], "it is for optimal and second-order"),
         (["--solver", "reachability"], "solver = reachability: method optimal does not use it"),
         (["--method", "bezier", "--rounds", "0"], "rounds = 0: method bezier does not use it"),
-        (["--corner", "bezier", "--rounds", "2"], "corner bezier has none"),
+        (["--corner", "bezier", "--rounds", "2"], "bezier corners have none"),
         (["--format", "parquet"], "name one with -o DIR"),
     ],
 )
@@ -53,7 +53,7 @@ def test_notes_are_printed_and_in_json(tmp_path: Path) -> None:
     said = json.loads(run(job, "--method", "stop", "--json", "-o", out).stdout)
     assert said["notes"] == json.loads((out / "summary.json").read_text())["notes"]
     assert said["notes"][0] == note
-    assert said["notes"][1].startswith("planned.ngc is the program as it was")
+    assert said["notes"][1].startswith("planned.ngc equals the program")
 
 
 def test_a_file_that_was_not_written_is_said(tmp_path: Path) -> None:

@@ -11,8 +11,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+import rich.progress
 from hand_made import SQUARE
 
 from planner.commands import terminal
@@ -42,6 +44,7 @@ def run(*arguments: object, **how: object) -> subprocess.CompletedProcess[str]:
 # ------------------------------------------------------------------------------------------ Ctrl-C
 
 
+@pytest.mark.slow
 @unix
 def test_ctrl_c_at_random_times(job: Path, tmp_path: Path) -> None:
     """During imports, work and writing: exit code 130, one word, and the outputs whole or not there."""
@@ -145,6 +148,7 @@ def test_output_that_cannot_be_written_or_is_closed() -> None:
     assert (closed.returncode, closed.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @unix
 def test_any_encoding_and_any_file_name(tmp_path: Path) -> None:
     """The units have plain names where an encoding lacks theirs; bytes of a name that are no UTF-8 are escaped."""
@@ -180,13 +184,21 @@ def test_progress_without_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_the_clock_of_the_bar_runs_on_after_a_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(terminal, "PROGRESS_AFTER", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    bars: list[rich.progress.Progress] = []
+
+    class Recorded(rich.progress.Progress):
+        def __init__(self, *columns: Any, **how: Any) -> None:
+            super().__init__(*columns, **how)
+            bars.append(self)
+
+    monkeypatch.setattr(rich.progress, "Progress", Recorded)
     with ProgressBar() as progress:
         progress("read", 0.0)
-        bar = progress._bar
+        (bar,) = bars
         progress("read", 1.0)
         before = bar.tasks[0].elapsed
         progress("solve", 0.0)
-        assert progress._bar is bar
+        assert bars == [bar]
         assert [task.description for task in bar.tasks] == ["solve"]
         assert not bar.finished
         assert bar.tasks[0].elapsed > before
@@ -216,6 +228,7 @@ def kernel(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @unix
 def test_kernels_without_a_place_for_their_cache(kernel: Path) -> None:
     """A file stands where each of the directories would be made: nothing can be written, not by root either."""
@@ -226,6 +239,7 @@ def test_kernels_without_a_place_for_their_cache(kernel: Path) -> None:
     assert done.stderr.count("compiled kernels cannot be kept (cannot cache function 'twice'") == 1
 
 
+@pytest.mark.slow
 @unix
 def test_kernels_on_a_full_disk(kernel: Path) -> None:
     import resource
@@ -239,6 +253,7 @@ def test_kernels_on_a_full_disk(kernel: Path) -> None:
     assert done.stderr.count("compiled kernels cannot be kept (File too large)") == 1
 
 
+@pytest.mark.slow
 def test_kernels_are_kept_where_they_can(kernel: Path) -> None:
     done = use_kernel(kernel, env={"NUMBA_CACHE_DIR": str(kernel / "cache")})
     assert (done.stdout, done.stderr) == ("42 3.0\n", "")

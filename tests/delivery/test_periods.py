@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from quick import slow_but
 
 from benchmarks import problems
 from planner.delivery.periods import USED, missed, with_less_tolerance
@@ -138,12 +139,16 @@ def coarse(dt: float, eps: float):
 
 
 @pytest.mark.parametrize(("dt", "eps"), PERIODS)
-@pytest.mark.parametrize("method", ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order"])
+@pytest.mark.parametrize(
+    "method",
+    slow_but(("stop", "second-order"), ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order"]),
+)
 def test_every_period_keeps_the_tolerance(method, dt, eps):
     made = plan(LAW_JOB, coarse(dt, eps), method=method).require()
     assert made.verdict.passed, made.verdict.faults
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("dt", "eps"), PERIODS[::3])
 def test_the_optimum_keeps_the_tolerance_at_every_period(dt, eps):
     made = plan(LAW_JOB, coarse(dt, eps)).require()

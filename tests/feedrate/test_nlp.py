@@ -136,6 +136,7 @@ def test_inches_and_metres_give_the_same_plan(bend, unit):
     assert theirs.feed_sq / unit**2 == pytest.approx(mine.feed_sq, rel=1e-4, abs=1e-6 * mine.feed_sq.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["velocity", "acceleration", "jerk"])
 def test_prices_are_the_derivatives_of_the_cycle_time(quantity):
     """Centred differences of 1 %; the optimum's switches move between grid points, which costs a few per cent."""

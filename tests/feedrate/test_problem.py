@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from random_problems import line
 
 from planner.base.errors import NotSolvedError
-from planner.constraints import bounds
+from planner.constraints import bounds, normal_limit
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
@@ -100,7 +100,7 @@ def test_axis_velocity_is_used_up(angle: float, vx: float, vy: float) -> None:
 
 @given(curvature, positive)
 def test_normal_acceleration_is_used_up(kappa: float, limit: float) -> None:
-    assert kappa * bounds.normal_acceleration(one(kappa), limit)[0] == pytest.approx(limit)
+    assert kappa * normal_limit.feed_sq_within(one(kappa), limit)[0] == pytest.approx(limit)
 
 
 @given(curvature, st.floats(1e-6, 1.0), st.floats(1e-4, 1e-2))
@@ -148,7 +148,7 @@ def test_curvature_jump_is_used_up(kappa: float, angle: float, ax: float, ay: fl
 
 def test_straight_lines_are_not_limited() -> None:
     flat = np.zeros(3)
-    assert np.isinf(bounds.normal_acceleration(flat, 1.0)).all()
+    assert np.isinf(normal_limit.feed_sq_within(flat, 1.0)).all()
     assert np.isinf(bounds.chord_error(flat, np.ones(3), 1e-3)).all()
     assert np.isinf(bounds.filter_error(flat, np.ones(3), (0.01,))).all()
     assert np.isinf(bounds.phase_lag(flat, 0.1, (0.01,))).all()

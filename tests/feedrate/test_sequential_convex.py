@@ -78,6 +78,7 @@ def worst_row(problem: FeedrateProblem, solution: FeedrateSolution) -> float:
     return max(worst)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 11, 19])
 def test_every_pass_keeps_all_limits_and_is_not_slower_than_the_last(seed: int) -> None:
     problem = random_path(seed, POINTS)
@@ -98,6 +99,7 @@ def test_rows_are_active(trident: FeedrateProblem) -> None:
     assert worst_row(trident, SequentialConvex().solve(trident)) >= 1 - 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 5, 11])
 def test_random_paths_take_the_time_of_the_other_solvers(seed: int) -> None:
     """On grids this coarse the transcriptions differ by up to 2 %."""
@@ -110,6 +112,7 @@ def test_random_paths_take_the_time_of_the_other_solvers(seed: int) -> None:
     assert own == pytest.approx(ipopt, rel=2e-2)
 
 
+@pytest.mark.slow
 def test_the_optimum_converges_to_that_of_the_other_formulation() -> None:
     gap = []
     for points in (40, 80, 160):

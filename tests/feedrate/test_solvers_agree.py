@@ -75,6 +75,7 @@ def test_jobs(job: str) -> None:
     both(solve(problems.all_jobs()[job], problems.machine()).problem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a_pentagon", "b_zigzag", "c_circle", "d_starspiral", "e_chips", "x_arcs"])
 def test_programs_of_the_peers(name: str, shared_dir: Path) -> None:
     file = shared_dir / "peers" / "programs" / f"{name}.ngc"

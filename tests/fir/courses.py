@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks import problems
 from planner.base.arrays import FloatArray
-from planner.fir.course import Course, course_of
+from planner.fir.course import StraightCourse, course_of
 from planner.fir.schedule import Schedule
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
@@ -24,7 +24,7 @@ def machine_of(axes: int = 3, **settings) -> Machine:
     return made.model_copy(update={"axes": made.axes | ({"a": a} if axes == 4 else {})})
 
 
-def course_through(points: FloatArray, machine: Machine, feed: float | FloatArray = 100.0) -> Course:
+def course_through(points: FloatArray, machine: Machine, feed: float | FloatArray = 100.0) -> StraightCourse:
     """The course of G1 moves through points (n+1, A), A up to 4."""
     points = np.asarray(points, float)
     program = problems.polyline(points[:, : min(3, points.shape[1])], feed=feed)
@@ -42,10 +42,11 @@ def corner(theta: float, length: float = 50.0, axes: int = 2) -> FloatArray:
     return points
 
 
-def overlapping(course: Course, overlap: float | FloatArray, T1: float, T2: float) -> Schedule:
+def overlapping(course: StraightCourse, overlap: float | FloatArray, T1: float, T2: float) -> Schedule:
     """Every leg at its feed, every inner joint with the overlap [s]."""
     inner = course.inner
     return Schedule(
+        course=course,
         T1=np.full(course.stretches, T1),
         T2=np.full(course.stretches, T2),
         speed=course.feed,

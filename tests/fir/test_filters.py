@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import signal
 
 from planner.fir.filters import (
     Filters,
@@ -205,6 +204,7 @@ def test_what_a_filter_of_one_period_leaves_of_a_mode(damping, residue):
     assert exact.residue(frequency, damping) == pytest.approx(residue, rel=0.3, abs=1e-12)
 
 
+@pytest.mark.slow
 @given(
     frequency=st.floats(5.0, 80.0),
     damping=st.floats(0.0, 0.2),
@@ -213,6 +213,8 @@ def test_what_a_filter_of_one_period_leaves_of_a_mode(damping, residue):
 @settings(max_examples=15)
 def test_residual_vibration_against_a_simulated_oscillator(frequency, damping, times):
     """x'' + 2 z w x' + w^2 x = -a(t): scipy's lsim, straight between the samples like ours, and its state's envelope at the end."""
+    from scipy import signal  # takes a second
+
     filters, w = Filters(tuple(times)), 2 * np.pi * frequency
     t = np.linspace(0, 0.15 + filters.delay, 1200)
     a = V * (filters.kernel(t) - filters.kernel(t - 0.15))

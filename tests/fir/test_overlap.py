@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from planner.corners.fir import overlap_time
 from planner.fir.overlap import corner_error, overlap_beside, overlap_within, overlap_within_limits
-from planner.fir.settle import make
+from planner.fir.slow_down import make
 from planner.methods.fir import motion_of
 
 V, T1, T2 = 100.0, 0.05, 0.03
@@ -22,7 +22,7 @@ thetas = st.floats(1.0, 174.0).map(np.deg2rad)
 
 def corner_motion(theta, overlap, T1=T1, T2=T2, feed=V, length=50.0):
     course = course_through(corner(theta, length, 3), MACHINE, feed)
-    return course, motion_of(course, make(course, MACHINE, overlapping(course, overlap, T1, T2)).pieces)
+    return course, motion_of(course, make(overlapping(course, overlap, T1, T2), MACHINE).motion)
 
 
 def around_corner(course, motion, overlap, feed=V, T1=T1, T2=T2, count=2001):
@@ -189,7 +189,7 @@ def test_overlaps_within_limits_keep_them(theta, turn, T1, ratio, share):
         ones * share * (T1 + T2), w[:1], w[1:], ones * T1, ones * T2, np.full(3, a), np.full(3, j)
     )[0]
     assert 0 <= Tk <= share * (T1 + T2)
-    made = make(course, machine, overlapping(course, Tk, T1, T2))
+    made = make(overlapping(course, Tk, T1, T2), machine)
     assert made.seen.acceleration.max() <= 1 + 1e-6
     assert made.seen.jerk.max() <= 1 + 1e-6
 

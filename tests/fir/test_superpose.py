@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from planner.fir.command import Cells, command_of
 from planner.fir.course import course_of
 from planner.fir.filters import Filters
-from planner.fir.settle import make
+from planner.fir.slow_down import make
 from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program
 from planner.methods.fir import motion_of
@@ -59,14 +59,14 @@ def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):
         t = pieces.t[at] - command.begin[k]
         expected = by_superposition(command, k, t)
         size = speed.max()
-        np.testing.assert_allclose(pieces.position[at], expected[0], atol=1e-10 * size)
-        np.testing.assert_allclose(pieces.velocity[at], expected[1], atol=1e-10 * size)
-        np.testing.assert_allclose(pieces.acceleration[at], expected[2], atol=1e-10 * size / (T1 * ratio))
+        np.testing.assert_allclose(pieces.state[0, at], expected[0], atol=1e-10 * size)
+        np.testing.assert_allclose(pieces.state[1, at], expected[1], atol=1e-10 * size)
+        np.testing.assert_allclose(pieces.state[2, at], expected[2], atol=1e-10 * size / (T1 * ratio))
         # pieces join: what one ends with, the next begins with
         h = np.diff(t)[:, None]
-        p, v, a, j = (getattr(pieces, n)[at][:-1] for n in ("position", "velocity", "acceleration", "jerk"))
-        np.testing.assert_allclose(p + h * (v + h * (a / 2 + h * j / 6)), pieces.position[at][1:], atol=1e-9)
-        np.testing.assert_allclose(a + h * j, pieces.acceleration[at][1:], atol=1e-8 * size / (T1**2 * ratio))
+        p, v, a, j = pieces.state[:, at][:, :-1]
+        np.testing.assert_allclose(p + h * (v + h * (a / 2 + h * j / 6)), pieces.state[0, at][1:], atol=1e-9)
+        np.testing.assert_allclose(a + h * j, pieces.state[2, at][1:], atol=1e-8 * size / (T1**2 * ratio))
 
 
 def test_the_universal_identity():
@@ -83,7 +83,8 @@ def test_the_universal_identity():
         cells = Cells(leg=np.arange(12), length=course.length, speed=course.feed)
         command = command_of(through, cells, np.zeros(13), np.array([T1]), np.array([T2]))
         pieces = superpose(command)
-        seen = np.abs(getattr(pieces, quantity)[:, 0]).max() / (
+        row = ("position", "velocity", "acceleration", "jerk").index(quantity)
+        seen = np.abs(pieces.state[row, :, 0]).max() / (
             V / T1 if quantity == "acceleration" else V / (T1 * T2)
         )
         assert seen == pytest.approx(peak, rel=1e-3)
@@ -96,15 +97,15 @@ def test_nothing_adds_up_over_a_long_program():
     turn = np.cumsum(rng.normal(0, 0.2, 20_000))
     steps = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) * length[:, None]
     course = course_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, 20.0)
-    made = make(course, MACHINE, overlapping(course, 0.09, 0.06, 0.03))
-    motion = motion_of(course, made.pieces)
+    made = make(overlapping(course, 0.09, 0.06, 0.03), MACHINE)
+    motion = motion_of(course, made.motion)
     end = motion.at(np.array([motion.end]), 1.0)
     assert motion.end > 10_000
     np.testing.assert_allclose(end.position[0], course.point[-1], atol=2e-9)
-    p, v = made.pieces.position, made.pieces.velocity
+    p, v, a, j = made.motion.state
     assert np.abs(v[-1]).max() < 20.0
-    h = np.diff(made.pieces.t)[:, None]
-    onward = p[:-1] + h * (v[:-1] + h * (made.pieces.acceleration[:-1] / 2 + h * made.pieces.jerk[:-1] / 6))
+    h = np.diff(made.motion.t)[:, None]
+    onward = p[:-1] + h * (v[:-1] + h * (a[:-1] / 2 + h * j[:-1] / 6))
     assert np.abs(onward - p[1:]).max() < 5e-9
 
 
@@ -113,9 +114,9 @@ def test_dwells_and_full_stops():
     machine = machine_of()
     course = course_of(toolpath_from_program(program, machine), machine)
     np.testing.assert_allclose(course.dwell, [0.5, 1.0, 0.25])  # the exact stop comes after the corner at Y10
-    made = make(course, machine, overlapping(course, 0.0, 0.05, 0.03))
-    motion = motion_of(course, made.pieces)
+    made = make(overlapping(course, 0.0, 0.05, 0.03), machine)
+    motion = motion_of(course, made.motion)
     assert made.command.begin[0] == 0.5
     assert motion.end == pytest.approx(1.75 + course.length.sum() / 100.0 + len(course) * 0.08)
-    rest = made.pieces.velocity[made.pieces.t >= motion.end - 0.25 - 1e-9]
+    rest = made.motion.state[1, made.motion.t >= motion.end - 0.25 - 1e-9]
     assert not rest.any()

@@ -7,6 +7,7 @@ import random
 
 import numpy as np
 import pytest
+from quick import slow_but
 
 import planner
 from planner.geometry.build import toolpath_from_program
@@ -135,7 +136,10 @@ def mixed(blocks: int) -> str:
 
 @pytest.mark.parametrize(
     "method",
-    ["optimal", "second-order", "bezier", "kinematic", "fir", "fir-spline", "stop"],
+    slow_but(
+        ("second-order", "stop"),
+        ["optimal", "second-order", "bezier", "kinematic", "fir", "fir-spline", "stop"],
+    ),
 )
 def test_every_method_names_the_block_it_is_at(method: str) -> None:
     program = parse_program(mixed(16), MACHINE)

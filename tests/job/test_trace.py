@@ -91,6 +91,7 @@ def run(*arguments: object):
     return CliRunner().invoke(app, ["plan", *(str(argument) for argument in arguments)])
 
 
+@pytest.mark.slow
 def test_the_command_line_has_lines_and_a_file(tmp_path: Path):
     program, file = tmp_path / "square.ngc", tmp_path / "trace.json"
     program.write_text(SQUARE)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from quick import slow_but
 from scipy.spatial import cKDTree
 
 from benchmarks import problems
@@ -83,17 +84,19 @@ def assert_kept(made, lengths):
     np.testing.assert_allclose(position[-1], made.toolpath.end[-1], atol=1e-6)
 
 
-@pytest.mark.parametrize("lengths", LENGTHS, ids=str)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("lengths", slow_but([(0.02, 0.013)], LENGTHS), ids=str)
+@pytest.mark.parametrize("method", slow_but(("stop", "kinematic", "fir", "second-order"), METHODS))
 def test_behind_the_filters_nothing_leaves_the_tolerance(method, lengths):
     assert_kept(plan(JOB, machine(lengths), method=method, corner=BEZIER.get(method)), lengths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(0.02, 0.013), (0.01, 0.02, 0.005), (0.03,)], ids=str)
 def test_any_number_of_filters_on_splines(lengths):
     assert_kept(OptimalMethod(rounds=1).plan(CORNER, machine(lengths)), lengths)
 
 
+@pytest.mark.slow
 def test_tube_too():
     assert_kept(TubeMethod().plan(CORNER, machine((0.02, 0.013))), (0.02, 0.013))
 

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from quick import slow_but
 
 import planner
 from benchmarks import problems
@@ -49,7 +50,7 @@ def planned(job: str, method: str) -> planner.Plan:
 METHODS = ("optimal", "second-order", "bezier", "kinematic", "fir", "fir-spline", "stop")
 
 
-@pytest.mark.parametrize("job", JOBS)
+@pytest.mark.parametrize("job", slow_but(("pentagon", "five points"), JOBS))
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_keeps_the_laws_at_every_programmed_corner(method, job):
     plan = planned(job, method)
@@ -66,6 +67,7 @@ def test_every_method_keeps_the_laws_at_every_programmed_corner(method, job):
     assert (ratio <= found.speed_ratio * (1 + 1e-12)).all()
 
 
+@pytest.mark.slow
 def test_the_optimum_inside_the_tube_keeps_them_too():
     plan = planner.plan(problems.zigzag(count=4), MACHINE, method="tube")
     assert plan.verdict.passed, plan.verdict.faults
@@ -101,7 +103,12 @@ def by_hand(plan: planner.Plan, machine: Machine) -> tuple[list[float], list[flo
 
 @pytest.mark.parametrize("method", ["optimal", "second-order", "kinematic", "fir"])
 @pytest.mark.parametrize(
-    ("job", "gains"), [("pentagon", (1.3, 1.75)), ("zigzag", (1.4, 1.7)), ("five points", (0.9, 1.75))]
+    ("job", "gains"),
+    [
+        ("pentagon", (1.3, 1.75)),
+        ("five points", (0.9, 1.75)),
+        pytest.param("zigzag", (1.4, 1.7), marks=pytest.mark.slow),
+    ],
 )
 def test_the_samples_alone_say_what_a_second_hand_finds_in_them(job, gains, method):
     plan = planned(job, method)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from quick import slow_but
 
 from benchmarks import problems
 from planner.machine import Axis, Machine
@@ -67,7 +68,7 @@ def machine(seed: int = 0, **more) -> Machine:
     return problems.machine(**({"axes": axes, "tolerance": 10 ** rng.uniform(-2.0, -0.7)} | more))
 
 
-@pytest.mark.parametrize("method", HOLDING)
+@pytest.mark.parametrize("method", slow_but(set(HOLDING) - {"optimal"}, HOLDING))
 @given(seed=seeds, axes=st.integers(2, 4))
 @settings(max_examples=8)
 def test_tolerance_and_limits_hold(method, seed, axes):
@@ -152,6 +153,7 @@ def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed
         assert missed >= limits.tolerance * (1 - 2e-3) - bow
 
 
+@pytest.mark.slow
 @given(theta=corners, axes=st.integers(2, 4), seed=seeds)
 @settings(max_examples=15)
 def test_the_optimum_misses_the_vertex_by_the_share_of_its_rounding(theta, axes, seed):

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from planner.base.arrays import FloatArray
 from planner.corners import kinematic
-from planner.lookahead import look_ahead as la
-from planner.lookahead.look_ahead import Legs, Passage, capped, look_ahead, needed
-from planner.lookahead.ramps import Kind, reach
+from planner.lookahead.look_ahead import LegLimits, Passage, capped, look_ahead, moves, needed, swept
+from planner.lookahead.ramps import JointKind, gain_max
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -44,10 +43,10 @@ def ruckig_time(distance, V1, A1, V2, A2, v, a, j) -> float:
 
 
 def random_case(seed: int, joints: int):
-    """Legs of one to a thousand and corners of both families at all inner joints, none longer than half a leg."""
+    """LegLimits of one to a thousand and corners of both families at all inner joints, none longer than half a leg."""
     rng = np.random.default_rng(seed)
     n = joints - 1
-    legs = Legs(
+    legs = LegLimits(
         length=10 ** rng.uniform(-2, 1.3, n),
         v=10 ** rng.uniform(1, 2.5, n),
         a=10 ** rng.uniform(2.5, 4, n),
@@ -64,7 +63,7 @@ def random_case(seed: int, joints: int):
     room[inner] = 0.5 * np.minimum(legs.length[:-1], legs.length[1:])
     wish = feed * rng.uniform(0.05, 1.0, joints)
     candidates = []
-    for which, p, q in ((Kind.ZERO, alpha, eta), (Kind.ENTRY, a, J)):
+    for which, p, q in ((JointKind.ZERO, alpha, eta), (JointKind.ENTRY, a, J)):
         kind = np.zeros(joints, int)
         kind[inner] = which
         candidates.append(capped(Passage(kind=kind, V=wish, p=p, q=q), legs, room))
@@ -74,15 +73,15 @@ def random_case(seed: int, joints: int):
 def corner_of(passage: Passage, i: int) -> tuple[float, float, float]:
     """A, l and T of a corner by corners/kinematic.py."""
     kind, V, p, q = (getattr(passage, name)[i] for name in ("kind", "V", "p", "q"))
-    if kind == Kind.ZERO and V > 0:
+    if kind == JointKind.ZERO and V > 0:
         return 0.0, float(kinematic.approach(V, p, q)), float(np.sum(kinematic.phase_times(V, p, q)))
-    if kind == Kind.ENTRY and V > 0:
+    if kind == JointKind.ENTRY and V > 0:
         A = float(kinematic.entry_acceleration(V, p, q))
         return A, float(kinematic.entry_length(V, p, q)), 2 * V / A
     return 0.0, 0.0, 0.0
 
 
-def shortest_need(legs: Legs, passage: Passage, i: int) -> float:
+def shortest_need(legs: LegLimits, passage: Passage, i: int) -> float:
     """The shortest length that leg i can have between its corners, by adding up the phases of both ramps."""
 
     def ramp(V, A, W, a, j):
@@ -104,7 +103,7 @@ def test_reach_is_the_inverse_of_the_ramp(V, gain, a, j):
     """Over the length of the fastest ramp by `gain` exactly this gain is reached, from a micro-speed to m/s."""
     V, gain, a, j = 10.0**V, 10.0**gain, 10.0**a, 10.0**j
     time = 2 * np.sqrt(gain / j) if gain <= a**2 / j else gain / a + a / j
-    assert reach(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-12)
+    assert gain_max(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-12)
 
 
 @given(share=st.floats(0.0, 0.499), gain=st.floats(-3, 3), a=st.floats(2, 4), j=st.floats(3, 6))
@@ -113,7 +112,7 @@ def test_reach_from_where_a_ramp_would_have_begun_backwards(share, gain, a, j):
     gain, a, j = 10.0**gain, 10.0**a, 10.0**j
     V = -share * gain
     time = 2 * np.sqrt(gain / j) if gain <= a**2 / j else gain / a + a / j
-    assert reach(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-9)
+    assert gain_max(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-9)
 
 
 @given(seeds)
@@ -131,17 +130,17 @@ def test_a_leg_takes_the_time_that_ruckig_finds(seed):
         assert time[i + 1] - time[i] - T2 == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [1.0, 0.5])
 @pytest.mark.parametrize("family", [0, 1])
 def test_no_leg_is_too_short_on_thousands(k, family):
     legs, candidates = random_case(5, 6000)
     way = candidates[family]
-    la._sweep(way.kind, V := way.V.copy(), way.p, way.q, legs.length, legs.a, legs.j, k)
-    swept = Passage(kind=way.kind, V=V, p=way.p, q=way.q)
-    assert (V <= way.V).all()
-    lowered = (V < way.V * (1 - 1e-9)).mean()
+    slower = swept(legs, way, k)
+    assert (slower.V <= way.V).all()
+    lowered = (slower.V < way.V * (1 - 1e-9)).mean()
     assert 0.1 < lowered < 0.9
-    missing = np.array([shortest_need(legs, swept, i) for i in range(len(legs))]) - legs.length
+    missing = np.array([shortest_need(legs, slower, i) for i in range(len(legs))]) - legs.length
     assert (missing <= 1e-9 * legs.length).all()
     # without the sweeps very many legs are
     before = np.array([shortest_need(legs, way, i) for i in range(len(legs))]) - legs.length
@@ -154,15 +153,16 @@ def test_short_segment_rule_holds_in_both_directions(seed, k):
     """V_target <= k (V + reach), towards either end, where both ends run through."""
     legs, candidates = random_case(seed, 200)
     way = candidates[0]
-    la._sweep(way.kind, V := way.V.copy(), way.p, way.q, legs.length, legs.a, legs.j, k)
-    length = [corner_of(Passage(kind=way.kind, V=V, p=way.p, q=way.q), i)[1] for i in range(len(V))]
+    slower = swept(legs, way, k)
+    V = slower.V
+    length = [corner_of(slower, i)[1] for i in range(len(V))]
     for i in range(len(legs)):
         low, high = sorted(V[i : i + 2])
         free = legs.length[i] - length[i] - length[i + 1]
-        assert high <= k * (low + reach(low, max(free, 0.0), legs.a[i], legs.j[i])) * (1 + 1e-9) + 1e-12
+        assert high <= k * (low + gain_max(low, max(free, 0.0), legs.a[i], legs.j[i])) * (1 + 1e-9) + 1e-12
 
 
-def total_time(legs: Legs, passage: Passage) -> float:
+def total_time(legs: LegLimits, passage: Passage) -> float:
     """Time of a passage by ruckig, infinite where a leg is too short."""
     total = 0.0
     for i in range(len(legs)):
@@ -180,13 +180,9 @@ def total_time(legs: Legs, passage: Passage) -> float:
 def test_no_other_choice_of_corners_and_stops_is_faster(seed):
     """Brute force over all 3^4 choices with the swept speeds."""
     legs, candidates = random_case(seed, 6)
-    swept = []
-    for way in candidates:
-        V = way.V.copy()
-        la._sweep(way.kind, V, way.p, way.q, legs.length, legs.a, legs.j, 1.0)
-        swept.append(Passage(kind=way.kind, V=V, p=way.p, q=way.q))
+    slower = [swept(legs, way) for way in candidates]
     stop = Passage(kind=np.zeros(6, int), V=np.zeros(6), p=np.ones(6), q=np.ones(6))
-    ways, at = [stop, *swept], np.arange(6)
+    ways, at = [stop, *slower], np.arange(6)
     times = []
     for choice in itertools.product(range(3), repeat=4):
         row = np.array([0, *choice, 0])
@@ -197,10 +193,12 @@ def test_no_other_choice_of_corners_and_stops_is_faster(seed):
     assert time[-1] >= min(times) * (1 - 1e-4)
 
 
-def two_legs(theta: float, V: float, eps: float, *, kinds=("zero", "entry")) -> tuple[Legs, list[Passage]]:
+def two_legs(
+    theta: float, V: float, eps: float, *, kinds=("zero", "entry")
+) -> tuple[LegLimits, list[Passage]]:
     """docs/papers.md' example: two legs of 20 mm, A = 2000, J = 66,667 along the path, a corner of angle theta between them."""
     A, J, s = 2000.0, 66_667.0, np.sin(theta / 2)
-    legs = Legs(length=np.full(2, 20.0), v=np.full(2, V), a=np.full(2, A), j=np.full(2, J))
+    legs = LegLimits(length=np.full(2, 20.0), v=np.full(2, V), a=np.full(2, A), j=np.full(2, J))
     u1, u2 = np.array([[1.0, 0.0]]), np.array([[np.cos(theta), np.sin(theta)]])
     limits = np.full(2, A), np.full(2, J)
     alpha, eta = kinematic.ratio_min(limits[0], u2 - u1), kinematic.ratio_min(limits[1], u2 - u1)
@@ -208,11 +206,11 @@ def two_legs(theta: float, V: float, eps: float, *, kinds=("zero", "entry")) -> 
     a = np.minimum(a, A)
     m = np.array([eps / (2 * s)])
     ways = {
-        "zero": (Kind.ZERO, kinematic.speed_from_middle(m, alpha, eta), alpha, eta),
-        "entry": (Kind.ENTRY, kinematic.entry_speed_from_middle(m, a, jerk), a, jerk),
+        "zero": (JointKind.ZERO, kinematic.speed_from_middle(m, alpha, eta), alpha, eta),
+        "entry": (JointKind.ENTRY, kinematic.entry_speed_from_middle(m, a, jerk), a, jerk),
     }
 
-    def candidate(kind: Kind, speed: FloatArray, p: FloatArray, q: FloatArray) -> Passage:
+    def candidate(kind: JointKind, speed: FloatArray, p: FloatArray, q: FloatArray) -> Passage:
         row = np.zeros((3, 3))
         row[:, 1] = np.minimum(speed[0], V), p[0], q[0]
         way = Passage(kind=np.array([0, kind, 0]), V=row[0], p=row[1], q=row[2])
@@ -227,7 +225,7 @@ def test_the_fastest_corner_is_not_the_fastest_motion():
     assert zero.V[1] == pytest.approx(22.9, abs=0.05)
     assert total_time(legs, zero) == pytest.approx(0.56144, abs=2e-5)
     chosen, time = look_ahead(legs, [zero])
-    assert chosen.kind[1] == Kind.STOP
+    assert chosen.kind[1] == JointKind.STOP
     assert time[-1] == pytest.approx(0.56, abs=2e-5)
 
 
@@ -253,3 +251,41 @@ def test_needed_counts_the_ramps():
             A, reach_back, _ = corner_of(way, i)
             ramps = [A / j * way.V[i] + A**3 / (3 * j**2) for j in legs.j[i - 1 : i + 1]]
             assert length[i] == pytest.approx(reach_back + max(ramps), rel=1e-12)
+
+
+@given(seeds)
+@settings(max_examples=20)
+def test_where_only_limits_change_the_motion_is_as_fast_as_the_limits_allow(seed):
+    """Legs without corners: no stop, all legs run; with corners at constant speed some of which are stops, as by brute force."""
+    legs, _ = random_case(seed, 7)
+    inner = np.minimum(legs.v[:-1], legs.v[1:])
+    straight = Passage(
+        kind=np.array([0, 1, 1, 1, 1, 1, 0]), V=np.array([0, *inner, 0]), p=np.zeros(7), q=np.zeros(7)
+    )
+    chosen, time = look_ahead(legs, [straight])
+    np.testing.assert_allclose(chosen.V, swept(legs, straight).V, rtol=1e-12)
+    duration, _ = moves(chosen, legs)
+    np.testing.assert_allclose(np.diff(time), duration.sum(axis=1), rtol=1e-12)
+    rng = np.random.default_rng(seed)
+    corner = np.array([False, False, True, False, True, False, False])
+    least = np.append(np.minimum(legs.length[:-1], legs.length[1:]), 0.0)
+    taken = 0.3 * np.where(corner, np.insert(least, 0, 0.0)[:7], 0.0)
+    turning = Passage(
+        kind=np.where(corner, JointKind.CONSTANT, straight.kind),
+        V=np.where(corner, straight.V * rng.uniform(0.02, 1.0), straight.V),
+        p=taken,
+        q=taken,
+        r=2 * taken,
+    )
+    _, time = look_ahead(legs, [turning])
+    times = []
+    for through in itertools.product((False, True), repeat=2):
+        stopped = np.zeros(7, bool)
+        stopped[corner] = through
+        kind = np.where(stopped, JointKind.STOP, turning.kind)
+        other = {name: np.where(stopped, 0.0, getattr(turning, name)) for name in ("p", "q", "r")}
+        V = np.where(corner & ~stopped, swept(legs, turning).V, np.where(stopped, 0.0, turning.V))
+        way = swept(legs, Passage(kind=kind, V=V, **other))
+        lasting = moves(way, legs)[0].sum()
+        times.append(lasting)
+    assert time[-1] == pytest.approx(min(times), rel=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from quick import slow_but
 
 import planner
 from benchmarks import problems
@@ -17,16 +18,22 @@ from planner.methods.optimal import SIGMA2, OptimalMethod
 
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
+# Cycle time on single corners, over the bound without jerk limits [-]: where corners follow closely, jerk is what holds them.
+OVER_BOUND = {
+    "pentagon": 1.016, "zigzag": 1.049, "circle": 2.65, "spiral": 2.06, "five points": 1.22, "arcs": 1.010,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("corner", ["bezier", "fir"])
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", slow_but(("pentagon", "five points"), JOBS))
 def test_jobs_are_verified_with_their_jerk_limited(name, corner):
     plan = OptimalMethod(corner=corner).plan(JOBS[name], MACHINE)
     assert plan.verdict.passed, plan.verdict.faults
     assert all(check.limited for check in plan.verdict.limits.values())
     bound = planner.plan(JOBS[name], MACHINE, method="second-order", corner=corner)
-    assert bound.trajectory.cycle_time * (1 - 2e-3) <= plan.trajectory.cycle_time <= plan.stop_time
+    over = plan.trajectory.cycle_time / bound.trajectory.cycle_time
+    assert 1 - 2e-3 <= over <= OVER_BOUND[name] * (1 + 5e-3)
+    assert plan.trajectory.cycle_time <= plan.stop_time
     assert plan.rounded.worst_ratio() <= 1 + 1e-9
     assert plan.corners.held == len(plan.corners) > 0
 

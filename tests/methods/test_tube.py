@@ -8,23 +8,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from quick import slow_but
 
 import planner
 from benchmarks import problems
 from planner.base.errors import InputError, NotSolvedError
 from planner.feedrate.solution import Status
-from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
 from planner.machine import Fir
 from planner.methods.optimal import OptimalMethod
 from planner.methods.tube import LEGS_MAX, TubeMethod
 from planner.nc.reader import parse_program
-from planner.tube import course as courses
-from planner.tube.course import Course, courses_of
-from planner.tube.guess import Guess
-from planner.tube.motion import _closing, _integrated
 from planner.tube.nlp import TubeNLP
 
 MACHINE = problems.machine()
@@ -57,7 +51,7 @@ def verified(program, machine=MACHINE) -> Plan:
     return made
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", slow_but("corner of 90 degrees", JOBS))
 def test_jobs_are_verified_and_faster_than_what_they_start_from(name):
     made = tube(name).require()
     assert made.verdict.passed, made.verdict.faults
@@ -75,6 +69,7 @@ def test_jobs_are_verified_and_faster_than_what_they_start_from(name):
     assert set(made.trajectory.block) == set(made.toolpath.block)
 
 
+@pytest.mark.slow
 def test_the_pentagon_takes_what_free_motion_is_known_to_take():
     """DESIGN 8: 0.957 s by another transcription."""
     assert tube("pentagon").trajectory.cycle_time == pytest.approx(0.9577, rel=SAME)
@@ -95,6 +90,7 @@ def test_something_is_at_its_limit_all_the_time():
     assert np.mean(ratio > 0.98) > 0.9
 
 
+@pytest.mark.slow
 def test_scaled_lengths_and_limits_take_the_same_time():
     k = 7.0
     large = problems.machine(velocity=100 * k, acceleration=2000 * k, jerk=2e5 * k, tolerance=0.05 * k)
@@ -104,6 +100,7 @@ def test_scaled_lengths_and_limits_take_the_same_time():
     )
 
 
+@pytest.mark.slow
 def test_turned_by_a_right_angle_takes_the_same_time():
     made = verified(corner(90, first=90.0))
     assert made.trajectory.cycle_time == pytest.approx(
@@ -111,12 +108,14 @@ def test_turned_by_a_right_angle_takes_the_same_time():
     )
 
 
+@pytest.mark.slow
 def test_more_tolerance_takes_less_time():
     wide = verified(corner(90), problems.machine(tolerance=0.2)).trajectory.cycle_time
     fine = verified(corner(90), problems.machine(tolerance=0.01)).trajectory.cycle_time
     assert wide < tube("corner of 90 degrees").trajectory.cycle_time * (1 - 5e-3) < fine * (1 - 5e-3)
 
 
+@pytest.mark.slow
 def test_stops_and_dwells_add_up():
     """Exact stops make courses of their own; a dwell stands between two of them."""
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nY0\nM2\n")
@@ -130,6 +129,7 @@ def test_stops_and_dwells_add_up():
     )
 
 
+@pytest.mark.slow
 def test_normal_acceleration_is_kept_and_used():
     limit = 1000.0
     check = verified(corner(60), problems.machine(normal_acceleration=limit)).verdict.limits[
@@ -138,6 +138,7 @@ def test_normal_acceleration_is_kept_and_used():
     assert 0.9 * limit < check.value <= limit * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_filters_that_follow_get_their_share_of_the_tolerance():
     plain = tube("corner of 90 degrees").trajectory.cycle_time
     made = verified(corner(90), problems.machine(fir=Fir(time_constants=(0.02,))))
@@ -148,68 +149,12 @@ def test_filters_that_follow_get_their_share_of_the_tolerance():
     assert made.verdict.after_filters.vertex_error_mm <= 0.05
 
 
+@pytest.mark.slow
 def test_a_lower_feed_holds_on_its_block():
     job = problems.polyline([[0, 0], [4, 0], [8, 0], [8, 4]], feed=np.array([100.0, 20.0, 100.0]))
     made = verified(job)
     assert made.trajectory.feed[made.trajectory.block == 1].max() <= 20.0 * (1 + 1e-6)
     assert made.trajectory.feed.max() > 30.0
-
-
-# --- what the problem is made of ---------------------------------------------------------------------------------------------
-
-
-def only_course(program) -> Course:
-    (course,) = courses_of(toolpath_from_program(program, MACHINE), MACHINE)
-    return course
-
-
-def test_cutting_a_line_changes_no_leg():
-    whole = only_course(problems.polyline([[0, 0], [4, 0], [4, 4]]))
-    cut = only_course(problems.polyline([[0, 0], [1, 0], [2.5, 0], [4, 0], [4, 4]]))
-    for name in ("length", "base", "drift", "budget", "vertex", "vertex_budget", "feed"):
-        np.testing.assert_allclose(getattr(cut, name), getattr(whole, name), atol=1e-12)
-    assert list(whole.axis) == [0, 1]  # z stands still
-
-
-def test_a_course_is_the_programmed_path():
-    toolpath = toolpath_from_program(JOBS["line and arcs"], MACHINE)
-    course = only_course(JOBS["line and arcs"])
-    legs = np.arange(len(course))
-    np.testing.assert_allclose(course.points(legs, np.zeros(3)), toolpath.start, atol=1e-9)
-    np.testing.assert_allclose(course.points(legs, course.length), toolpath.end, atol=1e-9)
-    step = 1e-6
-    slope = (
-        course.points(legs, course.length / 2 + step) - course.points(legs, course.length / 2 - step)
-    ) / (2 * step)
-    np.testing.assert_allclose(course.tangents(legs, course.length / 2), slope, atol=1e-8)
-
-
-@given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
-@settings(max_examples=200, deadline=None)
-def test_a_step_on_an_arc_bends_away_by_no_more_than_its_share(places, t):
-    """The mean of points on the arc with Bernstein weights is within ARC_SHARE of the budget of the point at the mean place."""
-    course = only_course(JOBS["line and arcs"])
-    for leg in (1, 2):
-        s = np.sort(places) * course.step_max[leg]
-        weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
-        rows = np.full(4, leg)
-        off = weights @ course.points(rows, s) - course.points(rows[:1], (weights @ s)[None])[0]
-        assert np.linalg.norm(off) <= courses.ARC_SHARE * course.budget[leg] * (1 + 1e-9)
-
-
-def test_the_closing_jerks_are_what_the_motion_runs_too_far():
-    course = only_course(corner(90))
-    rng = np.random.default_rng(1)
-    h, jerk = rng.uniform(1e-3, 5e-3, 30), rng.normal(size=(30, 2))
-    steps = _integrated(course, h, jerk - _closing(course, h, jerk))
-    last, tau = (
-        {name: getattr(steps, name)[-1] for name in ("position", "velocity", "acceleration", "jerk")},
-        h[-1],
-    )
-    p, v, a, j = last.values()
-    np.testing.assert_allclose(p + tau * (v + tau * (a / 2 + tau * j / 6)), course.vertex[-1], atol=1e-9)
-    np.testing.assert_allclose(v + tau * (a + tau * j / 2), 0.0, atol=1e-8)
-    np.testing.assert_allclose(a + tau * j, 0.0, atol=1e-6)
 
 
 # --- refusals and failures ---------------------------------------------------------------------------------------------------
@@ -236,6 +181,7 @@ def test_a_job_that_is_too_long_is_refused_before_any_work():
 HASTY = TubeNLP(max_iterations=2)
 
 
+@pytest.mark.slow
 def test_where_nothing_converges_the_start_stays_and_says_why():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n")
     made = TubeMethod(starts=SHORT, solver=HASTY).plan(job, MACHINE)
@@ -243,8 +189,7 @@ def test_where_nothing_converges_the_start_stays_and_says_why():
     assert made.status is Status.ACCEPTABLE
     assert made.trajectory.cycle_time == SHORT[0].plan(job, MACHINE).trajectory.cycle_time
     assert (
-        "stays on 1 of 1 stretches between full stops, the first on lines 2 to 3: not converged"
-        in made.sentence
+        "stays on 1 of 1 runs between full stops, the first on lines 2 to 3: not converged" in made.sentence
     )
 
 
@@ -255,6 +200,7 @@ class SecondFails(TubeNLP):
         return TubeNLP(max_iterations=2 if len(course) == 1 else 300).solve(course, guess)
 
 
+@pytest.mark.slow
 def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nG4 P0.1\nM2\n")
     made = TubeMethod(starts=SHORT, solver=SecondFails()).plan(job, MACHINE).require()
@@ -263,9 +209,10 @@ def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     rest = SHORT[0].plan(parse_program("G21 G90 F6000\nG1 X4\nM2\n"), MACHINE)
     both = first.trajectory.cycle_time + rest.trajectory.cycle_time + 0.35
     assert made.trajectory.cycle_time == pytest.approx(both, rel=1e-6)
-    assert "stays on 1 of 2 stretches between full stops, the first on lines 5 to 5" in made.sentence
+    assert "stays on 1 of 2 runs between full stops, the first on lines 5 to 5" in made.sentence
 
 
+@pytest.mark.slow
 def test_the_next_start_is_tried_where_the_first_leads_to_nothing():
     asked = []
 
@@ -296,13 +243,7 @@ def test_a_start_without_a_motion_is_a_status():
         made.require()
 
 
-def test_settings_and_guesses_are_checked():
-    with pytest.raises(ValueError, match="tol: 0"):
-        TubeNLP(tol=0)
-    with pytest.raises(ValueError, match=r"Guess\.h"):
-        Guess(leg=np.zeros(1), h=np.zeros(1), state=np.zeros((2, 3, 2)), place=np.zeros((1, 4)))
-
-
+@pytest.mark.slow
 def test_it_has_a_name():
     made = planner.plan(dataclasses.replace(corner(90)), MACHINE, method="tube")
     assert made.method == "tube"

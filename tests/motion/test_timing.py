@@ -169,14 +169,40 @@ def test_a_dwell_at_the_start_has_no_acceleration():
 decades = st.floats(-2.0, 2.0).map(lambda e: 10.0**e)
 
 
+def ruckigs(length: float, v: float, a: float, j: float) -> ruckig.Trajectory:
+    """The same move by ruckig, in units in which length and jerk are 1: its own epsilons are absolute."""
+    unit = (length / j) ** (1 / 3)
+    move, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    move.target_position, move.max_jerk = [1.0], [1.0]
+    move.max_velocity, move.max_acceleration = [v * unit / length], [a * unit**2 / length]
+    assert ruckig.Ruckig(1).calculate(move, found) == ruckig.Result.Working
+    return found
+
+
 @given(length=st.floats(-4.0, 3.0).map(lambda e: 10.0**e), v=decades, a=decades, j=decades)
 @settings(max_examples=150)
-def test_closed_form_times_are_ruckigs(length, v, a, j):
+def test_closed_forms_are_ruckigs(length, v, a, j):
     v, a, j = 10 * v, 1e3 * a, 1e5 * j
     limits = tuple(np.array([x]) for x in (length, v, a, j))
-    duration, _ = rest_to_rest_phases(*limits)
-    assert duration.shape == (1, PHASES)
-    assert rest_to_rest_times(*limits)[0] == pytest.approx(duration.sum(), rel=1e-7)
+    duration, jerk = rest_to_rest_phases(*limits)
+    assert duration.shape == jerk.shape == (1, PHASES)
+    assert rest_to_rest_times(*limits)[0] == pytest.approx(duration.sum(), rel=1e-9)
+    expected, unit = ruckigs(length, v, a, j), (length / j) ** (1 / 3)
+    np.testing.assert_allclose(duration.sum() / unit, expected.duration, rtol=1e-7)
+    for share in (0.1, 0.3, 0.5, 0.8):
+        t = np.clip(share * duration.sum() - np.append(0.0, np.cumsum(duration)[:-1]), 0.0, duration[0])
+        state = np.zeros(3)
+        for h, jj in zip(t, jerk[0], strict=True):
+            x, speed, acceleration = state
+            state = np.array(
+                [
+                    x + h * (speed + h * (acceleration / 2 + h * jj / 6)),
+                    speed + h * (acceleration + h * jj / 2),
+                    acceleration + h * jj,
+                ]
+            )
+        theirs = expected.at_time(share * expected.duration)[0][0]
+        assert state[0] / length == pytest.approx(theirs, abs=1e-6)
 
 
 def test_known_times():

@@ -27,7 +27,7 @@ from planner.nc.reader import parse_program, read_program
 
 HERE = Path(__file__).parent
 SHARED = HERE.parents[1].parent / "shared"
-NOT_NC = (".csv", ".plt", ".hpgl")  # plotter files: tests/nc/test_hpgl.py
+NOT_NC = (".csv", ".plt", ".hpgl")  # plotter files: tests/nc/hpgl
 PROGRAMS = sorted(p for p in (SHARED / "nc").glob("*") if p.suffix not in NOT_NC) if SHARED.is_dir() else []
 PYTHON = "/usr/bin/python3"
 NOWHERE = 1e-9  # [mm]
@@ -119,6 +119,7 @@ def assert_sweeps_reach_ends(program: Program) -> None:
     assert np.abs(off).max(initial=0.0) < 1.1e-6
 
 
+@pytest.mark.slow
 @needs_oracle
 def test_real_programs_agree(tmp_path: Path) -> None:
     assert len(PROGRAMS) > 40, "the collection of real programs is not complete"

@@ -224,6 +224,7 @@ def test_the_control_reads_random_programs_as_we_do(tmp_path: Path) -> None:
 REAL_MAX = 200_000  # bytes: enough of the collection, in seconds
 
 
+@pytest.mark.slow
 @needs_oracle
 def test_the_control_reads_real_programs_as_we_do(tmp_path: Path) -> None:
     """Programs of many post-processors, and those of the comparison with other planners."""

@@ -24,6 +24,7 @@ def pentagon():
     return problems.all_jobs()["pentagon"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["optimal", "second-order"])
 def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
     """Without shaping it rings with 0.8 mm; method fir, which chooses its filters for the mode, takes 1.0419 s."""
@@ -37,7 +38,7 @@ def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
 def test_without_shaping_it_rings(pentagon):
     made = plan(pentagon, SHAKEN, method="bezier")
     assert left(made) > 0.1
-    assert any("does not shape its set points" in note for note in made.notes)
+    assert any("does not shape its setpoints" in note for note in made.notes)
 
 
 PROGRAM = b"""G21 G90 G17 G94 G64 P0.04 F3000
@@ -53,6 +54,7 @@ M2
 """
 
 
+@pytest.mark.slow
 def test_arcs_stops_and_dwells_with_two_modes_and_filters():
     """The verdict judges the exact stop, the dwell, and what comes out of the machine's own filters."""
     machine = problems.machine(

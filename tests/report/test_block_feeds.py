@@ -16,7 +16,7 @@ from planner.methods.stop import StopMethod
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 from planner.nc.writer import retimed
-from planner.report.block_feeds import RUN_PERIODS, SPREAD, _runs, block_feeds, block_times
+from planner.report.block_feeds import RUN_PERIODS, SPREAD, block_feeds, block_times, runs_of_feed
 
 MACHINE = load_machine("mill")
 PROGRAM = """G21 G90 G17
@@ -97,7 +97,7 @@ def test_blocks_of_a_run_share_their_feed() -> None:
 def test_where_runs_end(least: float, runs: list[int]) -> None:
     near = 1.0 + 0.9 * SPREAD
     highest = np.array([1.0, near, 1.0, 9.0, 9.0, 9.0 * near, 1.0, 1.0])
-    assert _runs(highest, np.ones(8), least).tolist() == runs
+    assert runs_of_feed(highest, np.ones(8), least).tolist() == runs
 
 
 def test_a_block_without_a_sample_is_not_held_up() -> None:

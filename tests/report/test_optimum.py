@@ -55,8 +55,8 @@ def test_what_more_saves() -> None:
 def test_a_hint_is_told_as_its_range() -> None:
     hints = dataclasses.replace(PRICES, hints=("feed", "tolerance"))
     assert price_rows(hints, 0.8)[:2] == [
-        ("10 % more saves", "feed 0.049 to 0.051 s, acceleration.y 0.0381 s; ranges are no more than a hint"),
-        ("10 µm more tolerance", "saves 0.01 to 0.016 s, no more than a hint"),
+        ("10 % more saves", "feed 0.049 to 0.051 s, acceleration.y 0.0381 s; ranges are hints only"),
+        ("10 µm more tolerance", "saves 0.01 to 0.016 s, a hint only"),
     ]
     elsewhere = dataclasses.replace(PRICES, hints=("jerk.y",))  # which stands in no table
     assert price_rows(elsewhere, 0.8) == price_rows(PRICES, 0.8)
@@ -79,7 +79,7 @@ def test_where_more_saves_nothing() -> None:
         (0.0131, "saves 0.0131 s"),
         (0.0003, "saves nothing to speak of"),
         (-0.0003, "saves nothing to speak of"),
-        (-0.0131, "costs 0.0131 s: on short legs corners take from each other"),
+        (-0.0131, "costs 0.0131 s: corners that share a short leg take room from each other"),
     ],
 )
 def test_more_tolerance_may_cost_time(saved: float, told: str) -> None:
@@ -126,6 +126,7 @@ def test_the_summary() -> None:
     assert nothing["prices"] is None
 
 
+@pytest.mark.slow
 def test_a_real_plan() -> None:
     machine = load_machine("mill")
     program = parse_program("G21 G90\nG1 X20 F6000\nY10\nX0\nY0\n", machine)

@@ -42,7 +42,7 @@ def test_blocks_have_their_planned_feed(job: Path, tmp_path: Path) -> None:
     assert "planned.ngc" in names
     assert (tmp_path / "out" / "planned.ngc").read_bytes() == SQUARE.encode()
     assert notes(tmp_path / "out") == [
-        "planned.ngc is the program as it was: no block is planned to be slower than its F word"
+        "planned.ngc equals the program: no block is planned slower than its F word"
     ]
 
     plan.trajectory = trajectory_along(plan.toolpath, time=0.5)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hand_made import make_plan
 from matplotlib.figure import Figure
+from quick import slow_but
 
 from planner.report import plots, profiles_figure, toolpath_figure
 
@@ -20,7 +21,7 @@ PROGRAMS = {
 }
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", slow_but("flat", PROGRAMS))
 def test_figures(tmp_path: Path, name: str) -> None:
     plots.write_figures(make_plan(PROGRAMS[name]), tmp_path)
     for file in ("toolpath.png", "profiles.png"):
@@ -50,7 +51,7 @@ def test_the_envelope_keeps_every_peak() -> None:
     values = np.zeros(1_000_000)
     values[[123_456, 654_321]] = 7.0, -5.0
     axes = Figure().add_subplot()
-    profiles_figure._profile(axes, np.linspace(0.0, 1.0, len(values)), values, "black")
+    profiles_figure.draw_profile(axes, np.linspace(0.0, 1.0, len(values)), values, "black")
     drawn = axes.collections[0].get_paths()[0].vertices
     assert drawn[:, 1].max() == 7.0
     assert drawn[:, 1].min() == -5.0
@@ -60,7 +61,7 @@ def test_the_envelope_keeps_every_peak() -> None:
 def test_thinning_keeps_the_ends_and_stays_within_a_pixel() -> None:
     angle = np.linspace(0.0, 2 * np.pi, 500_000)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    keep = toolpath_figure._one_per_pixel(circle)
+    keep = toolpath_figure.one_per_pixel(circle)
     assert keep[0] == 0
     assert keep[-1] == len(circle) - 1
     assert len(keep) < 8 * toolpath_figure.PIXELS
@@ -69,7 +70,7 @@ def test_thinning_keeps_the_ends_and_stays_within_a_pixel() -> None:
 
 def test_the_constraint_that_fills_a_column_wins() -> None:
     t = np.array([0.0, 0.5, 0.5 + 1e-9, 1.0])
-    kinds = profiles_figure._majority(t, np.array([0, 1, 2]), 3, 1.0)
+    kinds = profiles_figure.majority(t, np.array([0, 1, 2]), 3, 1.0)
     half = profiles_figure.COLUMNS // 2
     assert (kinds[:half] == 0).all()
     assert (kinds[half:] == 2).all()

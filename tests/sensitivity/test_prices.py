@@ -112,6 +112,7 @@ def job(request) -> Job:
     return Job(text({"lines": LINES, "arcs": ARCS}[request.param]))
 
 
+@pytest.mark.slow
 def test_axis_limits_cost_what_plans_made_again_say(job):
     priced = job.prices()
     some = 0
@@ -152,6 +153,7 @@ def assert_corners(job: Job, dear, *, rel: float) -> None:
         assert dear.saved[k] == pytest.approx(job.time - again.time, rel=rel, abs=1e-4 * job.time)
 
 
+@pytest.mark.slow
 def test_single_corners_save_what_plans_made_again_save(job):
     dear = job.prices().corners
     assert len(dear) >= 3
@@ -219,6 +221,7 @@ def test_ranked_tells_what_saves_time_and_nothing_else(job):
 
 
 # How far off the tolerance is priced for corners that bend while they grow: see the text of the module.
+@pytest.mark.slow
 @pytest.mark.parametrize(("corner", "rel"), [("kinematic", 0.15), ("fir", 0.4)])
 def test_other_corner_shapes(corner, rel):
     machine = problems.machine(fir=Fir(time_constants=[0.01, 0.004])) if corner == "fir" else MACHINE
@@ -298,6 +301,7 @@ def test_a_solver_without_multipliers_has_no_prices():
     assert plan.prices is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pentagon", "zigzag"])
 def test_splines_price_their_tolerance(name):
     """Within a third of plans made again with 1 to 10 um more: the plan is not quite the optimum that the multipliers belong to."""

@@ -32,6 +32,7 @@ def on_splines():
     return compared("pentagon", problems.pentagon(), MACHINE, "auto", among)
 
 
+@pytest.mark.slow
 def test_on_rounded_corners_all_that_stands_in_the_table_is_a_number_and_right(on_corners):
     for row in on_corners["rows"]:
         assert row["right"], row
@@ -40,6 +41,7 @@ def test_on_rounded_corners_all_that_stands_in_the_table_is_a_number_and_right(o
     assert len(on_corners["rows"]) >= 5
 
 
+@pytest.mark.slow
 def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_splines):
     cycle_time = on_splines["cycle_time_s"]
     for row in on_splines["rows"]:
@@ -52,6 +54,7 @@ def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_s
     assert rows["tolerance"]["found_s"] > 1e-3 * cycle_time
 
 
+@pytest.mark.slow
 def test_where_the_period_may_take_its_share_of_more_everything_is_a_hint_and_right():
     """Chords between samples 4 ms apart use 40 % of the tolerance: a faster motion has to leave them more."""
     among = ("feed", "tolerance")
@@ -66,6 +69,7 @@ def test_where_the_period_may_take_its_share_of_more_everything_is_a_hint_and_ri
     assert not set(among) & set(plan.prices.hints)
 
 
+@pytest.mark.slow
 def test_a_tenth_more_of_anything_saves_no_more_than_everything_a_tenth_faster(on_corners, on_splines):
     for result in (on_corners, on_splines):
         for row in result["rows"]:
@@ -158,9 +162,9 @@ def test_legs_that_a_wider_tolerance_opens_count(solved):
     path = samples.path
     free = path.legs.length - path.d_out[:-1] - path.d_in[1:]
     closed = np.flatnonzero(free < 1e-9)
-    assert part._opened(path) == pytest.approx(0.0, abs=1e-9)
+    assert part.opened(path) == pytest.approx(0.0, abs=1e-9)
     smaller = dataclasses.replace(path, d=0.9 * path.d)
-    opened = part._opened(smaller)
+    opened = part.opened(smaller)
     if not len(closed):
         assert opened == 0.0
         return
@@ -173,7 +177,7 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
     """400 pieces of 10 points, then one of 5000: windows of the first hold whole pieces, none has a part that is too short."""
     piece = np.append(np.arange(0, 4001, 10), 9000)
     kept = np.arange(9000)
-    edges, points, sampled = savings._windows(piece, kept, 3_000)
+    edges, points, sampled = savings.windows_of_grid(piece, kept, 3_000)
     assert sampled
     assert 2_500 <= len(points) <= 3_000
     for a, b in pairwise(edges):
@@ -184,4 +188,4 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
         whole = part[0] == piece[inside] and part[-1] + 1 == piece[inside + 1]
         assert whole or len(part) > savings.CELLS_MIN
     assert (points < 4000).any()
-    assert savings._windows(piece, kept, 9_000)[2] is False
+    assert savings.windows_of_grid(piece, kept, 9_000)[2] is False

@@ -72,6 +72,7 @@ def objective(problem, c):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("linear_part", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_same_optimum_as_ipopt(seed, linear_part):

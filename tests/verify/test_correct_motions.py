@@ -126,6 +126,7 @@ def test_segments_far_shorter_than_the_budget_pass():
     assert verdict.contour_error_mm < 1e-12
 
 
+@pytest.mark.slow
 def test_a_spiral_with_turns_closer_than_the_budget_passes():
     angle = np.linspace(0, 20 * np.pi, 1200)
     radius = 5 + 0.02 * angle / (2 * np.pi)
@@ -141,6 +142,7 @@ coordinate = st.floats(-50, 50).map(lambda x: round(x, 3))
 point = st.tuples(coordinate, coordinate, coordinate)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(points=st.lists(point, min_size=2, max_size=12), jerk=st.sampled_from([np.inf, 2e5, 5e3]))
 def test_every_polyline_run_rest_to_rest_passes(points, jerk):
@@ -156,6 +158,7 @@ def test_every_polyline_run_rest_to_rest_passes(points, jerk):
     assert verdict.contour_error_mm < 2000 * M.dt**2 / 8
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(scale=st.floats(0.01, 100), legs=st.integers(1, 6), seed=st.integers(0, 99))
 def test_scaling_lengths_and_limits_leaves_the_ratios(scale, legs, seed):

@@ -131,7 +131,7 @@ def test_a_stop_at_a_corner_keeps_the_laws_and_is_counted_as_one():
     found = judged(polyline(points, acceleration=900.0), points).corners
     assert (found.count, found.held, int(found.stands.sum()), int(found.compared.sum())) == (1, 1, 1, 0)
     assert max(found.worst_speed_ratio, found.worst_budget_ratio) < 0.002
-    assert found.sentence().endswith("; 1 stopped at")
+    assert found.sentence().endswith("; full stops at 1")
 
 
 def test_stops_of_the_program_and_joints_that_do_not_turn_are_no_corners():
@@ -143,7 +143,8 @@ def test_stops_of_the_program_and_joints_that_do_not_turn_are_no_corners():
     found = verify(sample(motion, 0.001), toolpath, UNEQUAL).corners
     assert found.line.tolist() == [20]
     assert (
-        "turns nowhere" in judged(polyline([(0, 0, 0), (9, 0, 0)]), [(0, 0, 0), (9, 0, 0)]).corners.sentence()
+        "no corner without a full stop"
+        in judged(polyline([(0, 0, 0), (9, 0, 0)]), [(0, 0, 0), (9, 0, 0)]).corners.sentence()
     )
 
 
@@ -158,7 +159,7 @@ def test_samples_too_far_apart_are_said_aloud_and_the_motion_is_looked_at_instea
     alone = judged(motion, points, coarse, between=False).corners
     assert (alone.count, alone.not_looked_at, alone.held) == (0, 1, 0)
     assert np.isnan(alone.worst_speed_ratio)
-    assert alone.sentence() == "eq. 18-20 hold at 0 of 1 corners; 1 could not be looked at"
+    assert alone.sentence() == "eq. 18-20 hold at 0 of 1 corners; 1 could not be checked"
     assert alone.summary()["not_looked_at"] == 1
     asked = judged(motion, points, coarse).corners
     assert (asked.count, asked.not_looked_at) == (1, 0)
@@ -171,7 +172,7 @@ def test_corners_that_the_motion_never_reaches_are_not_looked_at():
     found = verdict.corners
     assert found.looked.tolist() == [True, True, False]  # it ends at the second
     assert found.held == 2
-    assert "1 could not be looked at" in found.sentence()
+    assert "1 could not be checked" in found.sentence()
 
 
 # --- the laws, broken ---------------------------------------------------------------------------------------------------------
@@ -228,8 +229,8 @@ def test_half_of_the_closed_form_would_fail_motions_that_use_it(monkeypatch):
     feed = 0.9 * np.sqrt((BOX @ inward).max() * arc_of(theta, 0.04))
     before = judged(rounded(points, 0.04, feed), points)
     assert not laws_broken(before)
-    support = error_allocation._support
-    monkeypatch.setattr(error_allocation, "_support", lambda *given: 0.5 * support(*given))
+    support = error_allocation.allowed_across
+    monkeypatch.setattr(error_allocation, "allowed_across", lambda *given: 0.5 * support(*given))
     after = judged(rounded(points, 0.04, feed), points)
     assert laws_broken(after)
     assert after.corners.worst_speed_ratio == pytest.approx(np.sqrt(2) * before.corners.worst_speed_ratio)

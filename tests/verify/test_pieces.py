@@ -6,14 +6,14 @@ from motions import Moves, helix, machine
 from numba import njit
 from scipy.optimize import minimize_scalar
 
-from planner.verify.pieces import PIECE_ANGLE, pieces_of, reach
+from planner.verify.pieces import PIECE_ANGLE, program_pieces, reach_piece
 
 M = machine()
 
 
 @njit
 def distance_from(pieces, i, q):
-    return reach(pieces, i, q, 0.0)[2]
+    return reach_piece(pieces, i, q, 0.0)[2]
 
 
 @pytest.mark.parametrize("rise", [0.0, 3.0, -30.0])
@@ -21,7 +21,7 @@ def distance_from(pieces, i, q):
 def test_the_distance_from_an_arc_is_the_searched_one(sweep, rise):
     start, center = (7.0, 1.0, 2.0), (1.0, -2.0)
     toolpath = Moves(start).arc(center, sweep, rise=rise).toolpath(M)
-    pieces = pieces_of(toolpath)
+    pieces = program_pieces(toolpath)
     _, curve = helix(start, center, sweep, rise)
     rng = np.random.default_rng(1)
     for i, piece in enumerate(pieces.piece):
@@ -42,7 +42,7 @@ def test_the_distance_from_an_arc_is_the_searched_one(sweep, rise):
 
 
 def test_the_distance_from_a_line():
-    pieces = pieces_of(Moves().line(10).toolpath(M))
+    pieces = program_pieces(Moves().line(10).toolpath(M))
     assert distance_from(pieces, 0, np.array([4.0, 3.0, 0.0])) == pytest.approx(3.0, abs=1e-15)
     assert distance_from(pieces, 0, np.array([13.0, 4.0, 0.0])) == pytest.approx(5.0, abs=1e-15)
 
@@ -51,7 +51,7 @@ def test_the_budget_of_a_segment_is_the_larger_of_its_joints():
     toolpath = Moves().line(10).line(10, 10).line(20, 10).toolpath(M)
     fields = {name: getattr(toolpath, name) for name in toolpath.__dataclass_fields__}
     fields["tolerance"] = np.array([0.01, 0.02, 0.005, 0.001])
-    pieces = pieces_of(type(toolpath)(**fields))
+    pieces = program_pieces(type(toolpath)(**fields))
     np.testing.assert_array_equal(pieces.piece["budget"], [0.02, 0.02, 0.005])
     np.testing.assert_array_equal(pieces.joint["budget"], [0.01, 0.02, 0.005, 0.001])
 
@@ -64,4 +64,4 @@ def test_an_arc_that_does_not_end_where_it_says_is_refused():
     )
     fields = {name: getattr(toolpath, name) for name in toolpath.__dataclass_fields__}
     with pytest.raises(ValueError, match="does not end where its arc does"):
-        pieces_of(type(toolpath)(**{**fields, "arcs": longer}))
+        program_pieces(type(toolpath)(**{**fields, "arcs": longer}))

@@ -69,10 +69,10 @@ class Step(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def weigh(model, at, settings):
+def weigh(model, at):
     """Add the rows' weights to the model's convex Hessian and gradient, without a barrier; returns their largest residual."""
     gradient, rows, values, hessian = model.gradient, model.rows, model.values, model.convex
-    slack, lam, least = at.slack, at.lam, settings.hessian_min
+    slack, lam = at.slack, at.lam
     n, count = values.shape
     lower = slack.shape[1] - count
     weights, pushes = np.empty(count), np.empty(count)
@@ -89,7 +89,7 @@ def weigh(model, at, settings):
             weights[r] += w
             pushes[r] -= w * residual
             worst = max(worst, abs(residual))
-        hxx, hxu, hxp, huu, hup, hpp = 0.0, 0.0, 0.0, least, 0.0, least
+        hxx, hxu, hxp, huu, hup, hpp = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         gx, gu, gp = 0.0, 0.0, 0.0
         for r in range(count):
             a, b, c, w = rows[i, 0, r], rows[i, 1, r], rows[i, 2, r], weights[r]
@@ -324,18 +324,18 @@ def minimise_time(grid, start, jumps, tol, iterations, settings):
     sides = at.slack.shape[1]
     step = empty_step(at)
     total, residual, defect = 1.0, np.inf, np.inf
-    fraction, stalled, far = 1.0, 0, False
+    stalled, far = 0, False
     status, done = OUT_OF_ITERATIONS, iterations
     for iteration in range(iterations):
         # Model the Lagrangian at the iterate; its gradient and Hessian with the slacks eliminated.
         total, defect = linearise(grid, at, model, jumps)
-        residual = weigh(model, at, settings)
+        residual = weigh(model, at)
         if gap <= tol * total and residual <= settings.residual and defect <= settings.defect:
             status, done = SOLVED, iteration
             break
 
         # Factorise, with as much of the curvature of rows and dynamics as leaves the model convex.
-        fraction = min(settings.fraction_more * fraction, 1.0)
+        fraction = 1.0
         convex = riccati(model, fraction, gains)
         while not convex and fraction > 0.0:
             fraction = settings.fraction_less * fraction if fraction > settings.fraction_min else 0.0

@@ -1,8 +1,8 @@
 """One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point kernel, to its result.
 
 A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the envelope tracked by a motion,
-where that is found, then from the envelope itself, whose kinematics are not exact, and from rest then from the plain start
-(start.py): as fast as the envelope, and so slow that it keeps all limits.
+where that is found, then from the envelope itself, whose kinematics are not exact, and then from the plain start as fast as the
+envelope (start.py).
 """
 
 from __future__ import annotations
@@ -19,9 +19,13 @@ from planner.feedrate.jerk.rows import Grid, Profile, at_profile, empty_model, l
 from planner.feedrate.jerk.settings import SETTINGS, Settings
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 
-START_ROOM = 0.9  # a start keeps every limit times this [-] ...
-SLOWER_MAX = 2.0  # ... if it takes no more than this slowing down; from too slow a profile the way is as long as from outside
-TRACKING_ROUNDS = 20  # at most, of a start; 2 to 6 are the rule
+# A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
+START_ROOM = 0.9
+# ... if it takes no more than this slowing down [-]; from too slow a profile the way is as long as from outside the limits.
+SLOWER_MAX = 2.0
+TRACKING_ROUNDS = (
+    20  # at most, of a start; 2 to 6 are the rule. A start that is not tracked takes 17 % more iterations
+)
 POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
 POLISHED = 1e-14  # defect, share of the largest feed [-]
 GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
@@ -86,7 +90,7 @@ class ScaledWindow:
         """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
         own = slice(begin, end + 1)
         feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
-        t = float(feed / problem.acceleration.max())
+        t = float(feed / problem.acceleration[: problem.machine_axes].max())
         length = feed * t
         grid = Grid(
             ds=np.diff(problem.s[own]) / length,
@@ -126,6 +130,18 @@ class ScaledWindow:
         n = len(profile.p)
         return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
 
+    def near(self, x: FloatArray, u: FloatArray) -> Window | None:
+        """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
+        none. It may exceed its limits a little, and has no multipliers."""
+        rate = u * self.time / self.feed
+        profile, defect = self._track(
+            Profile(x / self.feed**2, rate, np.diff(rate)), 0.0, TRACKING_ROUNDS, POLISHED
+        )
+        if defect > self.settings.defect:
+            return None
+        n = len(profile.p)
+        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+
     def _starts(self, behind: Window | None) -> Iterator[Profile]:
         """Profiles to start from, the best first."""
         for start in self._from_rest():
@@ -144,7 +160,6 @@ class ScaledWindow:
             yield self._slowed(tracked, SLOWER_MAX)
         yield self._slowed(near, SLOWER_MAX)
         yield self._slowed(self._plain(asked.max()), SLOWER_MAX)
-        yield self._slowed(self._plain(1.0))
 
     def _joined(self, behind: Window, start: Profile) -> Profile:
         """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""

@@ -25,34 +25,49 @@ Not convex, and no certificate of a global optimum; from many starting points bo
 row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed duration 1), so that the iterates do not
 depend on the unit of length or time.
 
-Prices are Lagrange multipliers: with rows scaled by their limit c, |g| <= 1, the optimum obeys dT/dc = -sum |lambda| / c. They hold
-for the given grid: `margin`, which depends a little on the limits, stays. Where two limits coincide (an axis velocity and the
-programmed feed), the first in `bound_names` has the price of loosening both.
+The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py), so that prices, reshaping and sensitivities need
+not know who solved the problem. Rows of axis limits are the same there; a bound on v is one on x = v^2, with half of its multiplier
+when both count relative changes. The kernel's only equation is x_{i+1} = x_i + (2 a + p)(ds + p h^2/12) + e with p = j h; an error e
+in it shifts v_{i+1} by e/(2 vm), vm = (v_i + v_{i+1})/2, and the length of the interval by h e/(4 vm), so that with the multipliers
+nu_v of v's gap and nu_s of the row of ds_i
 
-Costs 2-6 ms per grid point with ipopt; fatrop's iterations take half as long, but building its interface grows with the square of
-the points and costs more than it saves above a few hundred (17 ms per point at 6000).
+    pi = dT/de = (nu_s h/(2 ds) - nu_v) / (2 vm).
+
+Costs 1-5 ms per grid point with ipopt; fatrop's iterations take half as long, but building its interface grows with the square of
+the points and costs more than it saves above a few hundred (docs/solvers.md has the numbers).
 References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023, arXiv 2303.16746 (fatrop).
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.packages import needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.piecewise import INTERVALS_MIN, Found, solve_pieces, too_few
-from planner.feedrate.solution import FeedrateSolution, Prices, Status
+from planner.feedrate.reference.piecewise import (
+    INTERVALS_MIN,
+    Found,
+    solution_of,
+    solve_pieces,
+    too_few,
+    too_large,
+)
+from planner.feedrate.solution import FeedrateSolution, Status
 
 # The guess is the second-order optimum, everywhere this much slower [-]. Of 0.3 to 1, and of optima at a third or a tenth of the
 # acceleration, the best by iterations (23-41); all of them lead to the same optimum.
 SLOWER = 0.7
 # Largest violation of a scaled row or bound that a solution may have [-].
 VIOLATION_MAX = 1e-6
+# Grid points of the largest problem that is tried: one that takes about a minute (benchmarks/results/solver-sizes.md).
+POINTS_MAX = {"ipopt": 20_000, "fatrop": 5_000}
 # Residual of ipopt's rows [-]; its default of 1e-4 leaves ratios to the limits of 1 + 1e-5 on long pieces.
 FEASIBILITY = 1e-8
 
@@ -81,14 +96,16 @@ BROKE_DOWN = (
 class JerkLimitedNLP:
     """The jerk-limited reference.
 
-    solver         : "ipopt" (with mumps), or "fatrop", which uses the stages (for pieces of at most some hundred points)
+    solver         : "ipopt" (with mumps), or "fatrop", which uses the stages
     tol            : relative tolerance of optimality [-]
     max_iterations : per piece
+    points_max     : larger problems are refused; None for `POINTS_MAX` of the solver
     """
 
     solver: Literal["ipopt", "fatrop"] = "ipopt"
     tol: float = 1e-8
     max_iterations: int = 500
+    points_max: int | None = None
 
     def __post_init__(self) -> None:
         if self.solver not in ("ipopt", "fatrop"):
@@ -96,38 +113,20 @@ class JerkLimitedNLP:
         if not self.tol > 0:
             raise ValueError(f"JerkLimitedNLP.tol: {self.tol} must be positive")
 
-    def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal jerk-limited profile with prices; a failure of any piece is the status of the whole."""
+    def solve(
+        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
+    ) -> FeedrateSolution:
+        """Time-optimal jerk-limited profile with multipliers and prices; a failure of any piece is the status of the whole."""
         began = time.perf_counter()
+        most = POINTS_MAX[self.solver] if self.points_max is None else self.points_max
+        if len(problem) > most:
+            return too_large(problem, most, self.solver, repr(self))
         guess = Reachability().solve(problem)
         if not guess.solved:
             took = time.perf_counter() - began
             return FeedrateSolution.failed(problem, guess.status, guess.sentence, repr(self), took)
-        found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self))
-        took = time.perf_counter() - began
-        if found.columns is None:
-            return FeedrateSolution.failed(
-                problem, found.status, found.sentence, repr(self), took, found.iterations
-            )
-        v, acc, jerk, duration, *_ = found.columns.T
-        prices = found.columns[:, 4:]
-        axes = len(problem.axes)
-        relative = prices[:, 0] * problem.feed_sq_limit  # dT / d(ln feed_sq_max)
-        return FeedrateSolution(
-            status=found.status,
-            sentence=found.sentence,
-            solver=repr(self),
-            feed_sq=v**2,
-            acc_s=acc,
-            jerk_s=jerk,
-            duration=duration,
-            solve_time=took,
-            iterations=found.iterations,
-            jerk_limited=True,
-            prices=Prices.from_relative(
-                problem, prices[:, 1 : 1 + axes].sum(axis=0), prices[:, 1 + axes :].sum(axis=0), relative
-            ),
-        )
+        found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self), progress)
+        return solution_of(problem, found, repr(self), began, priced=True)
 
 
 def _solve_piece(
@@ -135,9 +134,9 @@ def _solve_piece(
 ) -> Found:
     """Transcribe and solve piece g; the whole formulation, from top to bottom.
 
-    The columns are v, a, j, h and dT/d(feed_sq_limit), then dT/d(ln limit) of acceleration and jerk, one for each axis.
+    The columns are those of `piecewise.Found`.
     """
-    import casadi as ca
+    ca = needed("casadi", f"solver {settings.solver}")
 
     here = slice(problem.piece[g], problem.piece[g + 1])
     ds = np.diff(problem.s[here])
@@ -221,20 +220,30 @@ def _solve_piece(
 
     # ---- unpack ---------------------------------------------------------------------------------------------------------------
     found = np.append(result["x"], [0.0, 0.0]).reshape(points, 5)
-    columns = found[:, [0, 1, 3, 4]] * [speed, acc, jerk, second]
-    columns[:, 0] = np.clip(columns[:, 0], 0.0, feed_max)
-    columns[[0, -1], 0] = v_start, v_end
-    shadow = np.abs(np.insert(result["lam_g"], -4 * axes, np.zeros(5)).reshape(points, -1)[:, 4:])
-    of_axes = shadow[:, 1:].reshape(points, 2, 2, axes).sum(axis=1).reshape(points, 2 * axes)
-    of_feed = np.append(result["lam_x"], [0.0, 0.0]).reshape(points, 5)[:, 0] / speed
-    of_feed = np.maximum(of_feed, 0.0)  # the other bound of v is rest
-    of_feed[[0, -1]] = 0.0  # given, not limited
-    of_feed[:-1] += shadow[:-1, 0] / (2.0 * cap)
-    of_feed[1:] += shadow[:-1, 0] / (2.0 * cap)
-    of_feed /= 2.0 * feed_max  # from feed to feed^2
-    prices = -second * np.column_stack([of_feed, of_axes])
+    v, h = found[:, 0], found[:, 4]
+    profile = found[:, [0, 1, 3, 4]] * [speed, acc, jerk, second]
+    profile[:, 0] = np.clip(profile[:, 0], 0.0, feed_max)
+    profile[[0, -1], 0] = v_start, v_end
+
+    # ---- multipliers, in time [s]: gaps of v, a, j_left; length; feed between the points; then right and left of the point ------
+    lam = second * np.insert(result["lam_g"], -4 * axes, np.zeros(5)).reshape(points, -1)
+    of_speed = second * np.maximum(np.append(result["lam_x"], [0.0, 0.0]).reshape(points, 5)[:, 0], 0.0)
+    of_speed[[0, -1]] = 0.0  # given, not limited
+    sides = lam[:, 5:].reshape(points, 2, 2, axes)  # point, side, acceleration or jerk, axis
+    multipliers = np.zeros((points, 3 + 4 * axes))
+    multipliers[:, 0] = of_speed * (feed_max / speed) / 2.0
+    multipliers[:-1, 1] = lam[:-1, 4] / 2.0
+    multipliers[:-1, 2] = (lam[:-1, 3] * h[:-1] / (2.0 * ds / length) - lam[:-1, 0]) / (v[:-1] + v[1:])
+    multipliers[:, 2] /= speed**2
+    of_rows = np.zeros((points, axes, 4))  # in the order of `Multipliers.rows`
+    of_rows[:, :, 0], of_rows[:, :, 1] = sides[:, 0, 0], sides[:, 0, 1]
+    of_rows[:-1, :, 2], of_rows[:-1, :, 3] = sides[1:, 1, 1], sides[1:, 1, 0]
+    multipliers[:, 3:] = of_rows.reshape(points, -1)
     return Found(
-        status=status, sentence=sentence, iterations=iterations, columns=np.column_stack([columns, prices])
+        status=status,
+        sentence=sentence,
+        iterations=iterations,
+        columns=np.column_stack([profile[:, 0] ** 2, profile[:, 1:], multipliers]),
     )
 
 

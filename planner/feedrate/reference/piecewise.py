@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.solution import Status
+from planner.feedrate.lagrangian import lagrangian
+from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 # Fewer intervals cannot go from rest to rest: the jerk must be positive, negative and positive again.
 INTERVALS_MIN = 3
@@ -17,7 +19,11 @@ INTERVALS_MIN = 3
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Found:
-    """Columns (n, C) over the n points of a piece, or of all pieces; None on failure. `iterations`: the most of any piece."""
+    """The n points of a piece, or of all pieces; `iterations`: the most of any piece.
+
+    columns : (n, 7 + 4 A) feed_sq, acc_s, jerk_s and duration, then the multipliers: feed (2), dynamics (1) and rows (A x 4) of
+              `Multipliers`; None on failure
+    """
 
     status: Status
     sentence: str
@@ -34,7 +40,20 @@ def too_few(intervals: int) -> Found:
     )
 
 
-def solve_pieces(problem: FeedrateProblem, solve_piece: Callable[[int], Found]) -> Found:
+def too_large(problem: FeedrateProblem, most: int, name: str, solver: str) -> FeedrateSolution:
+    """The failure of a problem that the solver of that name is not tried on."""
+    sentence = (
+        f"{len(problem):,} grid points are too many for solver {name}, which takes milliseconds for each and is tried on {most:,} "
+        "at most; use solver own, or a shorter program"
+    )
+    return FeedrateSolution.failed(problem, Status.TOO_LARGE, sentence, solver, 0.0)
+
+
+def solve_pieces(
+    problem: FeedrateProblem,
+    solve_piece: Callable[[int], Found],
+    progress: Callable[[float], None] | None = None,
+) -> Found:
     """All pieces by their numbers; the first failure, and else the worse status, stands for the whole."""
     columns = []
     whole: Found | None = None
@@ -48,5 +67,42 @@ def solve_pieces(problem: FeedrateProblem, solve_piece: Callable[[int], Found]) 
         if whole is None or found.status is Status.ACCEPTABLE:
             whole = found
         columns.append(found.columns)
+        if progress is not None:
+            progress(float(problem.piece[g + 1] / len(problem)))
     assert whole is not None, "a problem has a piece"
     return replace(whole, iterations=iterations, columns=np.concatenate(columns))
+
+
+def solution_of(
+    problem: FeedrateProblem, found: Found, solver: str, began: float, *, priced: bool
+) -> FeedrateSolution:
+    """What was found as a solution; `priced` where its jerk is constant on every interval, which prices are made for."""
+    took = time.perf_counter() - began
+    if found.columns is None:
+        return FeedrateSolution.failed(problem, found.status, found.sentence, solver, took, found.iterations)
+    feed_sq, acc, jerk, duration, at_point, between, dynamics = found.columns[:, :7].T
+    solution = FeedrateSolution(
+        status=found.status,
+        sentence=found.sentence,
+        solver=solver,
+        feed_sq=feed_sq,
+        acc_s=acc,
+        jerk_s=jerk,
+        duration=duration,
+        solve_time=took,
+        iterations=found.iterations,
+        jerk_limited=True,
+        multipliers=Multipliers(
+            rows=found.columns[:, 7:].reshape(len(problem), -1, 4),
+            feed=np.column_stack([at_point, between]),
+            dynamics=dynamics,
+        ),
+    )
+    return with_prices(problem, solution) if priced else solution
+
+
+def with_prices(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution:
+    """The solution with the prices that follow from its multipliers."""
+    found = lagrangian(problem, solution)
+    prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
+    return replace(solution, prices=prices)

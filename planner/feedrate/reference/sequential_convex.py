@@ -50,15 +50,24 @@ doi 10.1109/TAC.2009.2028959 (path domain); Waechter & Biegler 2006, doi 10.1007
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.packages import needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.piecewise import INTERVALS_MIN, Found, solve_pieces, too_few
+from planner.feedrate.reference.piecewise import (
+    INTERVALS_MIN,
+    Found,
+    solution_of,
+    solve_pieces,
+    too_few,
+    too_large,
+)
 from planner.feedrate.solution import FeedrateSolution, Status
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -91,11 +100,13 @@ class SequentialConvex:
     tol            : a pass that gains a smaller share of the time is the last [-]
     max_passes     : per piece
     max_iterations : of ipopt, per pass
+    points_max     : larger problems are refused: this one takes about a minute
     """
 
     tol: float = 1e-5
     max_passes: int = 20
     max_iterations: int = 200
+    points_max: int = 10_000  # benchmarks/results/solver-sizes.md
 
     def __post_init__(self) -> None:
         if not self.tol > 0:
@@ -103,32 +114,19 @@ class SequentialConvex:
         if not self.max_passes > 0:
             raise ValueError(f"SequentialConvex.max_passes: {self.max_passes} must be positive")
 
-    def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
+    def solve(
+        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
+    ) -> FeedrateSolution:
         """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the status of the whole.
         `iterations` are those of ipopt, summed over the passes, of the piece that took most."""
         began = time.perf_counter()
         if problem.feed_sq_start.any() or problem.feed_sq_end.any():
             raise ValueError("SequentialConvex: pieces must start and end at rest")
+        if len(problem) > self.points_max:
+            return too_large(problem, self.points_max, "sequential-convex", repr(self))
         guess = Reachability().solve(problem).require()  # from rest to rest there always is one
-        found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self))
-        took = time.perf_counter() - began
-        if found.columns is None:
-            return FeedrateSolution.failed(
-                problem, found.status, found.sentence, repr(self), took, found.iterations
-            )
-        feed_sq, acc, jerk, duration = found.columns.T
-        return FeedrateSolution(
-            status=found.status,
-            sentence=found.sentence,
-            solver=repr(self),
-            feed_sq=feed_sq,
-            acc_s=acc,
-            jerk_s=jerk,
-            duration=duration,
-            solve_time=took,
-            iterations=found.iterations,
-            jerk_limited=True,
-        )
+        found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self), progress)
+        return solution_of(problem, found, repr(self), began, priced=False)
 
 
 def _solve_piece(
@@ -136,9 +134,9 @@ def _solve_piece(
 ) -> Found:
     """Transcribe piece g and solve it pass by pass; the whole formulation, from top to bottom.
 
-    The columns are x, u, mean jerk and duration.
+    The columns are those of `piecewise.Found`; the jerk is the mean of each interval.
     """
-    import casadi as ca
+    ca = needed("casadi", "solver sequential-convex")
 
     here = slice(problem.piece[g], problem.piece[g + 1])
     ds = np.diff(problem.s[here])
@@ -192,8 +190,9 @@ def _solve_piece(
     # ---- boundary: rest, and what the jerk of the first and last interval allows next to it -----------------------------------
     free = np.full(n + 1, np.inf)
     lower, upper = np.concatenate([np.zeros(n + 1), -free]), np.concatenate([cap, free])
-    upper[1] = min(upper[1], _beside_rest(problem, here.start, 1) / speed**2)
-    upper[n - 1] = min(upper[n - 1], _beside_rest(problem, here.stop - 1, -1) / speed**2)
+    beside = (1, *_beside_rest(problem, here.start, 1)), (n - 1, *_beside_rest(problem, here.stop - 1, -1))
+    for i, x_max, _ in beside:
+        upper[i] = min(upper[i], x_max / speed**2)
     for at_rest in (0, n):
         lower[[at_rest, n + 1 + at_rest]] = upper[[at_rest, n + 1 + at_rest]] = 0.0
 
@@ -228,6 +227,7 @@ def _solve_piece(
             )
             break
         profile, gained, fastest = result["x"], fastest - result["f"][0], result["f"][0]
+        lam = {"x": result["lam_x"], "g": result["lam_g"]}
         if gained <= settings.tol * fastest:
             status, sentence = CONVERGED
             break
@@ -236,10 +236,34 @@ def _solve_piece(
     profile = np.clip(profile, lower, upper)
     x_found, u_found = profile[: n + 1] * speed**2, profile[n + 1 :] * acc
     h = np.array(ca.Function("times", [x, u], [times])(profile[: n + 1], profile[n + 1 :])).ravel() * second
-    columns = np.zeros((n + 1, 4))
-    columns[:, 0], columns[:, 1] = x_found, u_found
-    columns[:-1, 2], columns[:-1, 3] = np.diff(u_found) / h, h
-    return Found(status=status, sentence=sentence, iterations=iterations, columns=columns)
+    profile_columns = np.zeros((n + 1, 4))
+    profile_columns[:, 0], profile_columns[:, 1] = x_found, u_found
+    profile_columns[:-1, 2], profile_columns[:-1, 3] = np.diff(u_found) / h, h
+
+    # ---- multipliers of the last pass, in time [s]: where the tangents touch, their rows have the gradients of the true ones --------
+    of_gap, of_feed, *of_axes = np.split(
+        second * lam["g"], np.cumsum([n, n - 2, *[n, n - 2, n - 2] * 2 * axes])[:-1]
+    )
+    of_x = second * np.maximum(lam["x"][: n + 1], 0.0)
+    multipliers = np.zeros((n + 1, 3 + 4 * axes))
+    multipliers[1:n, 0] = of_x[1:n] * cap[1:n]
+    multipliers[inner, 1] = of_feed
+    multipliers[:-1, 2] = -of_gap / speed**2
+    of_rows = np.zeros((n + 1, axes, 4))  # in the order of `Multipliers.rows`
+    for place, (of_acceleration, of_jerk) in enumerate(((0, 1), (3, 2))):
+        for k in range(axes):
+            along, over, under = of_axes[3 * (place * axes + k) :][:3]
+            of_rows[:-1, k, of_acceleration], of_rows[inner, k, of_jerk] = along, over + under
+    for i, x_max, (k, row) in beside:
+        if x_max / speed**2 <= cap[i]:  # the bound of x there is that of a jerk, which goes with x^(3/2)
+            of_rows[i - 1 if i == 1 else i, k, row], multipliers[i, 0] = of_x[i] * upper[i] / 1.5, 0.0
+    multipliers[:, 3:] = of_rows.reshape(n + 1, -1)
+    return Found(
+        status=status,
+        sentence=sentence,
+        iterations=iterations,
+        columns=np.column_stack([profile_columns, multipliers]),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,8 +305,9 @@ class _Shape:
         )
 
 
-def _beside_rest(problem: FeedrateProblem, rest: int, step: int) -> float:
-    """Largest x at the point before or after a rest: what the jerks on the interval between them allow (module text)."""
+def _beside_rest(problem: FeedrateProblem, rest: int, step: int) -> tuple[float, tuple[int, int]]:
+    """Largest x at the point before or after a rest, what the jerks on the interval between them allow (module text); also the axis
+    of the jerk that says so, and its row in `Multipliers.rows`: 1 at the start of the interval, 2 at its end."""
     beside = rest + step
     d = abs(problem.s[beside] - problem.s[rest])
     d2 = problem.d2_left[beside] if step > 0 else problem.d2_right[beside]
@@ -290,8 +315,10 @@ def _beside_rest(problem: FeedrateProblem, rest: int, step: int) -> float:
     jerk = 2.0 / (9.0 * d**2)  # of the motion, per x^(3/2)
     at_rest = np.abs(problem.d1[rest]) * jerk
     moving = np.abs(problem.d1[beside] * jerk + step * 2.0 / d * d2 + d3)
-    limit = problem.jerk_limit
-    return float(np.maximum(at_rest / limit[rest], moving / limit[beside]).max() ** (-2.0 / 3.0))
+    ratio = np.column_stack([at_rest / problem.jerk_limit[rest], moving / problem.jerk_limit[beside]])
+    k, where = np.unravel_index(int(ratio.argmax()), ratio.shape)
+    row = 1 + where if step > 0 else 2 - where
+    return float(ratio.max() ** (-2.0 / 3.0)), (int(k), int(row))
 
 
 def _violation(result: dict[str, FloatArray], bounds: dict[str, FloatArray]) -> float:

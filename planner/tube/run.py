@@ -1,6 +1,6 @@
-"""What the free optimum has to follow: the legs of the programmed path between two full stops, with their budgets and limits.
+"""What the free optimum has to follow: a run, the legs of the programmed path between two full stops, with their budgets and limits.
 
-A leg is a run of collinear lines with one feed and one budget, or an arc. Over the place x in [0, length] on it both are
+A leg consists of collinear lines with one feed and one budget, or is an arc. Over the place x in [0, length] on it both are
 
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
@@ -18,7 +18,8 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.allocation import allocate, error_rate, normal_acceleration_max
+from planner.constraints import normal_limit
+from planner.corners.allocation import allocate, error_rate
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
@@ -28,7 +29,7 @@ ARC_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Course:
+class TubeRun:
     """R legs from rest to rest over the A axes that move on them, and the R+1 vertices around them.
 
     axis                         : (A,) their indices among the axes of the toolpath
@@ -38,7 +39,7 @@ class Course:
     radius, rate                 : (R,) [mm], [rad/mm]
     curvature                    : (R,) bound of it on the leg [1/mm]
     budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
-    normal_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
+    across_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
                                    where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes
@@ -56,7 +57,7 @@ class Course:
     curvature: FloatArray
     budget: FloatArray
     feed: FloatArray
-    normal_max: FloatArray
+    across_max: FloatArray
     vertex: FloatArray
     vertex_budget: FloatArray
     velocity: FloatArray
@@ -69,7 +70,7 @@ class Course:
         freeze(self, "first", np.int64, (legs + 1,))
         for name in ("length", "radius", "rate", "curvature", "budget"):
             freeze(self, name, np.float64, (legs,))
-        for name in ("feed", "normal_max"):
+        for name in ("feed", "across_max"):
             freeze(self, name, np.float64, (legs,), finite=False)
         for name in ("base", "drift", "e1", "e2"):
             freeze(self, name, np.float64, (legs, axes))
@@ -94,7 +95,7 @@ class Course:
 
     @property
     def offset(self) -> FloatArray:
-        """(R+1,) place of the vertices along the course [mm]."""
+        """(R+1,) place of the vertices along the run [mm]."""
         return np.append(0.0, np.cumsum(self.length))
 
     def points(self, leg: Array, x: FloatArray) -> FloatArray:
@@ -110,10 +111,10 @@ class Course:
         return self.drift[leg] + (self.radius * self.rate)[leg, None] * across
 
 
-def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
-    """The courses between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
+def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
+    """The runs between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
     limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
-    reachable = min(float(np.linalg.norm(limits["acceleration"])), machine.normal_acceleration or np.inf)
+    reachable = normal_limit.anywhere(machine, toolpath.axes)
     rate = error_rate(machine)
     budget = np.maximum(
         toolpath.tolerance[:-1], toolpath.tolerance[1:]
@@ -125,7 +126,7 @@ def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
         row = first[:-1]  # the segment that stands for its leg
         tol_leg = budget[row]
         tol_ap = allocate(tol_leg, np.full(len(row), reachable), rate)
-        left = normal_acceleration_max(tol_leg, tol_ap, np.full(len(row), reachable), rate)
+        left = normal_limit.within_budget(tol_leg, tol_ap, np.full(len(row), reachable), rate)
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
         at_vertex = np.minimum(
             toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
@@ -137,13 +138,13 @@ def courses_of(toolpath: Toolpath, machine: Machine) -> Iterator[Course]:
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
         held = left < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
-        yield Course(
+        yield TubeRun(
             axis=np.flatnonzero(moves),
             first=first,
             curvature=toolpath.curvature[row],
             budget=tol_ap,
             feed=toolpath.feed[row],
-            normal_max=np.where(held, left, np.inf),
+            across_max=np.where(held, left, np.inf),
             vertex=vertex[:, moves],
             vertex_budget=vertex_ap,
             **{name: limit[moves] for name, limit in limits.items()},

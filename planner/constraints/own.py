@@ -1,0 +1,211 @@
+"""Limits of one's own: beside the axes' limits, what else of a machine may not be exceeded, as a class of some ten lines.
+
+    class SpindlePower(PathLimit):
+        name = "spindle power"
+
+        def velocity(self, at):                       # [mm/s], from the place: a number or an array
+            return np.where(at.x < 30.0, 100.0, 40.0)
+
+    class Turntable(JointLimit):
+        name, unit = "turntable", "rad"
+        velocity, acceleration, jerk, turn = 3.0, 40.0, 2000.0, 2 * np.pi
+
+        def joint(self, at):                          # any smooth function of the position
+            return np.arctan2(at.y, at.x)
+
+`PathLimit` bounds velocity, acceleration and jerk along the path by functions of position and direction; `JointLimit` bounds those of a
+function q of the position, such as a joint of the kinematics that carry the tool. Along a path r(s), with ' for d/ds,
+
+    velocity      q' feed                                       <= velocity
+    acceleration  q' u + q'' feed^2                             <= acceleration
+    jerk          q' jerk + 3 q'' feed u + q''' feed^3          <= jerk
+
+the same rows as an axis has; q', q'', q''' follow from r', r'', r''' exactly (base/series.py). The length of the path is such a q with
+q' = 1. Between grid points the same measures hold as for the axes: points where the rows are not close to linear and a margin
+(path/own_rows.py), tightening (optimal/between_points.py). Methods `optimal` and `second-order` plan with these limits; the verdict
+judges the motions of all methods by them, from the delivered positions (verify/own.py).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.base.series import Series
+
+if TYPE_CHECKING:
+    from planner.motion.trajectory import Trajectory
+
+QUANTITIES = ("velocity", "acceleration", "jerk")
+# Below this speed [mm/s] the direction of a motion is rounding, and what it does along its path is not told.
+AT_REST = 1e-6
+
+
+class Place:
+    """n places on a path: `x`, `y` ... [mm], and `direction`, the unit tangent there (n, A), for limits that depend on it."""
+
+    def __init__(self, axes: tuple[str, ...], columns: Sequence[Any], direction: FloatArray):
+        self.axes = axes
+        self.direction = direction
+        self._columns = dict(zip(axes, columns, strict=True))
+
+    def __getattr__(self, letter: str) -> Any:
+        if letter.startswith("_") or letter not in self._columns:
+            raise AttributeError(f"a place has no '{letter}'; there are {', '.join(self.axes)} and direction")
+        return self._columns[letter]
+
+
+class OwnLimit(Protocol):
+    """What planner and judge ask of a limit.
+
+    name  : what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
+    unit  : of q
+    turn  : what q may jump by because it starts again, 2 pi for an angle of arctan2; None if it does not
+    """
+
+    name: str
+    unit: str
+    turn: float | None
+
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """Largest velocity, acceleration and jerk at the places; inf where nothing limits."""
+        ...
+
+    def value(self, at: Place) -> Any:
+        """q at the places; None where it is the length of the path."""
+        ...
+
+
+class PathLimit:
+    """Bounds on speed, acceleration and jerk along the path; override those that are bounded."""
+
+    name: str = ""
+    unit: str = "mm"
+    turn: ClassVar[float | None] = None
+
+    def velocity(self, at: Place) -> Any:
+        """Largest speed [mm/s] at the places (n,)."""
+        return np.inf
+
+    def acceleration(self, at: Place) -> Any:
+        """Largest acceleration along the path, and deceleration [mm/s2]."""
+        return np.inf
+
+    def jerk(self, at: Place) -> Any:
+        """Largest jerk along the path [mm/s3]."""
+        return np.inf
+
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        return self.velocity(at), self.acceleration(at), self.jerk(at)
+
+    def value(self, at: Place) -> None:
+        return None
+
+
+class JointLimit(ABC):
+    """Bounds on velocity, acceleration and jerk of a function of the position; inf for those that are not bounded."""
+
+    name: str = ""
+    unit: str = "mm"
+    velocity: float = np.inf
+    acceleration: float = np.inf
+    jerk: float = np.inf
+    turn: float | None = None
+
+    @abstractmethod
+    def joint(self, at: Place) -> Any:
+        """q at the places, computed with numpy from `at.x`, `at.y` ...: it is called with arrays, and with their derivatives
+        (base/series.py), so that it may use operators and numpy's functions, but no conditions."""
+
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        return self.velocity, self.acceleration, self.jerk
+
+    def value(self, at: Place) -> Any:
+        return self.joint(at)
+
+
+def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
+    """Raise InputError unless every limit has a name of its own."""
+    for limit in limits:
+        for method in ("bounds", "value"):
+            if not callable(getattr(limit, method, None)):
+                raise InputError(
+                    f"limits: {limit!r} is not a limit; derive its class from PathLimit or JointLimit"
+                )
+        if not limit.name or "." in limit.name:
+            raise InputError(
+                f"limits: {type(limit).__name__} is called '{limit.name}'; a name without dots is needed"
+            )
+        if limit.name in taken or sum(limit.name == other.name for other in limits) > 1:
+            raise InputError(
+                f"limits: the name '{limit.name}' is taken; axes and limits need names of their own"
+            )
+
+
+def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
+    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive."""
+    found = np.empty((count, 3))
+    for k, bound in enumerate(limit.bounds(at)):
+        found[:, k] = bound
+        if not (found[:, k] > 0.0).all():
+            worst = int((~(found[:, k] > 0.0)).argmax())
+            where = " ".join(f"{letter}{np.atleast_1d(getattr(at, letter))[worst]:.6g}" for letter in at.axes)
+            raise InputError(
+                f"limit '{limit.name}': {QUANTITIES[k]} {found[worst, k]:.6g} at {where}; it must be positive"
+            )
+    return found
+
+
+def derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
+    """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`, 4 arrays (n, A), with
+    respect to whatever they are with respect to. Raises InputError where they are not finite."""
+    table = np.stack(motion)
+    columns = [Series(table[:, :, k]) for k in range(len(axes))]
+    found = limit.value(Place(axes, columns, table[1]))
+    if not isinstance(found, Series):
+        if found is None:
+            raise ValueError("the length of the path has no derivatives by the position")
+        return np.zeros((3, table.shape[1]))  # a constant
+    if not np.isfinite(found.derivatives).all():
+        worst = int((~np.isfinite(found.derivatives)).any(axis=0).argmax())
+        where = " ".join(f"{a}{x:.6g}" for a, x in zip(axes, table[0, worst], strict=True))
+        raise InputError(f"limit '{limit.name}': its joint has no derivatives at {where}")
+    return found.derivatives[1:]
+
+
+def along_path(
+    velocity: FloatArray, acceleration: FloatArray, jerk: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(3, n) speed, acceleration and jerk along the path of a motion (n, A), and its direction (n, A); none at rest."""
+    speed = np.linalg.norm(velocity, axis=1)
+    moving = speed > AT_REST
+    direction = np.divide(velocity, speed[:, None], out=np.zeros_like(velocity), where=moving[:, None])
+    along = (acceleration * direction).sum(axis=1)
+    across_sq = ((acceleration - along[:, None] * direction) ** 2).sum(axis=1)
+    turning = np.divide(across_sq, speed, out=np.zeros_like(speed), where=moving)
+    return np.stack(
+        [speed, along, np.where(moving, (jerk * direction).sum(axis=1) + turning, 0.0)]
+    ), direction
+
+
+def ratios(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """For every quantity of every limit its order, 1 to 3, and the motion's ratio to it (n,)."""
+    columns = (motion.velocity, motion.acceleration, motion.jerk)
+    if not limits:
+        return
+    path, direction = along_path(*columns)
+    place = Place(motion.axes, list(motion.position.T), direction)
+    for limit in limits:
+        bounds = bounds_at(limit, place, len(motion.t))
+        values = (
+            path
+            if limit.value(place) is None
+            else derivatives(limit, motion.axes, (motion.position, *columns))
+        )
+        for k in range(3):
+            yield k + 1, np.abs(values[k]) / bounds[:, k]

@@ -1,0 +1,92 @@
+"""A corner shape of one's own: the retreat X = d f(w) as a polynomial, the advance Y = d f(1 - w) its mirror image.
+
+    class Wide(PolynomialCorner):
+        name = "wide"
+
+        def retreat(self, w):
+            return (1 - w) ** 3 * (1 + w)
+
+f falls from 1 to 0 on [0, 1] and ends with f = f' = f'' = 0, so that the corner leaves every leg with its tangent and its curvature
+(corners/blend.py, where the error bound asks for f(w) f(1 - w) <= f(1/2)^2 as well). All of that is checked. The kernels know f by the
+coefficients of z^3 ... z^12 with z = 1 - w.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.corners.blend import OWN_TERMS, Shape
+
+LOWEST = 3  # power of z
+PLACES = 1001  # at which f is looked at
+POLYNOMIAL = 1e-9  # f may differ from its polynomial by so much [-]
+ROUNDING = 1e-12
+
+
+class PolynomialCorner(ABC):
+    """A shape of corners with the retreat and advance of the module's text; `name` is what plans call it."""
+
+    name: str = ""
+    shape = Shape.OWN
+
+    @abstractmethod
+    def retreat(self, w: FloatArray) -> FloatArray:
+        """f at the parameters w (n,) in [0, 1]."""
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """(OWN_TERMS,) of z^3, z^4 ... Raises InputError unless f is as the module's text says."""
+        z = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, PLACES))
+        f = np.broadcast_to(np.asarray(self.retreat(1.0 - z), dtype=np.float64), z.shape)
+        if not np.isfinite(f).all() or abs(f[-1] - 1.0) > POLYNOMIAL or abs(f[0]) > POLYNOMIAL:
+            self._refuse(f"it must fall from 1 to 0, and goes from {f[-1]:.6g} to {f[0]:.6g}")
+        basis = z[:, None] ** LOWEST * np.polynomial.chebyshev.chebvander(2.0 * z - 1.0, OWN_TERMS - 1)
+        found, *_ = np.linalg.lstsq(basis, f, rcond=None)
+        if np.abs(basis @ found - f).max() > POLYNOMIAL:
+            self._refuse(
+                f"it must be a polynomial of degree {LOWEST + OWN_TERMS - 1} at most that ends with a triple zero"
+            )
+        power = np.polynomial.Chebyshev(found, domain=[0.0, 1.0]).convert(kind=np.polynomial.Polynomial).coef
+        coefficients = np.zeros(OWN_TERMS)
+        coefficients[: len(power)] = power / power.sum()
+        if (np.diff(f) < -ROUNDING).any() or f[-1] - f[-2] <= ROUNDING:
+            self._refuse("it must fall all the way, from its beginning on")
+        product = f * np.interp(1.0 - z, z, f)  # the places are symmetric
+        if product.max() > f[PLACES // 2] ** 2 * (1.0 + POLYNOMIAL):
+            self._refuse("f(w) f(1 - w) must be largest at w = 1/2, or the corner's deviation has no bound")
+        return coefficients
+
+    def _refuse(self, why: str) -> None:
+        raise InputError(f"corner '{self.name or type(self).__name__}': retreat(w): {why}")
+
+    @cached_property
+    def _at_middle(self) -> float:
+        """f(1/2)."""
+        return float(self.coefficients @ 0.5 ** np.arange(LOWEST, LOWEST + OWN_TERMS))
+
+    def at(self, change: FloatArray) -> PolynomialCorner:
+        """The shape is the same at every corner."""
+        return self
+
+    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
+        """Tangent length d [mm] for the middle value m [mm]."""
+        return middle / self._at_middle
+
+    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Middle value m [mm] for the tangent length d [mm]."""
+        return reach * self._at_middle
+
+    def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """Parameter rows (n, 4) for tangent lengths d (n,) [mm]."""
+        rows = np.zeros((len(reach), 4))
+        rows[:, 0] = reach
+        return rows
+
+    def breaks(self, params: FloatArray) -> tuple[float, ...]:
+        """Parameters w where two pieces meet: the middle, where the matched side changes."""
+        return (0.5,)

@@ -1,0 +1,79 @@
+"""The solvers by their names: two of the problem without jerk limits, four of the problem with them.
+
+    second order   reachability        our kernel (feedrate/reachability.py)
+                   toppra              the package of that name, to compare with (feedrate/toppra_adapter.py)
+    third order    own                 our interior-point kernel (feedrate/jerk/)
+                   ipopt, fatrop       the problem as one nonlinear program, by casadi (feedrate/reference/nlp.py)
+                   sequential-convex   the problem in the path domain as a sequence of convex ones, by casadi and ipopt
+                                       (feedrate/reference/sequential_convex.py), brought onto constant jerks (exact_motion.py)
+
+A solver is its settings; wherever a name is taken, a solver with settings of one's own is, too. It has one method:
+
+    solve(problem, progress) -> FeedrateSolution      a profile with multipliers, or a status and a sentence that says what to do
+
+Sizes up to which each is sensible: docs/solvers.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Protocol
+
+from planner.base.errors import InputError
+from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.reachability import Reachability
+from planner.feedrate.reference.exact_motion import ExactMotion
+from planner.feedrate.reference.nlp import JerkLimitedNLP
+from planner.feedrate.reference.sequential_convex import SequentialConvex
+from planner.feedrate.solution import FeedrateSolution, FeedrateSolver
+from planner.feedrate.toppra_adapter import ToppraSolver
+
+REACHABILITY, OWN = "reachability", "own"  # the usual ones
+
+
+class ThirdOrderSolver(Protocol):
+    """A solver of third order; its repr is its row label in every table."""
+
+    def solve(
+        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
+    ) -> FeedrateSolution:
+        """Solve all pieces of the problem, which start and end at rest; failures are a status, not an exception.
+
+        progress : called with the share of the points that is done [-]
+        """
+        ...
+
+
+SECOND_ORDER: dict[str, FeedrateSolver] = {REACHABILITY: Reachability(), "toppra": ToppraSolver()}
+THIRD_ORDER: dict[str, ThirdOrderSolver] = {
+    OWN: JerkLimited(),
+    "ipopt": JerkLimitedNLP(solver="ipopt"),
+    "fatrop": JerkLimitedNLP(solver="fatrop"),
+    "sequential-convex": ExactMotion(solver=SequentialConvex()),
+}
+
+
+def second_order_solver(solver: str | FeedrateSolver) -> FeedrateSolver:
+    """The solver without jerk limits of that name, or the solver given. Raises InputError for a name that is none of them."""
+    if not isinstance(solver, str):
+        return solver
+    if solver not in SECOND_ORDER:
+        raise InputError(_unknown(solver, "second-order", SECOND_ORDER, THIRD_ORDER))
+    return SECOND_ORDER[solver]
+
+
+def third_order_solver(solver: str | ThirdOrderSolver) -> ThirdOrderSolver:
+    """The solver with jerk limits of that name, or the solver given. Raises InputError for a name that is none of them."""
+    if not isinstance(solver, str):
+        return solver
+    if solver not in THIRD_ORDER:
+        raise InputError(_unknown(solver, "optimal", THIRD_ORDER, SECOND_ORDER))
+    return THIRD_ORDER[solver]
+
+
+def _unknown(solver: str, method: str, names: Iterable[str], others: Iterable[str]) -> str:
+    said = (
+        f"solver = {solver}: method {method} does not use it" if solver in others else f"no solver '{solver}'"
+    )
+    return f"{said}; there are {', '.join(names)}"

@@ -1,0 +1,68 @@
+"""Columns of records over a polyline: one value per stretch between full stops, per leg or per joint.
+
+A field that is declared so is checked and made read-only, picked for some stretches and put back, for every record in the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field, fields
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import Array, freeze
+
+
+def per_stretch(width: int | None = None) -> Any:
+    """A field (S,), or (S, width)."""
+    return _column("stretch", np.float64, width)
+
+
+def per_leg(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
+    """A field (R,), or (R, A) with `axes`; with `finite=False` infinity is allowed."""
+    return _column("leg", dtype, -1 if axes else None, finite)
+
+
+def per_joint(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
+    """A field (R+1,), or (R+1, A) with `axes`."""
+    return _column("joint", dtype, -1 if axes else None, finite)
+
+
+def _column(rows: str, dtype: type, width: int | None, finite: bool = True) -> Any:
+    return field(metadata={"rows": rows, "dtype": dtype, "width": width, "finite": finite})
+
+
+def freeze_columns(record: Any, sizes: dict[str, int], axes: int) -> None:
+    """Check the columns of a record over `axes` axes and make them read-only; sizes: rows per stretch, leg and joint."""
+    for one in fields(record):
+        if "rows" in one.metadata:
+            width = one.metadata["width"]
+            shape = (sizes[one.metadata["rows"]], *(() if width is None else (axes if width < 0 else width,)))
+            freeze(record, one.name, one.metadata["dtype"], shape, finite=one.metadata["finite"])
+
+
+def rows_of(first: Array, chosen: Array) -> dict[str, Array]:
+    """Which rows per stretch, leg and joint the stretches `chosen` (S,) have; first (S+1,) as of `Polyline`."""
+    stretch = np.flatnonzero(chosen)
+    legs = np.flatnonzero(np.repeat(chosen, np.diff(first)))
+    return {"stretch": stretch, "leg": legs, "joint": np.append(legs, first[stretch[-1] + 1])}
+
+
+def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
+    """The given rows of all columns."""
+    return {
+        one.name: getattr(record, one.name)[rows[one.metadata["rows"]]]
+        for one in fields(record)
+        if "rows" in one.metadata
+    }
+
+
+def put(record: Any, rows: dict[str, Array], part: Any) -> dict[str, Any]:
+    """All columns of a record with the given rows from `part`; the joint at the end of a stretch belongs to the next one."""
+    columns: dict[str, Any] = {}
+    for one in fields(record):
+        if "rows" in one.metadata:
+            of, last = one.metadata["rows"], -1 if one.metadata["rows"] == "joint" else None
+            columns[one.name] = getattr(record, one.name).copy()
+            columns[one.name][rows[of][:last]] = getattr(part, one.name)[:last]
+    return columns

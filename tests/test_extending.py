@@ -1,0 +1,59 @@
+"""docs/extending.md: its examples run, in order, and do what the page says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def seen() -> dict:
+    """What the page's examples made."""
+    made: dict = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        for example in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+            exec(example, made)
+    return made
+
+
+def test_limits_hold_the_motion_and_are_kept(seen):
+    assert seen["powered"].verdict.passed
+    assert seen["powered"].verdict.limits["velocity.spindle power"].ratio > 0.999
+    assert seen["armed"].verdict.passed
+    arm = [c.ratio for name, c in seen["armed"].verdict.limits.items() if name.endswith(".arm")]
+    assert len(arm) == 3
+    assert 0.99 < max(arm) <= 1.0 + 1e-6
+
+
+def test_the_corner_shape_is_used_and_passes(seen):
+    assert seen["rounded"].corner == "wide"
+    assert seen["rounded"].verdict.passed
+    assert (seen["rounded"].rounded.tol_ap > 0).any()
+
+
+def test_the_method_is_judged_like_others(seen):
+    assert seen["gentle"].method == "gentle"
+    assert seen["gentle"].verdict.passed
+    worst = max(
+        c.ratio for name, c in seen["gentle"].verdict.limits.items() if name.startswith("acceleration")
+    )
+    assert worst == pytest.approx(0.5, rel=1e-3)
+
+
+def test_methods_are_compared(seen):
+    rows = {row.method: row for row in seen["rows"]}
+    assert set(rows) == {"bezier", "Gentle(0.5)", "Gentle(0.25)"}
+    assert rows["bezier"].outcome == "failed"
+    assert "spindle power" in rows["bezier"].sentence
+    assert rows["Gentle(0.25)"].cycle_time > rows["Gentle(0.5)"].cycle_time
+
+
+@pytest.mark.parametrize("path", sorted(set(re.findall(r"`((?:planner|tests)/[\w./-]+)`", PAGE))))
+def test_files_that_are_named_exist(path):
+    assert (ROOT / path).exists()

@@ -1,0 +1,66 @@
+"""The tests mirror the package: a folder for each of its folders, short files, and nothing but public names."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).resolve().parent
+PACKAGE = TESTS.parent / "planner"
+LONGEST = 350  # [lines]
+NO_CODE = {"examples", "machines", "templates"}
+# Tested in the folder above: all solvers are held against each other there.
+WITH_PARENT = {"feedrate/jerk", "feedrate/reference"}
+FILES = sorted(TESTS.rglob("*.py"))
+
+
+def test_every_folder_of_the_package_has_its_tests() -> None:
+    folders = {
+        str(file.parent.relative_to(PACKAGE)) for file in PACKAGE.rglob("*.py") if file.parent != PACKAGE
+    } - NO_CODE
+    without = [name for name in sorted(folders - WITH_PARENT) if not list((TESTS / name).glob("test_*.py"))]
+    assert not without
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(TESTS)))
+def test_files_are_short_and_use_public_names(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    lines, private = text.count("\n"), private_names(ast.parse(text))
+    assert lines <= LONGEST
+    assert not private
+
+
+def test_file_names_are_used_once() -> None:
+    """pytest imports test files by their name alone."""
+    names = [file.name for file in FILES if file.name != "conftest.py"]
+    assert sorted(names) == sorted(set(names))
+
+
+def private_names(tree: ast.Module) -> set[str]:
+    """Names of the package with a leading underscore that are imported, or reached through an imported module."""
+    modules, found = set(), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "planner":
+            for alias in node.names:
+                modules.add(alias.asname or alias.name)
+                found |= {alias.name} if is_private(alias.name) else set()
+        elif isinstance(node, ast.Import):
+            modules |= {
+                alias.asname or alias.name for alias in node.names if alias.name.startswith("planner")
+            }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and is_private(node.attr):
+            owner = node.value
+            if isinstance(owner, ast.Name) and owner.id in modules:
+                found.add(f"{owner.id}.{node.attr}")
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("setattr") and len(node.args) > 1:
+            name = node.args[1]
+            if isinstance(name, ast.Constant) and isinstance(name.value, str) and is_private(name.value):
+                found.add(name.value)
+    return found
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__")

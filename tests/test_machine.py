@@ -1,0 +1,101 @@
+"""Machine files: what is wrong in them is named, with the file, and the template has every key."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import planner
+from planner.base.errors import InputError
+from planner.machine import load_machine
+
+TEMPLATE = Path(planner.__file__).parent / "templates" / "machine.toml"
+
+
+def with_line(old: str, new: str) -> str:
+    text = TEMPLATE.read_text()
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+def refusal(path: Path) -> str:
+    """What is said of a machine file that is not taken."""
+    with pytest.raises(InputError) as caught:
+        load_machine(path)
+    told = str(caught.value)
+    assert told.startswith(f"{path}: ")
+    return told
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "machine file not found"),
+        ("name = ", "not valid TOML"),
+        ("", "name: missing"),
+        (
+            with_line("[axes.y]\nvelocity = 500.0\nacceleration = 4000.0\njerk = 100000.0\n", ""),
+            "axis 'y' is missing",
+        ),
+        (with_line("velocity = 500.0", "velocity = 0.0"), "axes.x.velocity"),
+        (with_line("velocity = 500.0", "velocity = -1.0"), "axes.x.velocity"),
+        (with_line("velocity = 500.0", "velocity = nan"), "axes.x.velocity"),
+        (with_line("jerk = 100000.0", "jerk = inf"), "axes.x.jerk"),
+        (with_line("jerk = 100000.0", ""), "axes.x.jerk: missing"),
+        (with_line("tolerance = 0.02", "tolerance = 0"), "tolerance"),
+        (with_line("tolerance = 0.02", "tolerance = 'thin'"), "tolerance"),
+        (with_line("dt = 0.001", "dt = 0.001\nspeed = 3"), "speed: unknown key"),
+        (with_line("[axes.z]", "[axes.w]"), "axis 'w' is not known"),
+        (with_line('path_control = "blend"', 'path_control = "round"'), "path_control"),
+        (TEMPLATE.read_text() + "[positions.g99]\nx = 1\n", "'g99' is not known"),
+        (TEMPLATE.read_text() + "[tools]\nlong = 1\n", "not a tool number"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, content: str | None, said: str) -> None:
+    path = tmp_path / "machine.toml"
+    if content is not None:
+        path.write_text(content)
+    assert said in refusal(path)
+
+
+def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text(with_line("velocity = 500.0", "velocity = 0.0").replace("dt = 0.001", "dt = -1"))
+    assert "axes.x.velocity" in refusal(path)
+    assert "dt" in refusal(path)
+
+
+def test_a_machine_file_that_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "machine.toml").write_bytes(b"\xff\xfe\x00\x00")
+    assert "cannot be read" in refusal(tmp_path / "machine.toml")
+    assert "cannot be read" in refusal(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = " + "[" * 100_000, "nested too deep"),
+        ("dt = " + "1" * 5000, "not valid TOML"),
+        (TEMPLATE.read_text() + "[tools]\n" + "1" * 5000 + " = 1\n", "not a tool number"),
+    ],
+)
+def test_machine_files_beyond_reason(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "machine.toml").write_text(text)
+    told = refusal(tmp_path / "machine.toml")
+    assert said in told
+    assert len(told) < 1000
+
+
+def test_every_key_of_the_template_is_valid_and_every_key_is_in_it(tmp_path: Path) -> None:
+    """With all optional keys uncommented the file loads, and sets every field of the record."""
+    text = re.sub(r"^# (?=\[|[\w.]+ = )", "", TEMPLATE.read_text(), flags=re.MULTILINE)
+    # the optional keys of the top level stand before the first table, as TOML demands
+    (tmp_path / "full.toml").write_text(text)
+    machine = load_machine(tmp_path / "full.toml")
+    assert machine.model_fields_set == set(type(machine).model_fields)
+    assert machine.fir is not None
+    assert machine.fir.phase_lag_max == 30.0
+    assert "a" in machine.axes
+    assert machine.work_offsets["g55"]["x"] == 120.0

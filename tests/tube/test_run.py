@@ -1,0 +1,79 @@
+"""What the free optimum is made of: legs, vertices, steps on arcs, and the motion that steps become."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks import problems
+from planner.geometry.build import toolpath_from_program
+from planner.nc.reader import parse_program
+from planner.tube import run as run_module
+from planner.tube.guess import Guess
+from planner.tube.motion import closing_jerks, integrated
+from planner.tube.nlp import TubeNLP
+from planner.tube.run import TubeRun, tube_runs_of
+
+MACHINE = problems.machine()
+ARCS = parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n")
+
+
+def only_run(program) -> TubeRun:
+    (run,) = tube_runs_of(toolpath_from_program(program, MACHINE), MACHINE)
+    return run
+
+
+def test_cutting_a_line_changes_no_leg():
+    whole = only_run(problems.polyline([[0, 0], [4, 0], [4, 4]]))
+    cut = only_run(problems.polyline([[0, 0], [1, 0], [2.5, 0], [4, 0], [4, 4]]))
+    for name in ("length", "base", "drift", "budget", "vertex", "vertex_budget", "feed"):
+        np.testing.assert_allclose(getattr(cut, name), getattr(whole, name), atol=1e-12)
+    assert list(whole.axis) == [0, 1]  # z stands still
+
+
+def test_a_run_is_the_programmed_path():
+    toolpath = toolpath_from_program(ARCS, MACHINE)
+    run = only_run(ARCS)
+    legs = np.arange(len(run))
+    np.testing.assert_allclose(run.points(legs, np.zeros(3)), toolpath.start, atol=1e-9)
+    np.testing.assert_allclose(run.points(legs, run.length), toolpath.end, atol=1e-9)
+    step = 1e-6
+    slope = (run.points(legs, run.length / 2 + step) - run.points(legs, run.length / 2 - step)) / (2 * step)
+    np.testing.assert_allclose(run.tangents(legs, run.length / 2), slope, atol=1e-8)
+
+
+@given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
+@settings(max_examples=200, deadline=None)
+def test_a_step_on_an_arc_bends_away_by_no_more_than_its_share(places, t):
+    """The mean of points on the arc with Bernstein weights is within ARC_SHARE of the budget of the point at the mean place."""
+    run = only_run(ARCS)
+    for leg in (1, 2):
+        s = np.sort(places) * run.step_max[leg]
+        weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
+        rows = np.full(4, leg)
+        off = weights @ run.points(rows, s) - run.points(rows[:1], (weights @ s)[None])[0]
+        assert np.linalg.norm(off) <= run_module.ARC_SHARE * run.budget[leg] * (1 + 1e-9)
+
+
+def test_the_closing_jerks_are_what_the_motion_runs_too_far():
+    run = only_run(problems.polyline([[0, 0], [4, 0], [4, 4]]))
+    rng = np.random.default_rng(1)
+    h, jerk = rng.uniform(1e-3, 5e-3, 30), rng.normal(size=(30, 2))
+    steps = integrated(run, h, jerk - closing_jerks(run, h, jerk))
+    last, tau = (
+        {name: getattr(steps, name)[-1] for name in ("position", "velocity", "acceleration", "jerk")},
+        h[-1],
+    )
+    p, v, a, j = last.values()
+    np.testing.assert_allclose(p + tau * (v + tau * (a / 2 + tau * j / 6)), run.vertex[-1], atol=1e-9)
+    np.testing.assert_allclose(v + tau * (a + tau * j / 2), 0.0, atol=1e-8)
+    np.testing.assert_allclose(a + tau * j, 0.0, atol=1e-6)
+
+
+def test_settings_and_guesses_are_checked():
+    with pytest.raises(ValueError, match="tol: 0"):
+        TubeNLP(tol=0)
+    with pytest.raises(ValueError, match=r"Guess\.h"):
+        Guess(leg=np.zeros(1), h=np.zeros(1), state=np.zeros((2, 3, 2)), place=np.zeros((1, 4)))

@@ -25,15 +25,14 @@ LONGEST_TOLERANCE = 4.0  # ... or so many tolerances [-]
 
 
 class SplineRuns(NamedTuple):
-    """Q runs in the order of the path, as in geometry/spline.py; fixed_first, fixed_last: control points that stay at either
-    end, 1 at a full stop, 5 on a straight leg."""
+    """Q runs in the order of the path. Run q begins on the leg before its first joint and ends on the leg after its last."""
 
-    joint_first: Array
-    joint_last: Array
-    x_first: FloatArray
-    x_last: FloatArray
-    fixed_first: Array
-    fixed_last: Array
+    joint_first: Array  # (Q,) joints between legs that it replaces
+    joint_last: Array  # (Q,)
+    x_first: FloatArray  # (Q,) where it begins on its first leg [mm]
+    x_last: FloatArray  # (Q,) where it ends on its last leg [mm]
+    fixed_first: Array  # (Q,) control points that stay at its start: 1 at a full stop, 5 on a straight leg
+    fixed_last: Array  # (Q,) and at its end
 
 
 def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatArray:

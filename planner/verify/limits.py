@@ -51,7 +51,7 @@ FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
 
 
-class Columns(NamedTuple):
+class SampleColumns(NamedTuple):
     """The samples: times (n,) [s], and positions and their derivatives (n, A); zeros where they were not delivered."""
 
     t: FloatArray
@@ -92,7 +92,7 @@ class Worst(NamedTuple):
 
 @kernel()
 def scan(
-    columns: Columns,
+    columns: SampleColumns,
     skip: int,
     allowed: Allowed,
     feed_max: FloatArray,

@@ -28,7 +28,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.reachability import rows_of
+from planner.feedrate.reachability import axis_rows
 from planner.feedrate.solution import FeedrateSolution, Multipliers
 
 # A row, or x, within this share of its limit holds it [-]: the passes of the solver end there to rounding.
@@ -77,7 +77,7 @@ def second_order_multipliers(problem: FeedrateProblem, solution: FeedrateSolutio
         before=np.zeros(points),
         behind=np.zeros(points),
     )
-    rows, feed, dynamics = _costates(rows_of(problem), profile)
+    rows, feed, dynamics = _costates(axis_rows(problem), profile)
     return Multipliers(rows=rows, feed=feed, dynamics=dynamics)
 
 

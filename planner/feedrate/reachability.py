@@ -42,7 +42,7 @@ NEGLIGIBLE = 1e-10
 ROUNDING = 1e-9
 
 
-class Rows(NamedTuple):
+class AxisRows(NamedTuple):
     """The limits of the axes at P points and A axes: | r'_k u + r''_k x | <= limit."""
 
     d1: FloatArray  # (P, A), like the next three
@@ -71,9 +71,9 @@ class Interval(NamedTuple):
     target: float
 
 
-def rows_of(problem: FeedrateProblem) -> Rows:
+def axis_rows(problem: FeedrateProblem) -> AxisRows:
     """The limits of a problem's axes, as the kernels take them."""
-    return Rows(problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit)
+    return AxisRows(problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit)
 
 
 def _bounds_of(problem: FeedrateProblem) -> Bounds:
@@ -93,7 +93,7 @@ def controllable_sets(problem: FeedrateProblem) -> FloatArray:
     Where a piece ends at rest exactly the feeds with feed^2 in [0, K] are controllable. Where it ends in motion there is a lower end as
     well, which is not looked for. NaN on pieces whose end asks for more than its own bound allows.
     """
-    return np.asarray(_controllable(rows_of(problem), _bounds_of(problem)))
+    return np.asarray(_controllable(axis_rows(problem), _bounds_of(problem)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class Reachability:
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
         """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is reachable."""
         began = time.perf_counter()
-        x, u, bad_piece = _solve(rows_of(problem), _bounds_of(problem))
+        x, u, bad_piece = _solve(axis_rows(problem), _bounds_of(problem))
         took = time.perf_counter() - began
         if bad_piece >= 0:
             at = problem.s[problem.piece[bad_piece]]

@@ -30,7 +30,7 @@ from planner.motion.trajectory import Trajectory
 from planner.verify import contour, findings
 from planner.verify import limits as rows
 from planner.verify.findings import Look
-from planner.verify.matching import AtStop, Place, match_samples, new_match
+from planner.verify.matching import AtStop, Located, match_samples, new_match
 from planner.verify.pieces import ProgramPieces, kernel, reach_piece
 from planner.verify.stream import Observed
 from planner.verify.times import AnyMotion
@@ -157,7 +157,7 @@ def look_behind(
         if not skip:
             seen.first, seen.t_first = position[0].copy(), float(t[0])
         piece, feed_max = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-        match_samples(pieces, seen.match, t, position, skip, False, anywhere, Place(piece, feed_max))
+        match_samples(pieces, seen.match, t, position, skip, False, anywhere, Located(piece, feed_max))
         if each is not None:
             ratio = np.empty(len(t))
             _ratios(pieces, piece, position, ratio)

@@ -53,7 +53,7 @@ FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
 
 
-class Columns(NamedTuple):
+class SampleColumns(NamedTuple):
     """The samples: times (n,) [s], and positions and their derivatives (n, A); zeros where they were not delivered."""
 
     t: FloatArray
@@ -99,7 +99,7 @@ def normal_limit(machine: Machine) -> float:
 
 @kernel()
 def scan(
-    columns: Columns,
+    columns: SampleColumns,
     skip: int,
     allowed: Allowed,
     feed_max: FloatArray,

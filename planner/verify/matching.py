@@ -105,7 +105,7 @@ class AtStop(NamedTuple):
     rounding: FloatArray
 
 
-class Place(NamedTuple):
+class Located(NamedTuple):
     """Where each of n samples lies: its piece (n,), and the largest feed (n,) of those it can lie on [mm/s]."""
 
     piece: Array
@@ -121,7 +121,7 @@ def match_samples(
     skip: int,
     middles: bool,
     at_stop: AtStop,
-    place: Place,
+    place: Located,
 ) -> None:
     """Match samples `skip` to the last, in `match`, and write their places; those before belong to the previous call. The first call
     has skip = 0.

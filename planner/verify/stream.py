@@ -14,8 +14,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.motion.trajectory import Trajectory
-from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, Columns, Worst, scan
-from planner.verify.matching import AtStop, Match, Place, match_samples, new_match
+from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
+from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
 from planner.verify.own import Block, OwnSeen
 from planner.verify.pieces import ProgramPieces
 
@@ -96,7 +96,7 @@ def watch(
         begin = int(np.searchsorted(chunk.t, seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
             new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
-            data = Columns(*(np.concatenate(pair) for pair in zip(carried, new, strict=True)))
+            data = SampleColumns(*(np.concatenate(pair) for pair in zip(carried, new, strict=True)))
             feed_max = np.concatenate([feed_max, np.full(len(new[0]), np.inf)])
             travelled = _block(seen, data, feed_max, pieces, limits, middles, travelled)
             carried, feed_max = [column[-CARRIED:] for column in data], feed_max[-CARRIED:]
@@ -106,7 +106,7 @@ def watch(
 
 def _block(
     seen: Observed,
-    data: Columns,
+    data: SampleColumns,
     feed_max: FloatArray,
     pieces: ProgramPieces,
     limits: Limits,
@@ -124,7 +124,7 @@ def _block(
     seen.gap_max = max(seen.gap_max, float(periods.max(initial=0.0)))
     piece = np.zeros(len(t), dtype=np.int64)
     at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
-    match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Place(piece, feed_max))
+    match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Located(piece, feed_max))
     block = Block(
         t=t,
         position=position,

@@ -16,7 +16,7 @@ from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.reachability import Interval, Reachability, controllable_sets, largest_feed_sq, rows_of
+from planner.feedrate.reachability import Interval, Reachability, axis_rows, controllable_sets, largest_feed_sq
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 
 JOBS = problems.all_jobs()
@@ -100,7 +100,7 @@ def test_controllable_sets_are_those_of_a_linear_programme(seed: int) -> None:
     for i in range(last - 1, -1, -1):
         expected = controllable_by_lp(problem, i, target)
         h, share = problem.s[i + 1] - problem.s[i], 1.0 - problem.margin[i]
-        target = largest_feed_sq(rows_of(problem), Interval(i, h, share, target), problem.feed_sq_max[i])
+        target = largest_feed_sq(axis_rows(problem), Interval(i, h, share, target), problem.feed_sq_max[i])
         assert target == pytest.approx(expected, rel=1e-8)
 
 

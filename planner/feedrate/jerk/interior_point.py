@@ -53,7 +53,7 @@ class Minimum(NamedTuple):
     pi: FloatArray
 
 
-class Step(NamedTuple):
+class NewtonStep(NamedTuple):
     """A Newton step of an `Iterate`.
 
     z     : (N+1, 3) of x, u and p
@@ -250,7 +250,7 @@ def advance(at, step, primal, dual):
 def empty_step(at):
     """Room for a step of an iterate, all zero."""
     n, sides = at.slack.shape
-    return Step(np.zeros((n + 1, 3)), np.zeros((n, sides)), np.zeros((n, sides)), np.zeros(n))
+    return NewtonStep(np.zeros((n + 1, 3)), np.zeros((n, sides)), np.zeros((n, sides)), np.zeros(n))
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class Settings(NamedTuple):
+class InteriorPointSettings(NamedTuple):
     """Numbers without a unit; the problem's units are scaled to fastest feed 1 and largest acceleration 1.
 
     Start
@@ -66,4 +66,4 @@ class Settings(NamedTuple):
     stall_rounds: int = 10
 
 
-SETTINGS = Settings()
+SETTINGS = InteriorPointSettings()

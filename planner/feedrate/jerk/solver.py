@@ -35,7 +35,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.settings import SETTINGS, Settings
+from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.jerk.window import ScaledWindow, Window
 from planner.feedrate.lagrangian import acceleration_limits, lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
@@ -77,7 +77,7 @@ class JerkLimited:
     tol: float = 1e-4
     iterations: int = 100
     window: int = 1_000
-    settings: Settings = field(default=SETTINGS, repr=False)
+    settings: InteriorPointSettings = field(default=SETTINGS, repr=False)
 
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None

@@ -16,7 +16,7 @@ from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
 from planner.feedrate.jerk.rows import Grid, Profile, at_profile, empty_model, linearise
-from planner.feedrate.jerk.settings import SETTINGS, Settings
+from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 
 # A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
@@ -76,7 +76,7 @@ class ScaledWindow:
     asked: FloatArray
     feed: float
     time: float
-    settings: Settings = SETTINGS
+    settings: InteriorPointSettings = SETTINGS
 
     @classmethod
     def of(
@@ -85,7 +85,7 @@ class ScaledWindow:
         acceleration: FloatArray,
         begin: int,
         end: int,
-        settings: Settings = SETTINGS,
+        settings: InteriorPointSettings = SETTINGS,
     ) -> ScaledWindow:
         """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
         own = slice(begin, end + 1)

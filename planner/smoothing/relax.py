@@ -29,10 +29,10 @@ from planner.smoothing.splines import Splines, control_first, run_control, run_k
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
 USED = 0.9995  # of the tolerance that sites may use at first [-]
-TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]
+TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
 ROUNDS = 20  # of tightening, in windows around the sites that need it; 2 are the rule
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
-WIDER = 1.002  # ... with tubes at least so much wider than it needs [-]
+WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it
 WINDOW = 240  # control points relaxed at a time ...
 OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
 

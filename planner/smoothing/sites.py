@@ -19,12 +19,14 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER
 
+# These constants decide how much the certificate has to ask for later. Twice as large, all of them together with SAGITTA and APART of
+# corridor.py, and half of PARTS of certificate.py, they change the times of the eight jobs of tests/golden by -6e-4 to 4e-4.
 SITE_SPACING = 0.5  # of sites on chords [spans]
-SITE_EDGE = 0.1  # no site on a chord so close to its ends [spans]
+SITE_EDGE = 0.1  # no site on a chord so close to its ends, which are sites themselves [spans]
 # Vertices nearer than this to the site before are left to the certificate [spans] ...
 SITES_DENSE = 0.125
 DENSE_TURN = 0.1  # ... unless the path turns there by more [rad]
-SLIDE = 0.1  # a site on a chord may slide along it by its radius over this, less near the chord's ends
+SLIDE = 0.1  # a site on a chord may slide along it by its radius over this, less near the chord's ends [-]
 
 
 class Sites(NamedTuple):

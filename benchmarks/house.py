@@ -100,7 +100,7 @@ def _arguments(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 def _is_command(node: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     """True for commands, whose arguments are the options of the command line."""
-    return any("command" in ast.unparse(decorator) for decorator in node.decorator_list)
+    return any("guarded" in ast.unparse(decorator) for decorator in node.decorator_list)
 
 
 def _constants(tree: ast.Module, text: str) -> Iterator[tuple[str, bool]]:

@@ -8,7 +8,7 @@ from typing import Any
 from planner.base.errors import InputError
 
 
-def needed(package: str, user: str) -> Any:
+def import_needed(package: str, user: str) -> Any:
     """The package, imported; `user` is what needs it. Raises InputError with the command that installs it."""
     try:
         return importlib.import_module(package)

@@ -161,7 +161,7 @@ def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
     return found
 
 
-def derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
+def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
     """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`, 4 arrays (n, A), with
     respect to whatever they are with respect to. Raises InputError where they are not finite."""
     table = np.stack(motion)
@@ -205,7 +205,7 @@ def ratios(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int
         values = (
             path
             if limit.value(place) is None
-            else derivatives(limit, motion.axes, (motion.position, *columns))
+            else limit_derivatives(limit, motion.axes, (motion.position, *columns))
         )
         for k in range(3):
             yield k + 1, np.abs(values[k]) / bounds[:, k]

@@ -25,7 +25,7 @@ from planner.corners.blend import OWN_TERMS, Shape
 LOWEST = 3  # power of z
 PLACES = 1001  # at which f is looked at
 POLYNOMIAL = 1e-9  # f may differ from its polynomial by so much [-]
-ROUNDING = 1e-12
+ROUNDING = 1e-12  # of the values of f [-]
 
 
 class PolynomialCorner(ABC):

@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.packages import needed
+from planner.base.packages import import_needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
@@ -187,7 +187,7 @@ def _import_toppra() -> Any:
         warnings.simplefilter(
             "ignore"
         )  # its sources hold escapes that newer Pythons warn of when they compile them
-        return needed("toppra", "solver toppra")
+        return import_needed("toppra", "solver toppra")
 
 
 @contextmanager

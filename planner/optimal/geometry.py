@@ -19,7 +19,7 @@ from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
 from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape
 
-STOP_ROUNDS = 4
+STOP_ROUNDS = 4  # rounds of placing full stops; in the last one a run without a spline is fenced by two
 
 
 def corner_shape(

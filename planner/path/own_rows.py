@@ -20,7 +20,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.constraints.own import OwnLimit, Place, bounds_at, derivatives
+from planner.constraints.own import OwnLimit, Place, bounds_at, limit_derivatives
 from planner.corners.elements import element_point, to_arc_length
 from planner.machine import Machine
 from planner.path.grid import JERK_SHARE, MARGIN_SAFETY
@@ -230,7 +230,7 @@ def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray],
     """(3, n) q', q'', q'''."""
     if limit.value(here) is None:
         return _unit(len(motion[0]))
-    return derivatives(limit, axes, motion)
+    return limit_derivatives(limit, axes, motion)
 
 
 def _unit(count: int) -> FloatArray:

@@ -39,7 +39,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.packages import needed
+from planner.base.packages import import_needed
 from planner.feedrate.solution import Status
 from planner.tube.guess import Guess
 from planner.tube.numbers import acceleration_along, step_numbers
@@ -137,7 +137,7 @@ class TubeNLP:
 
     def _solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
         """Transcribe and solve; the whole formulation, from top to bottom."""
-        ca = needed("casadi", "method tube")
+        ca = import_needed("casadi", "method tube")
 
         began = time.perf_counter()
         steps, axes, leg = len(guess), len(run.axis), guess.leg

@@ -31,7 +31,7 @@ UNITS = ("/s", "/s2", "/s3")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Block:
+class SampleBlock:
     """Samples n of a motion, those before `skip` for the differences only.
 
     travelled : path length run before [mm]
@@ -59,7 +59,7 @@ class OwnSeen:
         self.bounded = np.zeros(count, dtype=bool)  # True where a bound was finite anywhere
         self.least = np.full(count, np.inf)  # the least bound
 
-    def take(self, block: Block, limits: Limits) -> None:
+    def take(self, block: SampleBlock, limits: Limits) -> None:
         """Look at a block of samples."""
         if not self.own:
             return
@@ -91,7 +91,7 @@ class OwnSeen:
         self.least[row : row + 3] = np.minimum(self.least[row : row + 3], bounds.min(axis=0))
         self.bounded[row : row + 3] |= np.isfinite(bounds).any(axis=0)
 
-    def _keep(self, row: int, value: FloatArray, bound: FloatArray, how: int, block: Block) -> None:
+    def _keep(self, row: int, value: FloatArray, bound: FloatArray, how: int, block: SampleBlock) -> None:
         ratio = value / bound
         ratio[: block.skip] = 0.0
         k = int(ratio.argmax())
@@ -109,7 +109,7 @@ def _place(axes: tuple[str, ...], columns: Any, direction: FloatArray) -> Simple
     return SimpleNamespace(axes=axes, direction=direction, **dict(zip(axes, columns, strict=True)))
 
 
-def _along_path(block: Block, delivered: bool) -> tuple[FloatArray, FloatArray]:
+def _along_path(block: SampleBlock, delivered: bool) -> tuple[FloatArray, FloatArray]:
     """(3, n) speed, acceleration and jerk along the path, nothing at rest; and the direction (n, A), by the chord to the sample before
     if no velocity was delivered."""
     v, a, j = block.velocity, block.acceleration, block.jerk
@@ -127,7 +127,7 @@ def _along_path(block: Block, delivered: bool) -> tuple[FloatArray, FloatArray]:
     return np.stack([speed, along, np.einsum("nk,nk->n", j, t) + turning]) * moving, t
 
 
-def _rates(limit: Any, axes: tuple[str, ...], block: Block) -> FloatArray:
+def _rates(limit: Any, axes: tuple[str, ...], block: SampleBlock) -> FloatArray:
     """(3, n) derivatives of q by the time."""
     motion = np.stack([block.position, block.velocity, block.acceleration, block.jerk])
     found = limit.value(_place(axes, [Series(motion[:, :, k]) for k in range(len(axes))], motion[1]))
@@ -135,7 +135,7 @@ def _rates(limit: Any, axes: tuple[str, ...], block: Block) -> FloatArray:
     return rates
 
 
-def _position_error(block: Block, limits: Limits) -> FloatArray:
+def _position_error(block: SampleBlock, limits: Limits) -> FloatArray:
     """(n, A) largest error of the positions, as in limits.py [mm]."""
     ulp = ROUNDING_ULPS * 2.0**-52
     far = block.travelled + np.append(0.0, np.linalg.norm(np.diff(block.position, axis=0), axis=1)).cumsum()
@@ -151,7 +151,12 @@ def _position_error(block: Block, limits: Limits) -> FloatArray:
 
 
 def _value_error(
-    limit: Any, axes: tuple[str, ...], block: Block, direction: FloatArray, error: FloatArray, q: FloatArray
+    limit: Any,
+    axes: tuple[str, ...],
+    block: SampleBlock,
+    direction: FloatArray,
+    error: FloatArray,
+    q: FloatArray,
 ) -> FloatArray:
     """(n,) largest error of q."""
     off = ROUNDING_ULPS * 2.0**-52 * np.abs(q)

@@ -16,7 +16,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.motion.trajectory import Trajectory
 from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
 from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
-from planner.verify.own import Block, OwnSeen
+from planner.verify.own import OwnSeen, SampleBlock
 from planner.verify.pieces import ProgramPieces
 
 BLOCK_SAMPLES = 65_536  # read at a time: 8 MB for three axes
@@ -125,7 +125,7 @@ def _block(
     piece = np.zeros(len(t), dtype=np.int64)
     at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
     match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Located(piece, feed_max))
-    block = Block(
+    block = SampleBlock(
         t=t,
         position=position,
         velocity=data.velocity,

@@ -16,7 +16,13 @@ from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.reachability import Interval, Reachability, axis_rows, controllable_sets, largest_feed_sq
+from planner.feedrate.reachability import (
+    Interval,
+    Reachability,
+    axis_rows,
+    controllable_sets,
+    largest_feed_sq,
+)
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 
 JOBS = problems.all_jobs()

@@ -48,7 +48,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.packages import needed
+from planner.base.packages import import_needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.piecewise import (
@@ -136,7 +136,7 @@ def _solve_piece(
 
     The columns are those of `piecewise.Found`.
     """
-    ca = needed("casadi", f"solver {settings.solver}")
+    ca = import_needed("casadi", f"solver {settings.solver}")
 
     here = slice(problem.piece[g], problem.piece[g + 1])
     ds = np.diff(problem.s[here])

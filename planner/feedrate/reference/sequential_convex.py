@@ -57,7 +57,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.packages import needed
+from planner.base.packages import import_needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.piecewise import (
@@ -136,7 +136,7 @@ def _solve_piece(
 
     The columns are those of `piecewise.Found`; the jerk is the mean of each interval.
     """
-    ca = needed("casadi", "solver sequential-convex")
+    ca = import_needed("casadi", "solver sequential-convex")
 
     here = slice(problem.piece[g], problem.piece[g + 1])
     ds = np.diff(problem.s[here])

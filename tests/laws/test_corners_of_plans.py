@@ -10,7 +10,7 @@ from quick import slow_but
 
 import planner
 from benchmarks import problems
-from planner.constraints import bounds
+from planner.constraints import bounds, normal_limit
 from planner.job import job
 from planner.machine import Machine
 from planner.methods.bezier import BezierMethod
@@ -135,7 +135,7 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
     kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert kept.verdict.passed, kept.verdict.faults
     assert 0.99 < kept.corners.worst_speed_ratio <= 1 + RATIO_ROUNDING
-    monkeypatch.setattr(bounds, "normal_acceleration", lambda kappa, limit: np.full(len(kappa), np.inf))
+    monkeypatch.setattr(normal_limit, "feed_sq_max", lambda kappa, machine: None)
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[0]

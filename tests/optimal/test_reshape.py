@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.geometry.build import toolpath_from_program
+from planner.job.trace import tell_nobody
 from planner.methods.optimal import OptimalMethod
 from planner.optimal.compare_corners import COMPARED_POINTS, CornerBounds, corner_bounds, with_corners
 from planner.optimal.on_path import OnPath
@@ -27,6 +29,7 @@ from planner.smoothing.spline_path import spline_shape, with_spline
 MACHINE = problems.machine()
 SOLVER = JerkLimited(tol=1e-7)
 JOBS = problems.all_jobs()
+QUIET = SimpleNamespace(tell=tell_nobody)  # what comparing corners asks of a job
 
 
 def planned_on(path, grid=None, shape=None):
@@ -129,7 +132,7 @@ def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_ar
     pieces = len(splines.samples.piece) - 1
     assert pieces == 2
     corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
-    best, left = with_corners(rounded, slow, corners, None, order)
+    best, left = with_corners(rounded, slow, corners, QUIET, order)
     assert not len(left)
     assert len(order.paths) == 1
     assert not best.shape.laid.fits.any()
@@ -142,7 +145,7 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     splines = planned_on(with_spline(rounded, shape), shape=shape)
     corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
     order = Recorded()
-    best, left = with_corners(rounded, splines, corners, None, order)
+    best, left = with_corners(rounded, splines, corners, QUIET, order)
     assert not order.paths
     assert list(left) == [0]
     assert best is splines

@@ -118,14 +118,14 @@ def test_where_feed_and_an_axis_are_equally_fast_neither_alone_is_worth_anything
 def solved():
     """What `price_list` gets of a plan."""
     got = {}
-    from planner.methods import optimal
+    from planner.optimal import result
 
     def kept(*given):
         got["given"] = given
         return price_list(*given)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(optimal, "price_list", kept)
+        patch.setattr(result, "price_list", kept)
         planner.plan(problems.zigzag(), MACHINE, method="optimal", corner="bezier")
     return got["given"][:4]
 

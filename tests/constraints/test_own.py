@@ -115,6 +115,7 @@ def test_a_motion_planned_without_is_faulted(job, limit):
     assert not any(limit.name in fault for fault in reported.faults)
 
 
+@pytest.mark.slow
 def test_loosening_never_costs_and_a_loose_limit_costs_nothing(job):
     plain = planner.plan(job, corner="bezier").trajectory.cycle_time
     times = []

@@ -162,6 +162,7 @@ def test_stops_wait_less_than_a_period():
     assert fine.trajectory.cycle_time == pytest.approx(fine.stop_time, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged():
     made = plan(LAW_JOB, coarse(0.02, 5e-3), method="second-order")
     assert any(note.startswith("samples 20 ms apart") for note in made.notes)
@@ -169,6 +170,7 @@ def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged
     assert (made.toolpath.joint[1:-1] != Joint.STOP).all()
 
 
+@pytest.mark.slow
 def test_without_it_chords_leave_the_tolerance(monkeypatch):
     """What the law would say of a planner that forgot its period."""
     monkeypatch.setattr(jobs, "PERIOD_ROUNDS", 0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from quick import slow_but
 from random_problems import in_units
 from whole_plans import smooth_path
 
@@ -105,6 +106,7 @@ def test_the_lagrangian_is_the_time_at_its_own_problem_and_stationary(name, bend
     assert there.cycle_time - solved[name].cycle_time == pytest.approx(foreseen, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", THIRD_ORDER)
 def test_solvers_do_not_depend_on_units(name, bend, solved):
     there = THIRD_ORDER[name].solve(in_units(bend, 1 / 25.4, 1.0)).require()
@@ -119,7 +121,7 @@ def test_progress_ends_at_the_whole(name):
     assert told[-1] == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize("name", FOREIGN)
+@pytest.mark.parametrize("name", slow_but("ipopt", FOREIGN))
 def test_a_whole_job_with_every_solver(name, tmp_path):
     job = tmp_path / "corner.ngc"
     job.write_text(CORNER)
@@ -133,6 +135,7 @@ def test_a_whole_job_with_every_solver(name, tmp_path):
     assert "NLP" in made.solver or "Convex" in made.solver
 
 
+@pytest.mark.slow
 def test_splines_are_reshaped_by_the_multipliers_of_ipopt(tmp_path):
     job = tmp_path / "corner.ngc"
     job.write_text(CORNER)

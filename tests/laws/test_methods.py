@@ -68,7 +68,9 @@ def machine(seed: int = 0, **more) -> Machine:
     return problems.machine(**({"axes": axes, "tolerance": 10 ** rng.uniform(-2.0, -0.7)} | more))
 
 
-@pytest.mark.parametrize("method", slow_but(set(HOLDING) - {"optimal"}, HOLDING))
+@pytest.mark.parametrize(
+    "method", slow_but(set(HOLDING) - {"optimal", "second-order", "fir-spline"}, HOLDING)
+)
 @given(seed=seeds, axes=st.integers(2, 4))
 @settings(max_examples=8)
 def test_tolerance_and_limits_hold(method, seed, axes):
@@ -124,6 +126,7 @@ def corner_job(theta: float, axes: int, seed: int) -> Program:
     return through([-LONG * u, np.zeros(axes), LONG * (np.cos(theta) * u + np.sin(theta) * v)])
 
 
+@pytest.mark.slow
 @given(theta=corners, axes=st.integers(2, 4), seed=seeds, eps=st.floats(-3.0, 0.0).map(lambda x: 10**x))
 @settings(max_examples=30)
 def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
@@ -139,6 +142,7 @@ def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
     assert made.verdict.vertex_error_mm == pytest.approx(expected, rel=1e-4, abs=bow)
 
 
+@pytest.mark.slow
 @given(theta=corners, axes=st.integers(2, 4), seed=seeds)
 @settings(max_examples=30)
 def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed):

@@ -175,6 +175,7 @@ def total_time(legs: LegLimits, passage: Passage) -> float:
     return total
 
 
+@pytest.mark.slow
 @given(seeds)
 @settings(max_examples=12)
 def test_no_other_choice_of_corners_and_stops_is_faster(seed):

@@ -95,6 +95,7 @@ def test_v_ph_is_the_lag_of_the_filtered_point(rho, phi, T1, ratio):
 normals = st.tuples(*(st.floats(-1, 1) for _ in range(3))).filter(lambda n: np.linalg.norm(n) > 0.1)
 
 
+@pytest.mark.slow
 @given(rho=st.floats(0.5, 50.0), normal=normals | st.sampled_from([(0, 0, 1), (1, 0, 0), (0, 1, 0)]))
 @settings(max_examples=30)
 def test_v_acc_and_v_jerk_reach_the_axes_limits_on_any_circle(rho, normal):

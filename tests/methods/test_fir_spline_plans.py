@@ -26,6 +26,7 @@ def strong(**more) -> Machine:
     return problems.machine(velocity=1e3, acceleration=1e5, jerk=1e8, **more)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10**6), axes=st.integers(2, 3), tolerance=st.floats(-2.5, -0.7))
 @settings(max_examples=12)
 def test_the_safe_mode_holds_tolerance_and_limits_on_random_curves(seed, axes, tolerance):

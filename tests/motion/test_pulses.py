@@ -71,6 +71,7 @@ def counter(train: AxisPulses, times: FloatArray) -> FloatArray:
     return np.concatenate([[0], train.count])[np.searchsorted(train.time, times, side="right")]
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10**6), steps=st.floats(0.5, 4), other=st.floats(0.5, 3))
 @settings(max_examples=40)
 def test_less_than_one_pulse_off_at_every_instant(seed, steps, other):

@@ -197,6 +197,7 @@ def spelled(text: str, rng: np.random.Generator) -> bytes:
     return str(rng.choice(["\n", "\r\n", "\r"])).join(lines).encode()
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=200, deadline=None)
 def test_any_program(seed: int) -> None:

@@ -66,6 +66,7 @@ def test_arcs_stops_and_dwells_with_two_modes_and_filters():
     assert left(made) < LEFT
 
 
+@pytest.mark.slow
 def test_an_exact_stop_stands_still():
     machine = problems.machine(modes=(Mode(frequency=25.0),))
     made = plan(parse_program(PROGRAM, machine), machine, method="second-order", corner="bezier", shaped=True)

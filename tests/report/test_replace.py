@@ -86,6 +86,7 @@ def leftovers(place: Path) -> list[Path]:
     return list(place.glob(".planner-*"))
 
 
+@pytest.mark.slow
 @linux_only
 def test_killed_before_every_step(tmp_path: Path) -> None:
     """The old set or the new one is there, or the run_id tells that it is neither; the next run cleans up without being forced."""

@@ -55,6 +55,7 @@ def frechet(curve, vertices):
     return reach[-1]
 
 
+@pytest.mark.slow
 @given(seeds)
 @settings(max_examples=15)
 def test_certificate_holds_against_brute_force(seed):
@@ -166,6 +167,7 @@ def test_a_cusp_is_found_at_the_joint_that_turns_there(before):
     assert np.abs(place - (begin + end) / 2).min() <= max(near, 2.0 * (end - begin))
 
 
+@pytest.mark.slow
 def test_stops_at_cusps_keep_the_splines_around_them(shared_dir):
     """A plotter's drawing with five loops smaller than the tolerance."""
     program = read_program(shared_dir / "nc" / "aiten__CNCLib__hedgehog.hpgl", MACHINE)

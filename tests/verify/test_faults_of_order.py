@@ -53,6 +53,7 @@ def test_one_turn_of_two_is_found():
     fault(verdict, "order")
 
 
+@pytest.mark.slow
 def test_a_turn_left_out_of_a_dense_spiral_is_found():
     """The turns are 0.02 mm apart, closer than the budget of 0.05 mm: only the order can tell."""
     angle = np.linspace(0, 8 * np.pi, 801)

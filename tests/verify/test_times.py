@@ -46,6 +46,7 @@ def test_there_are_more_times_than_the_planner_looks_at_and_others():
     assert not len(np.intersect1d(times(asked), prepared))
 
 
+@pytest.mark.slow
 def test_chunks_make_no_difference(monkeypatch):
     from planner.verify import times as module
 

@@ -24,6 +24,7 @@ from planner.nc.text import program_text
 MACHINE = load_machine("plotter")
 
 
+@pytest.mark.slow
 @given(strokes=drawings, dialect=dialect)
 @settings(max_examples=200)
 def test_every_dialect_reads_as_the_same_path(strokes, dialect):

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.record import RESULTS, markdown, write_results
-from planner.job.job import Method
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.machine import Axis, Machine
 from planner.methods.kinematic import KinematicMethod

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from planner.constraints.own import JointLimit, PathLimit
     from planner.corners.own import PolynomialCorner
     from planner.geometry.toolpath import Toolpath
-    from planner.job.job import Method
+    from planner.job.method import Method
     from planner.job.plan import Plan
     from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
@@ -46,7 +46,7 @@ _HOME = {
     "JointLimit": "planner.constraints.own",
     "PathLimit": "planner.constraints.own",
     "PolynomialCorner": "planner.corners.own",
-    "Method": "planner.job.job",
+    "Method": "planner.job.method",
     "compare": "planner.report.comparison",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",

@@ -21,7 +21,8 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
-from planner.job.job import Job, Method
+from planner.job.job import Job
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, corner_chain

@@ -26,7 +26,8 @@ from planner.fir.filtered import axes_of, check_profile_filters, reached
 from planner.fir.schedule import Schedule
 from planner.fir.search import fastest_schedule
 from planner.fir.superpose import Filtered, superpose
-from planner.job.job import Job, Method
+from planner.job.job import Job
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.motion.axis_motion import AxisMotion
 

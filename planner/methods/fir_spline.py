@@ -30,7 +30,8 @@ from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.job import Job, Method, faster
+from planner.job.job import Job
+from planner.job.method import Method, faster
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
 from planner.machine import Machine

@@ -28,7 +28,8 @@ from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.job import Job, Method
+from planner.job.job import Job
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces

@@ -20,7 +20,7 @@ from planner.base.names import (
 )
 from planner.constraints.own import OwnLimit
 from planner.corners.smooth import CornerShape
-from planner.job.job import Method
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
 from planner.job.trace import Log

@@ -13,7 +13,8 @@ from planner.base.names import AUTO
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import REACHABILITY, second_order_solver
-from planner.job.job import Job, Method
+from planner.job.job import Job
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.optimal.loop import Settings, fastest_plan
 from planner.optimal.order import SecondOrder

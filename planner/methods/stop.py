@@ -10,7 +10,8 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
-from planner.job.job import Job, Method
+from planner.job.job import Job
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_phases
 from planner.motion.time_law import law_of_phases

@@ -24,7 +24,8 @@ from planner.base.errors import InputError
 from planner.delivery.periods import missed
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
-from planner.job.job import Delivered, Job, Method
+from planner.job.job import Delivered, Job
+from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.methods.optimal import OptimalMethod
 from planner.motion.axis_motion import AxisMotion

@@ -32,7 +32,7 @@ from planner.report.tables import ratio_text
 
 if TYPE_CHECKING:
     from planner.constraints.own import OwnLimit
-    from planner.job.job import Method
+    from planner.job.method import Method
     from planner.job.plan import Plan
     from planner.job.stages import Progress
     from planner.verify import Verdict

@@ -13,6 +13,7 @@ from planner.delivery.periods import USED, missed, with_less_tolerance
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.job import job as jobs
+from planner.job import method as job_method
 from planner.methods.fir import FirMethod
 from planner.methods.registry import plan
 from planner.motion.axis_motion import AxisMotion
@@ -173,7 +174,7 @@ def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged
 @pytest.mark.slow
 def test_without_it_chords_leave_the_tolerance(monkeypatch):
     """What the law would say of a planner that forgot its period."""
-    monkeypatch.setattr(jobs, "PERIOD_ROUNDS", 0)
+    monkeypatch.setattr(job_method, "PERIOD_ROUNDS", 0)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="second-order").verdict.passed
     monkeypatch.setattr(jobs, "settled", lambda motion, *given: motion)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="stop").verdict.passed

@@ -11,7 +11,7 @@ from quick import slow_but
 import planner
 from benchmarks import problems
 from planner.constraints import bounds, normal_limit
-from planner.job import job
+from planner.job import method as job_method
 from planner.machine import Machine
 from planner.methods.bezier import BezierMethod
 from planner.nc.reader import parse_program
@@ -152,7 +152,7 @@ def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch)
     assert not any(
         laws_broken(repaired.corners)
     )  # planned again with less of the tolerance (delivery/periods.py)
-    monkeypatch.setattr(job, "PERIOD_ROUNDS", 0)
+    monkeypatch.setattr(job_method, "PERIOD_ROUNDS", 0)
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[1]

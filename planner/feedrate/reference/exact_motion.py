@@ -55,7 +55,7 @@ class ExactMotion:
                 time.perf_counter() - began,
                 found.iterations,
             )
-        slower = slowed(problem, exact)
+        slower = slowed_to_limits(problem, exact)
         later = slower.cycle_time / found.cycle_time - 1.0
         sentence = (
             f"{found.sentence}; with constant jerks between the points {100.0 * later:+.2g} % of the time"
@@ -83,7 +83,7 @@ def with_exact_kinematics(problem: FeedrateProblem, solution: FeedrateSolution) 
     return replace(solution, feed_sq=feed_sq, acc_s=acc, jerk_s=jerk, duration=duration)
 
 
-def slowed(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution:
+def slowed_to_limits(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution:
     """Every piece slower by the smallest factor with which all limits hold at its grid points."""
     factor = np.ones(len(problem))
     bounds = len(problem.bound_names)

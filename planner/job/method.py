@@ -1,0 +1,171 @@
+"""What every method shares: its way into a job, and planning it again where samples and filters ask for it."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from planner.delivery import periods
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.job import Job
+from planner.job.plan import Plan
+from planner.job.stages import Progress, Stages
+from planner.job.trace import Log
+from planner.machine import Machine
+from planner.motion.timing import require_samples
+from planner.nc.program import Program
+
+# A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
+# elsewhere, but what one phase may do to a corner is known after the first.
+PERIOD_ROUNDS = 8
+# Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
+INSTEAD_POINTS = 50_000
+
+
+class Method(ABC):
+    """A way to plan a job. Its repr is its row label in every table.
+
+    ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
+              `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
+    instead : methods that are tried as well if the chords between samples need some of the tolerance, because another one may then be
+              faster
+    """
+
+    instead: Sequence[Method] = ()
+    ways: ClassVar[tuple[tuple[float, float], ...]] = ()
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+        log: Log | None = None,
+    ) -> Plan:
+        """Plan a program, sample the motion and have it judged.
+
+        tolerance : contour tolerance [mm]; None for the one of the program (G64 P) or the machine
+        progress  : called with the stage's name and the fraction done (0 to 1)
+        log       : called with every step of the planning, e.g. a `Trace` (job/trace.py)
+
+        Raises InputError for a program that cannot be planned. An unsolved problem is the status of the plan.
+        """
+        stages = Stages(progress, log)
+        with stages.stage("geometry"):
+            toolpath = toolpath_from_program(program, machine, tolerance)
+        # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
+        require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
+        return self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+
+    def plan_best(self, job: Job) -> Plan:
+        """The plan of a job; on a machine with filters the fastest of those that are tried (`ways`)."""
+        best = self.plan_within_periods(job)
+        if job.machine.fir is None or not best.solved:
+            return best
+        for share, seen in self.ways:
+            made = self.plan_within_periods(job.with_share(share, seen))
+            before, best = best, faster(best, made)
+            job.tell(
+                "share of tolerance",
+                found=_time(made),
+                before=_time(before),
+                kept=best is made,
+                share=share,
+                filters=seen,
+            )
+        return best
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
+        return True
+
+    def plan_within_periods(self, job: Job) -> Plan:
+        """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py)."""
+        made = self.plan_job(job)
+        given, planned, (machine, programmed) = job, job.toolpath, job.real
+        for again in range(1, PERIOD_ROUNDS + 1):
+            if not self.keeps_tolerance or made.trajectory is None or _inside(made):
+                break
+            with job.stage("geometry"):
+                near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
+                less = periods.with_less_tolerance(planned, programmed, near, far)
+            if less is None:
+                break
+            planned = less
+            stops = int((less.joint == Joint.STOP).sum() - (programmed.joint == Joint.STOP).sum())
+            job.tell(
+                "less for the period",
+                round=again,
+                corners=int((less.tolerance < programmed.tolerance).sum()),
+                stops=stops,
+            )
+            job = dataclasses.replace(given, toolpath=planned, judged=(machine, programmed), noted=[])
+            made = self.plan_job(job)
+        if job is given:
+            return made
+        # what less tolerance costs is not in the problem's prices
+        made = dataclasses.replace(made, prices=None, notes=(*made.notes, _said(made, programmed, planned)))
+        for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
+            rival = other.plan_within_periods(given.afresh())
+            wins = faster(made, rival) is rival
+            job.tell(
+                "another method",
+                found=_time(rival),
+                before=_time(made),
+                kept=wins,
+                method=rival.method,
+                corner=rival.corner or "none",
+            )
+            if wins:
+                what = (
+                    f"{rival.corner} corners lose"
+                    if rival.method == made.method
+                    else f"method {rival.method} loses"
+                )
+                said = f"{what} less to the period; {rival.sentence}"
+                made = dataclasses.replace(rival, method=made.method, corner=made.corner, sentence=said)
+        return made
+
+    @abstractmethod
+    def plan_job(self, job: Job) -> Plan:
+        """Plan a job whose toolpath is laid out. What a method has to provide."""
+
+
+def faster(plan: Plan, other: Plan) -> Plan:
+    """Of two plans the one that passed; if both did, the faster one; the first if they are equal."""
+    if plan.trajectory is None or plan.verdict is None or other.trajectory is None or other.verdict is None:
+        return plan
+    if plan.verdict.passed != other.verdict.passed:
+        return plan if plan.verdict.passed else other
+    return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _time(plan: Plan) -> float:
+    """Cycle time [s], NaN for a motion that does not pass."""
+    passed = plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
+    return plan.trajectory.cycle_time if passed and plan.trajectory is not None else np.nan
+
+
+def _inside(made: Plan) -> bool:
+    """True if the motion's samples and chords keep the tolerance, at corners (eq. 18) wherever the samples fall."""
+    verdict = made.verdict
+    return verdict is None or not (
+        verdict.vertex.broken or verdict.contour.broken or verdict.corners.overdrawn.any()
+    )
+
+
+def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
+    """What the period took from the corners, for the notes."""
+    stops = (planned.joint == Joint.STOP) & (programmed.joint != Joint.STOP)
+    less = (planned.tolerance < programmed.tolerance) & ~stops
+    first = programmed.line[np.flatnonzero(stops | less)[0] - 1]
+    return (
+        f"samples {made.machine.dt * 1e3:g} ms apart: {less.sum()} corners are planned with less of the tolerance, and "
+        f"{stops.sum()} are full stops; the first is at the end of line {first}"
+    )

@@ -121,6 +121,23 @@ print("alive")
     assert subprocess.run([*PYTHON, code], capture_output=True, text=True, check=True).stdout == "alive\n"
 
 
+@unix
+@pytest.mark.parametrize("code", [0, 3])
+def test_a_command_whose_work_is_done_ends_with_its_own_code(code: int) -> None:
+    """Python takes handlers away before it leaves; an interrupt then must not end a command that has written everything."""
+    leaving = f"""
+import atexit, os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from planner import cli
+from planner.commands import app
+app.app = lambda prog_name: sys.exit({code})
+atexit.register(os.kill, os.getpid(), signal.SIGINT)
+cli.main()
+"""
+    done = subprocess.run([*PYTHON, leaving], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (code, "")
+
+
 # ------------------------------------------------------------------------------------------ output
 
 

@@ -32,7 +32,7 @@ from planner.machine import Machine
 from planner.methods.fir_spline import FirSplineMethod
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.report.comparison import Row, best_of, refused, row_of_plan
+from planner.report.compare import Row, best_of, refused, row_of_plan
 
 ROUNDING = (OPTIMAL, SECOND_ORDER)
 LABELS = tuple(

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
     from planner.nc.reader import read_program
-    from planner.report.comparison import compare
+    from planner.report.compare import compare
     from planner.verify import Verdict
 
     __version__: str
@@ -47,7 +47,7 @@ _HOME = {
     "PathLimit": "planner.constraints.own",
     "PolynomialCorner": "planner.corners.own",
     "Method": "planner.job.method",
-    "compare": "planner.report.comparison",
+    "compare": "planner.report.compare",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",

@@ -33,7 +33,7 @@ from planner.commands.terminal import (
 if TYPE_CHECKING:
     from planner.machine import Machine
     from planner.nc.program import Program
-    from planner.report.comparison import Row
+    from planner.report.compare import Row
 
 ALL = "all"
 
@@ -110,7 +110,7 @@ def parse_methods(text: str) -> list[str]:
 
 def _run(method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool) -> Row:
     """Plan with one method and say on standard error how it went."""
-    from planner.report.comparison import Row, row_of
+    from planner.report.compare import Row, row_of
 
     with ProgressBar(quiet=quiet) as progress:
         try:

@@ -19,7 +19,8 @@ from planner.base.names import METHODS
 from planner.cli import app
 from planner.commands.compare import parse_methods
 from planner.report import comparison
-from planner.report.comparison import Row, best_of, comparison_csv, comparison_dict
+from planner.report.compare import Row, best_of
+from planner.report.comparison import comparison_csv, comparison_dict
 
 
 def run(*arguments: object) -> Result:

@@ -1,0 +1,183 @@
+"""Several methods on one job: each is planned and judged, and whatever comes of it is its row.
+
+The best is the fastest motion that passed with every quantity limited. A motion without a jerk limit (method second-order) is listed
+beside it, and is the best only if no other passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planner.base.errors import InputError, NotSolvedError
+from planner.base.names import METHODS
+from planner.machine import LINEAR_AXES, Machine, load_machine
+from planner.nc.program import Program
+from planner.nc.reader import read_program
+from planner.report.export import summary, verdict_summary
+
+if TYPE_CHECKING:
+    from planner.constraints.own import OwnLimit
+    from planner.job.method import Method
+    from planner.job.plan import Plan
+    from planner.job.stages import Progress
+    from planner.verify import Verdict
+# Stages of a plan that cost every method the same per second of motion; the others are its planning time.
+AFTER_PLANNING = ("read", "sample", "verify")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """The result of one method.
+
+    outcome       : "passed", "failed" (a limit or the tolerance is exceeded), "not solved" or "refused"
+    sentence      : how the plan was solved, the first fault, or the reason why there is no motion
+    cycle_time    : [s]; None without a motion, as the following fields
+    worst         : for each quantity the largest ratio to its limit, and the name of that limit ("jerk.y")
+    free          : quantities that this method does not limit
+    contour_error, vertex_error : [mm]
+    after_filters : the larger of both behind the filters of the machine [mm]; None without filters, or where it is not known
+    corner_ratio  : the largest ratio of eq. 18-19 at the programmed corners [-]; None without corners
+    gain          : median of the speed there over eq. 20 of the paper's corner [-]; None where it is not defined
+    ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
+    planning_time : computing time without reading, sampling and verification [s]
+    summary       : the content of `summary.json`
+    """
+
+    method: str
+    outcome: str
+    sentence: str
+    cycle_time: float | None = None
+    worst: dict[str, tuple[float, str]] | None = None
+    free: tuple[str, ...] = ()
+    contour_error: float | None = None
+    vertex_error: float | None = None
+    corner_ratio: float | None = None
+    gain: float | None = None
+    after_filters: float | None = None
+    ringing: float | None = None
+    planning_time: float | None = None
+    summary: dict[str, Any] | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether its motion passed the verdict."""
+        return self.outcome == "passed"
+
+
+def compare(
+    program: Program | str | Path,
+    machine: Machine | str | Path | None = None,
+    methods: Sequence[str | Method] | None = None,
+    *,
+    limits: Sequence[OwnLimit] = (),
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Plan a program with several methods and put them side by side, judged by the same verifier.
+
+    methods   : names, or methods with settings of your own; None for all that have names
+    the others : as in `planner.plan`
+
+    Raises InputError for a program or a machine that cannot be read; what a method cannot do is its row.
+    """
+    from planner.methods.registry import DEFAULT_MACHINE
+
+    if not isinstance(machine, Machine):
+        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    if limits:
+        machine = machine.with_own((*machine.own, *limits))
+    if not isinstance(program, Program):
+        program = read_program(program, machine)
+    chosen = METHODS if methods is None else methods
+    return [row_of(method, program, machine, tolerance, progress) for method in chosen]
+
+
+def row_of(
+    method: str | Method,
+    program: Program,
+    machine: Machine,
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+) -> Row:
+    """The row of a method, whatever comes of it."""
+    from planner import plan
+
+    label = method if isinstance(method, str) else _label(method)
+    try:
+        return row_of_plan(
+            label, plan(program, machine, method=method, tolerance=tolerance, progress=progress)
+        )
+    except (InputError, NotSolvedError) as fault:
+        return refused(label, fault)
+
+
+def _label(method: Method) -> str:
+    """A method's repr, which names its settings, or its class."""
+    return type(method).__name__ if type(method).__repr__ is object.__repr__ else repr(method)
+
+
+def row_of_plan(method: str, plan: Plan) -> Row:
+    """The row of a plan, solved or not."""
+    planning = sum(seconds for stage, seconds in plan.timings.items() if stage not in AFTER_PLANNING)
+    if plan.trajectory is None or plan.verdict is None:
+        return Row(method=method, outcome="not solved", sentence=plan.sentence, planning_time=planning)
+    verdict = plan.verdict
+    worst: dict[str, tuple[float, str]] = {}
+    for name, check in verdict.limits.items():
+        quantity = name.partition(".")[0]
+        if np.isfinite(check.ratio) and check.ratio >= worst.get(quantity, (0.0, ""))[0]:
+            worst[quantity] = (float(check.ratio), name)
+    return Row(
+        method=method,
+        outcome="passed" if verdict.passed else "failed",
+        sentence=plan.sentence if verdict.passed else verdict.faults[0],
+        cycle_time=plan.trajectory.cycle_time,
+        worst=worst,
+        free=tuple(verdict_summary(verdict)["not_limited"]),
+        contour_error=verdict.contour_error_mm,
+        vertex_error=verdict.vertex_error_mm,
+        corner_ratio=_known(verdict.corners.worst_ratio),
+        gain=_known(verdict.corners.gains()[0]),
+        after_filters=_after_filters(verdict),
+        ringing=_ringing(verdict),
+        planning_time=planning,
+        summary=summary(plan),
+    )
+
+
+def _after_filters(verdict: Verdict) -> float | None:
+    after = verdict.after_filters
+    if after is None or after.contour_error_mm is None or after.vertex_error_mm is None:
+        return None
+    return max(after.contour_error_mm, after.vertex_error_mm)
+
+
+def _ringing(verdict: Verdict) -> float | None:
+    after = [
+        amplitude
+        for mode in verdict.ringing
+        for axis, amplitude in zip(mode.axes, mode.after, strict=True)
+        if axis in LINEAR_AXES
+    ]
+    return float(max(after)) if after else None
+
+
+def refused(method: str, fault: Exception) -> Row:
+    """The row of a method that cannot plan the job, with the reason."""
+    return Row(method=method, outcome="refused", sentence=str(fault))
+
+
+def best_of(rows: list[Row]) -> Row | None:
+    """The fastest method that passed, among those that limit every quantity if there is one; None if none passed."""
+    passed = [row for row in rows if row.passed]
+    candidates = [row for row in passed if not row.free] or passed
+    return min(candidates, key=lambda row: row.cycle_time or np.inf, default=None)
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None

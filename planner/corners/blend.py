@@ -52,13 +52,13 @@ class Shape(IntEnum):
 SHAPE_BEZIER, SHAPE_OWN = int(Shape.BEZIER), int(Shape.OWN)  # numba reads plain integers
 OWN_TERMS = 10  # coefficients of a shape of one's own
 
-# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.stretch`). Scaling X
+# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.scale`). Scaling X
 # and Y is an affine map, which keeps every geometric continuity.
 CORNER_DTYPE = np.dtype(
     [
         ("shape", np.int64),
         ("params", np.float64, (4,)),
-        ("stretch", np.float64, (2,)),
+        ("scale", np.float64, (2,)),
         ("own", np.float64, (OWN_TERMS,)),
     ]
 )
@@ -172,7 +172,7 @@ def shape_at(corner, w, w_ref):
         X, Y = _own_shape(p[0], corner.own, w)
     else:
         X, Y = _fir_shape(p[0], p[1], p[2], p[3], w, w_ref)
-    return _scaled(X, corner.stretch[0], 1.0), _scaled(Y, corner.stretch[1], 1.0)
+    return _scaled(X, corner.scale[0], 1.0), _scaled(Y, corner.scale[1], 1.0)
 
 
 @njit(cache=True, error_model="numpy")

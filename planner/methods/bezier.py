@@ -94,9 +94,9 @@ class BezierMethod(Method):
 
 def _stopped(path: SmoothPath, joint: Array) -> SmoothPath:
     """The same path with full stops at the vertices of some corners."""
-    columns = {name: getattr(path, name).copy() for name in ("joint", "d", "params", "stretch", "tol_ap")}
+    columns = {name: getattr(path, name).copy() for name in ("joint", "d", "params", "scale", "tol_ap")}
     columns["joint"][joint] = Joint.STOP
-    columns["stretch"][joint] = 1.0
+    columns["scale"][joint] = 1.0
     for name in ("d", "params", "tol_ap"):
         columns[name][joint] = 0.0
     return dataclasses.replace(path, **columns)

@@ -157,7 +157,7 @@ def corner_prices(
     turns = (joints % 2 == 0, joints % 2 == 1) if path.legs.table["round"].any() else (joints >= 0,)
     for own in turns:
         by = np.where(own, growth, 0.0)
-        grown = dataclasses.replace(path, stretch=path.stretch * (1.0 + by)[:, None])
+        grown = dataclasses.replace(path, scale=path.scale * (1.0 + by)[:, None])
         moved = feedrate_problem(moved_grid(samples, grown), machine)
         there = lagrangian(dataclasses.replace(moved, limit_scale=problem.limit_scale), solution)
         change = there.value - now.value

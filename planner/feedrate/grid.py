@@ -1,14 +1,14 @@
-"""Grid points on straight stretches: where a second-order profile switches, and what a jerk-limited one needs.
+"""Grid points on straight elements: where a second-order profile switches, and what a jerk-limited one needs.
 
-Between rest and feed, or between two corners, a straight stretch is one interval; its end speeds are already exact, because the
+Between rest and feed, or between two corners, a straight element is one interval; its end speeds are already exact, because the
 limits do not change along it. Inside it the optimum accelerates at the largest rate b, holds the speed limit, decelerates at b:
 
     peak below the limit:  one switch,  sigma = (x1 - x0 + 2 b L) / (4 b)
     limit x_c reached:     two,         sigma = (x_c - x0)/(2 b)  and  L - (x_c - x1)/(2 b)
 
-With these points added the profile on the grid *is* the optimum, however long the stretch.
+With these points added the profile on the grid *is* the optimum, however long the element.
 
-A jerk-limited profile rounds the switches off: on a stretch of length L, with limits a and j along it, in about
+A jerk-limited profile rounds the switches off: on an element of length L, with limits a and j along it, in about
 
     tau = min(a/j, (L / (16 j))^(1/3)),
 
@@ -16,7 +16,7 @@ which is the time to build up a, or half a phase of the move from rest to rest t
 profile with the acceleration j tau, as slow at corners as the jerk asks for at constant speed, tells when and where things happen;
 between its events the points are spread in time, every
 `STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
-So a stretch from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
+So an element from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ length h, fastest x and largest u that the limits allow there)
 `RESOLUTION`; for solvers of third order the error of the axis jerk at constant speed, relative to its limit, may be `JERK_SHARE`
 times as large, and x is bounded by the jerk limits as well. What remains is kept per interval as `margin`, and the constraints are
 tightened by it, so that they hold between
-grid points and not only at them. Straight stretches need one interval: there g is exactly linear.
+grid points and not only at them. Straight elements need one interval: there g is exactly linear.
 
 PathLimits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
 is convex there, so a line through two caps would cut the corner; the end with the larger curvature keeps its cap and the other

@@ -34,7 +34,8 @@ from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces
 from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
-from planner.lookahead.look_ahead import LegLimits, Passage, look_ahead
+from planner.lookahead.look_ahead import look_ahead
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine

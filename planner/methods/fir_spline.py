@@ -1,7 +1,7 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
 1. The path has to be smooth: corners are rounded by Bezier pairs that use a small share of the tolerance. Curves are taken as they are
-   (`plan_curve`). Either becomes chords so fine that they are the path (fir/guide.py).
+   (`plan_curve`). Either becomes chords so fine that they are the path (fir/chord_guide.py).
 2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J (fir/spline_speeds.py), for a few largest speeds V of
    every run between full stops.
 3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured, and where something is
@@ -22,9 +22,9 @@ from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.solution import Status
+from planner.fir.chord_guide import ChordGuide, guide_of_curve, guide_of_path
 from planner.fir.chord_speeds import ChordSpeeds, fastest_speeds, promised
 from planner.fir.filtered import axes_of, check_profile_filters, reached
-from planner.fir.guide import ChordGuide, guide_of_curve, guide_of_path
 from planner.fir.spline_speeds import v_sc
 from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program
@@ -119,9 +119,9 @@ class FirSplineMethod(Method):
 
     def _finish(self, job: Job, guide: ChordGuide, corner: str | None) -> Plan:
         with job.stage("solve"):
-            alone = guide.pick(np.ones(guide.stretches, bool))
+            alone = guide.pick(np.ones(guide.runs, bool))
             speeds = self._plain(alone, job.machine) if self.plain else fastest_speeds(alone, job.machine)
-            motion = _motion(dataclasses.replace(speeds, course=guide), job.toolpath)
+            motion = _motion(dataclasses.replace(speeds, guide=guide), job.toolpath)
         delay = 1e3 * (speeds.T1 + speeds.T2)
         return job.plan(
             job.deliver(motion if self.plain else job.behind_filters(motion)),
@@ -130,7 +130,7 @@ class FirSplineMethod(Method):
             solver="filters",
             status=Status.ACCEPTABLE,
             sentence=f"filters of {delay.min():.3g} to {delay.max():.3g} ms in all",
-            grid_points=len(guide) + guide.stretches,
+            grid_points=len(guide) + guide.runs,
         )
 
     def _with_stops(self, toolpath: Toolpath, machine: Machine) -> Toolpath:
@@ -145,7 +145,7 @@ class FirSplineMethod(Method):
             stopping = toolpath.with_joints(sharp, Joint.STOP)
             joint = stopping.joint
             guide = _guide_of(stopping, machine, self.profile_filters)
-            time = promised(guide.pick(np.ones(guide.stretches, bool)), machine)[1].min(axis=0)
+            time = promised(guide.pick(np.ones(guide.runs, bool)), machine)[1].min(axis=0)
             run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
             time = np.bincount(run, time, len(ends) - 1)
             better = np.append(time < best_time, False)[
@@ -160,7 +160,7 @@ class FirSplineMethod(Method):
         T1, T2 = guide.largest(guide.feed) / acceleration, acceleration / jerk
         T1, T2 = (np.maximum(T1, T2), np.minimum(T1, T2)) if guide.own is None else guide.given_filters()
         v = v_sc(guide, T1, T2, self.phase_lag)
-        return ChordSpeeds(course=guide, v=v, T1=T1, T2=T2, margin=np.ones((guide.stretches, 2)))
+        return ChordSpeeds(guide=guide, v=v, T1=T1, T2=T2, margin=np.ones((guide.runs, 2)))
 
 
 def _guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None) -> ChordGuide:
@@ -175,8 +175,8 @@ def _guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | N
 
 def _motion(speeds: ChordSpeeds, toolpath: Toolpath) -> AxisMotion:
     """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the guide."""
-    guide, motion = speeds.course, superpose(speeds.command())
+    guide, motion = speeds.guide, superpose(speeds.command())
     chord = np.searchsorted(guide.s, reached(motion), side="right") - 1
-    stretch = np.repeat(np.arange(guide.stretches), np.diff(motion.first))
-    segment = guide.segment[np.clip(chord, guide.first[stretch], guide.first[stretch + 1] - 1)]
+    run = np.repeat(np.arange(guide.runs), np.diff(motion.first))
+    segment = guide.segment[np.clip(chord, guide.first[run], guide.first[run + 1] - 1)]
     return axes_of(motion, segment, segment[0], toolpath, guide.point[0])

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.fir.guide import ChordGuide, guide_of_curve
+from planner.fir.chord_guide import ChordGuide, guide_of_curve
 from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine

@@ -40,7 +40,7 @@ LAYERS = (
     "planner.constraints",
     "planner.feedrate",
     "planner.motion.trajectory",
-    "planner.motion.passing",
+    "planner.motion.vertex_times",
     "planner.motion.time_law",
     "planner.motion.timing",
     "planner.motion",

@@ -19,7 +19,7 @@ from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_fro
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.spline import Spline, no_spline
-from planner.geometry.spline_passing import passed_places
+from planner.geometry.spline_joints import passed_places
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
@@ -55,10 +55,10 @@ class CornerShape(Protocol):
         ...
 
 
-# A leg whose free part is shorter than this share of it is closed by scaling up one of its corners [-]; grid intervals of the
+# A leg whose free part is shorter than this fraction of it is closed by scaling up one of its corners [-]; grid intervals of the
 # size of rounding would otherwise be left between corners that share a leg.
 CLOSE = 1e-4
-# Curvatures are the same below this share of the larger one [-]: printed arc centres are good to 1e-4 of a small radius.
+# Curvatures are the same below this fraction of the larger one [-]: printed arc centres are good to 1e-4 of a small radius.
 SAME_CURVATURE = 1e-6
 
 
@@ -148,7 +148,7 @@ def round_corners(
 
     blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it; such a corner has
                      theta = 0, bends off both legs within the tolerance, and has no jump left
-    free           : share of every leg that its corners leave free [-], for motions that change their speed between corners only
+    free           : fraction of every leg that its corners leave free [-], for motions that change their speed between corners only
 
     Raises InputError if the machine lacks an axis of the toolpath.
     """

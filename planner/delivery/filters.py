@@ -42,7 +42,7 @@ STOPS_AT_ONCE = 500  # 5 MB an array
 # together by up to 240, which leaves 1/57,600 of any filter's error.
 ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5
 FLOOR_STEP = 1.0 / 32.0  # of Td: by so much a rest grows that was too short, twice as much each time again
-# What the path leaves of the tolerance for filters counts as this share at least [-], or the first step would be too large.
+# What the path leaves of the tolerance for filters counts as this fraction at least [-], or the first step would be too large.
 ROOM_LEAST = 0.1
 
 
@@ -180,9 +180,9 @@ class Behind:
         """How far the filtered motion passes by the stops (g,) [mm] if it rests there for so many cells."""
         j = np.arange(before.shape[1]) - rest[:, None]
         whole = np.clip(np.floor(j).astype(np.int64), 0, before.shape[1] - 2)
-        share = np.clip(j - whole, 0.0, 1.0)[:, :, None]
+        fraction = np.clip(j - whole, 0.0, 1.0)[:, :, None]
         rows = np.arange(len(rest))[:, None]
-        shifted = (1.0 - share) * after[rows, whole] + share * after[rows, whole + 1]
+        shifted = (1.0 - fraction) * after[rows, whole] + fraction * after[rows, whole + 1]
         return np.linalg.norm(before + shifted, axis=2).min(axis=1)
 
     def _budget(self, block: Array, position: FloatArray) -> FloatArray:

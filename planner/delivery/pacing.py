@@ -17,7 +17,8 @@ from planner.motion.axis_motion import AxisMotion
 from planner.motion.time_law import TimeLaw
 from planner.motion.timing import Motion
 
-# Velocities and accelerations below this share of the motion's largest are none [-]: rounding of long sums of pulses is 1e-12 of them.
+# Velocities and accelerations below this fraction of the motion's largest are none [-]: rounding of long sums of pulses is 1e-12 of
+# them.
 STANDING = 1e-7
 
 Timed = Motion | AxisMotion

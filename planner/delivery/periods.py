@@ -26,9 +26,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
-from planner.motion.passing import STANDING, passing_times
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import joined
+from planner.motion.vertex_times import STANDING, passing_times
 
 # Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
 # changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
@@ -38,12 +38,12 @@ PER_PERIOD = 8
 # Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of the motion of its own, and
 # who looks at the pieces, at whatever times, sees it.
 LEAST_REST = 1e-6
-# Chords may miss a vertex by this share of its tolerance [-]; the rest is for what lies between the phases and places above.
+# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases and places above.
 USED = 0.99
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
-# A corner is stopped at instead where less than this share of its tolerance would be left to it [-].
+# A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
 
 
@@ -130,8 +130,8 @@ def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
     """(...,) distance of 0 from the chords a to b (..., A)."""
     step = b - a
     size = (step**2).sum(axis=-1)
-    share = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
-    near: FloatArray = np.linalg.norm(a + np.clip(share, 0.0, 1.0)[..., None] * step, axis=-1)
+    fraction = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
+    near: FloatArray = np.linalg.norm(a + np.clip(fraction, 0.0, 1.0)[..., None] * step, axis=-1)
     return near
 
 

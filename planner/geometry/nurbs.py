@@ -33,10 +33,10 @@ from planner.nc.program import Kind, PathControl, Program
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 GAUSS_NODES, GAUSS_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 LENGTH_PARTS = 64
-# Chords: parts of a span to begin with, halvings at most, places at which the deviation of a chord is measured [share of the chord].
+# Chords: parts of a span to begin with, halvings at most, places at which the deviation of a chord is measured [fraction of the chord].
 CHORDS_MIN, HALVINGS = 4, 40
 MEASURED = (0.25, 0.5, 0.75)
-# The deviation between these places may be larger; chords stay below this share of what is allowed [-].
+# The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
 CHORD_SAFETY = 0.9
 NEWTON_STEPS = 30
 
@@ -204,8 +204,8 @@ class Nurbs:
         chord = end - start
         size_sq = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
         worst = np.zeros(len(u0))
-        for share in MEASURED:
-            off = self.at(u0 + share * (u1 - u0))[:, 0] - start
+        for fraction in MEASURED:
+            off = self.at(u0 + fraction * (u1 - u0))[:, 0] - start
             along = np.clip((off * chord).sum(axis=1) / size_sq, 0.0, 1.0)
             worst = np.maximum(worst, np.linalg.norm(off - along[:, None] * chord, axis=1))
         return worst

@@ -31,8 +31,8 @@ from planner.lookahead.ramps import ENTRY, PHASES, ZERO, corner_at, leg_end, leg
 # A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius.
 ARC_PIECE = 0.01
 # Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this
-# fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets in, and
-# 2 kappa a^2 where the acceleration is constant.
+# fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets
+# in, and 2 kappa a^2 where the acceleration is constant.
 ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
 # Shortest piece of all [s]: at 1000 mm/s it is 1e-13 mm long.
 SHORTEST = 1e-16

@@ -1,6 +1,7 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
-1. The path has to be smooth: corners are rounded by Bezier pairs that use a small share of the tolerance. Curves are taken as they are
+1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance. Curves are taken as they
+are
    (`plan_curve`). Either becomes chords so fine that they are the path (fir/chord_guide.py).
 2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J (fir/spline_speeds.py), for a few largest speeds V of
    every run between full stops.
@@ -40,7 +41,7 @@ from planner.path.samples import sample_path
 
 # Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
 # zig-zag 2.93, 2.66, 2.65 s with 0.5, 0.1, 0.05; circle and spiral of chords do not care.
-ROUNDING_SHARE = 0.1
+ROUNDING_FRACTION = 0.1
 # Interpolation error of the grid that the chords start from, as of path/samples.py: they are refined by the
 # angle they turn. Ten jobs take 0.08 % longer with 0.2.
 RESOLUTION = 0.05
@@ -48,7 +49,7 @@ RESOLUTION = 0.05
 # degrees alone ten jobs take 0.6 % longer, one 3.9.
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
 # Fraction of the tolerance that the chords of a curve's program may use [-]: costs half of it in feed.
-CHORD_SHARE = 0.05
+CHORD_FRACTION = 0.05
 # Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (docs/papers.md).
 PHASE_LAG = 0.5
 
@@ -98,23 +99,23 @@ class FirSplineMethod(Method):
         stages = Stages(progress)
         with stages.stage("geometry"):
             whole = machine.tolerance if tolerance is None else tolerance
-            chords = CHORD_SHARE * whole
+            chords = CHORD_FRACTION * whole
             program = curve.to_program(chords, feed)
             toolpath = toolpath_from_program(program, machine, whole)
             ends = curve.stations(chords)
             back = ends[1:][toolpath.block[np.flatnonzero(toolpath.joint[1:-1] == Joint.STOP)]]
         job = Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
 
-        def within(share: float) -> Plan:
+        def within(fraction: float) -> Plan:
             with job.stage("geometry"):
                 guide = guide_of_curve(
-                    curve, machine, feed, share * (whole - chords), ends, back, self.profile_filters
+                    curve, machine, feed, fraction * (whole - chords), ends, back, self.profile_filters
                 )
             return self._finish(job, guide, None)
 
         best = within(1.0)
-        for share, _ in self.ways if machine.fir is not None else ():
-            best = faster(best, within(share))
+        for fraction, _ in self.ways if machine.fir is not None else ():
+            best = faster(best, within(fraction))
         return best
 
     def _finish(self, job: Job, guide: ChordGuide, corner: str | None) -> Plan:
@@ -164,11 +165,11 @@ class FirSplineMethod(Method):
 
 
 def _guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None) -> ChordGuide:
-    """The guide along a toolpath whose corners are rounded within a share of the tolerance."""
-    less = dataclasses.replace(toolpath, tolerance=ROUNDING_SHARE * toolpath.tolerance)
+    """The guide along a toolpath whose corners are rounded within a fraction of the tolerance."""
+    less = dataclasses.replace(toolpath, tolerance=ROUNDING_FRACTION * toolpath.tolerance)
     path = round_corners(less, machine.model_copy(update={"fir": None}), BezierCorner())
     path = dataclasses.replace(
-        path, toolpath=toolpath, tol=path.tol / ROUNDING_SHARE
+        path, toolpath=toolpath, tol=path.tol / ROUNDING_FRACTION
     )  # from here on the whole of it
     return guide_of_path(sample_path(path, machine, RESOLUTION), machine, own)
 

@@ -42,9 +42,9 @@ from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl
 
-# Share of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill their
-# chords: those leave the vertex by 2/3 to 1 of the sagitta.
-CHORD_SHARE = 0.5
+# Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill
+# their chords: those leave the vertex by 2/3 to 1 of the sagitta.
+CHORD_FRACTION = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +99,7 @@ class KinematicMethod(Method):
             whole |= slow
 
     def _look_ahead(self, toolpath: Toolpath, machine: Machine, whole: Array) -> _Course:
-        lines = parted_by_feed(chorded(toolpath, CHORD_SHARE, whole))
+        lines = parted_by_feed(chorded(toolpath, CHORD_FRACTION, whole))
         path = legs_of(lines)
         legs = leg_limits(path, lines, machine)
         free = candidates(path, lines, legs, machine, self.start_stop)
@@ -140,7 +140,7 @@ def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
     """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners between these."""
     arc = np.flatnonzero(toolpath.arc >= 0)
     whole = np.zeros(len(toolpath), bool)
-    count, _ = arc_sagitta(toolpath, CHORD_SHARE)
+    count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
     chord = toolpath.length[arc] / count[arc]
     bend = np.minimum(toolpath.curvature[arc] * chord, np.pi)
     a, j = (machine.limits(q, toolpath.axes).max() / bend for q in ("acceleration", "jerk"))

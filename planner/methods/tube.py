@@ -29,9 +29,9 @@ from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.methods.optimal import OptimalMethod
 from planner.motion.axis_motion import AxisMotion
-from planner.motion.passing import passing_times, standstills
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
+from planner.motion.vertex_times import passing_times, standstills
 from planner.nc.program import Program
 from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of
@@ -42,7 +42,7 @@ from planner.tube.splice import Part, Spliced
 # A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
 # 7 s, one of 400 two minutes and 0.44 GB.
 LEGS_MAX = 500
-# The start is sampled at this share of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
+# The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
 
 

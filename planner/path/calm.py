@@ -26,7 +26,7 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 
 SWITCHING_WAY = 0.03  # h above [v/a]
-FREE_SHARE = 0.5  # of accelerations and jerks, on calm curves [-]
+FREE_FRACTION = 0.5  # of accelerations and jerks, on calm curves [-]
 GROWTH = 0.25  # of intervals by their distance from what is not calm [-]: as on straight elements (feedrate/grid.py, STEP/NEAR)
 PLACES = 9  # on every curve, at which it is looked at
 
@@ -54,7 +54,7 @@ def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatA
     of_span = feed[np.clip(np.searchsorted(passed, ends, side="right") - 1, 0, len(feed) - 1)].max(axis=0)
     F = np.concatenate([of_leg, of_span])
     with np.errstate(invalid="ignore"):  # rapids: inf times 0
-        lively = (velocity.min() < F) | (bend * F**2 > FREE_SHARE) | (twist * F**3 > FREE_SHARE)
+        lively = (velocity.min() < F) | (bend * F**2 > FREE_FRACTION) | (twist * F**3 > FREE_FRACTION)
     with np.errstate(divide="ignore"):
         feed_sq = np.minimum(1.0 / bend, twist ** (-2.0 / 3.0))
     joint = place[legs.first]

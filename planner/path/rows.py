@@ -21,7 +21,7 @@ from planner.path.calm import SWITCHING_WAY, interval_ends
 ARC_STEP = np.pi / 8
 # ... and with so many at least, so that a short arc between two stops can start and stop.
 ARC_INTERVALS_MIN = 4
-# Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
+# Free parts of legs shorter than this fraction of the leg are nothing but rounding: longer ones are at least CLOSE [-].
 FREE_PART_MIN = 1e-9
 
 # curve, w0, w1: element and its parameters; segment: of the toolpath; begin, end: place along the legs from the start of the job [mm];
@@ -53,7 +53,7 @@ class Joints(NamedTuple):
 
     first: Array  # (R+1,) the first segment of each leg, then M (geometry/legs.py)
     place: FloatArray  # (M+1,) where each segment starts, counted along the legs [mm]
-    passed: FloatArray  # (M+1,) where the path passes that start; the same but on spans (geometry/spline_passing.py) [mm]
+    passed: FloatArray  # (M+1,) where the path passes that start; the same but on spans (geometry/spline_joints.py) [mm]
     d_in: FloatArray  # (R+1,) what its corner or run takes from the leg before [mm]
     d_out: FloatArray  # (R+1,) and from the leg after [mm]
     blended: Array  # (R+1,) True where there is a corner

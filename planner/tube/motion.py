@@ -16,7 +16,7 @@ from planner.tube.guess import Guess
 from planner.tube.nlp import TubeSolution
 from planner.tube.run import TubeRun
 
-# Places in every step at which the normal acceleration is measured [share of the step]; between them it is above by less than 1e-6.
+# Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.
 MEASURED_AT = np.linspace(0.0, 1.0, 257)
 
 
@@ -92,8 +92,8 @@ def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
         np.sqrt((np.abs(a) / run.acceleration).max()),
         np.cbrt((np.abs(j) / run.jerk).max()),
     ]
-    for share in MEASURED_AT if np.isfinite(run.across_max).any() else ():
-        tau = share * h
+    for fraction in MEASURED_AT if np.isfinite(run.across_max).any() else ():
+        tau = fraction * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
         speed_sq = (along**2).sum(axis=1)
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2

@@ -59,9 +59,9 @@ BARRIER = 0.1
 # Where normal acceleration is limited it is watched at these places of every step [-], and steps become no more than this much longer:
 # with the others' freedom one step reaches round the whole corner, with twice the limit between two places.
 WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
-# The search ends when the time changes by less than this share in each of so many iterations [-], with all rows kept.
+# The search ends when the time changes by less than this fraction in each of so many iterations [-], with all rows kept.
 SETTLED, SETTLED_ITERATIONS = 1e-5, 4
-# It may also come to rest far from any optimum: what is slower than the guess by more than this share [-] does not count.
+# It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-] does not count.
 NOT_SLOWER = 1e-4
 # Residual of the rows [-]: what is left is integrated away (tube/motion.py).
 FEASIBILITY = 1e-6

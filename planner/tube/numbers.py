@@ -8,7 +8,7 @@ from planner.base.arrays import FloatArray
 from planner.tube.guess import Guess
 from planner.tube.run import TubeRun
 
-# The tolerance is narrowed by this share [-], so that rounding stays inside it.
+# The tolerance is narrowed by this fraction [-], so that rounding stays inside it.
 ROUNDING = 1e-4
 
 

@@ -1,10 +1,10 @@
-"""When a motion passes the vertices of the programmed path, in their order.
+"""When a motion passes the vertices of the programmed path, in their order, by the length that it has run.
 
 From one vertex to the next the motion runs the length L of the block between them, give or take what it may cut or round: every
-point of it is within eps of the path, and a corner within eps of its vertex saves no more than 2 eps of the way on either side. So
-vertex i+1 is looked for where the way run since vertex i is within `SLACK` eps of L, never before vertex i, at the nearest place of
-the chords there. Order and way decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told
-apart.
+point of it is within eps of the path, and a corner within eps of its vertex saves no more than 2 eps of the length on either side. So
+vertex i+1 is looked for where the length run since vertex i is within `SLACK` eps of L, never before vertex i, at the nearest point of
+the chords there. Order and length decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told
+apart. (Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from planner.base.search import nearest
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 
-# By how much the way run between two vertices may differ from the block's length [tolerances]: 2 on either side, and as much again
+# By how much the length run between two vertices may differ from the block's [tolerances]: 2 on either side, and as much again
 # for where the vertex before was found.
 SLACK = 8.0
-# A motion rests where it is slower than this share of its fastest [-]: rounding.
+# A motion rests where it is slower than this fraction of its fastest [-]: rounding.
 STANDING = 1e-9
 
 
 def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(N+1,) when the motion passes the joints of a path of N segments [s], non-decreasing.
+    """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
 
     motion : sampled so often that between samples it runs straight to within the tolerance
     """
@@ -37,10 +37,10 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
 
 def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """When the motion comes to rest at the full stops of a path, and when it leaves (G,) [s].
+    """When the motion comes to rest at the G full stops of a path (G,) [s], and when it leaves them (G,) [s].
 
     motion : sampled at the ends of its pieces too
-    times  : (N+1,) when it passes the joints, `passing_times`
+    times  : (M+1,) when it passes the joints, from `passing_times`
     """
     still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
     group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1
@@ -54,16 +54,16 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
 
 @njit(cache=True, error_model="numpy")
 def _pass(position, s, t, vertex, length, slack, times):
-    """Write when the polyline position (T, A) with way s and times t (T,) is nearest to each vertex (N+1, A)."""
+    """Write when the polyline position (T, A) with lengths s and times t (T,) is nearest to each vertex (M+1, A) into times (M+1,)."""
     last = len(t) - 2
-    k, share = 0, 0.0  # the place reached: chord and share of it
+    k, fraction = 0, 0.0  # the place reached: chord and fraction of it
     times[0] = t[0]
     for i in range(1, len(vertex)):
-        here = s[k] + share * (s[k + 1] - s[k])
+        here = s[k] + fraction * (s[k + 1] - s[k])
         begin, end = here + length[i - 1] - slack[i - 1], here + length[i - 1] + slack[i - 1]
         while k < last and s[k + 1] < begin:
-            k, share = k + 1, 0.0
-        nearest, best, best_share = np.inf, k, share
+            k, fraction = k + 1, 0.0
+        nearest, best, best_fraction = np.inf, k, fraction
         n = k
         while n <= last and (n == k or s[n] <= end):
             along, size = 0.0, 0.0
@@ -73,13 +73,13 @@ def _pass(position, s, t, vertex, length, slack, times):
                 size += step * step
             q = min(max(along / size, 0.0), 1.0) if size > 0.0 else 0.0
             if n == k:
-                q = max(q, share)
+                q = max(q, fraction)
             apart = 0.0
             for axis in range(position.shape[1]):
                 there = position[n, axis] + q * (position[n + 1, axis] - position[n, axis])
                 apart += (vertex[i, axis] - there) ** 2
             if apart < nearest:
-                nearest, best, best_share = apart, n, q
+                nearest, best, best_fraction = apart, n, q
             n += 1
-        k, share = best, best_share
-        times[i] = t[k] + share * (t[k + 1] - t[k])
+        k, fraction = best, best_fraction
+        times[i] = t[k] + fraction * (t[k + 1] - t[k])

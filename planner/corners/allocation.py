@@ -35,7 +35,7 @@ def filter_rate(machine: Machine) -> float:
 
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
-    """The part of the tolerance that the rounding may use, eq. (20).
+    """How much of the tolerance the rounding may use, eq. (20).
 
     tol          : (n,) tolerance eps [mm]
     acceleration : (n,) largest normal acceleration A [mm/s2]

@@ -65,13 +65,22 @@ CORNER_DTYPE = np.dtype(
 
 
 def middle_from_tolerance(tol: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
-    """Largest m with E(m) <= tol [mm]; `curvature` is kappa1 + kappa2 [1/mm]. Infinite where nothing bends."""
+    """(n,) largest m with E(m) <= tol [mm]; infinite where nothing bends.
+
+    tol       : (n,) contour error [mm]
+    sin_half  : (n,) sine of half the turning angle [-]
+    curvature : (n,) kappa1 + kappa2 of the legs [1/mm]
+    """
     with np.errstate(divide="ignore"):
         return tol / (sin_half + np.sqrt(sin_half**2 + curvature * tol))
 
 
 def error_from_middle(middle: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
-    """E(m) [mm]: bound of the two-sided, in-order deviation of a corner; exact between straight legs."""
+    """(n,) E(m) [mm]: bound of the two-sided, in-order deviation of a corner; exact between straight legs.
+
+    middle              : (n,) m [mm]
+    sin_half, curvature : (n,) as of `middle_from_tolerance`
+    """
     return 2.0 * sin_half * middle + curvature * middle**2
 
 
@@ -177,7 +186,11 @@ def shape_at(corner, w, w_ref):
 
 @njit(cache=True, error_model="numpy")
 def corner_point(legs, corners, k, w, w_ref, work1, work2, out):
-    """Point and three w-derivatives of corner k (between legs k-1 and k), into out (4, A)."""
+    """Point [mm] and three w-derivatives of corner k (between legs k-1 and k) at w, into out (4, A).
+
+    w_ref        : as of `shape_at`
+    work1, work2 : (4, A) scratch
+    """
     X, Y = shape_at(corners[k], w, w_ref)
     leg_point(legs, k - 1, legs[k - 1].length - X[0], work1)
     leg_point(legs, k, Y[0], work2)

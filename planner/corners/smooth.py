@@ -1,7 +1,7 @@
 """The smooth path: the legs of a toolpath with each corner rounded within its tolerance.
 
 Corners are data, not objects. For each of the R+1 joints between legs the record holds how far the corner reaches back (d), the
-parameters of its shape, the part of the tolerance it uses, and the normal acceleration that is left for the motion.
+parameters of its shape, what it uses of the tolerance, and the normal acceleration that is left for the motion.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ class CornerFamily(Protocol):
     """Corners at n given joints: how tangent length d and middle value m depend on each other (corners/blend.py)."""
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """Tangent lengths d (n,) [mm] for middle values m (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
         ...
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Middle values m (n,) [mm] for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
         ...
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Parameters of the shape (n, 4) for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        """(n, 4) parameters of the shape for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
         ...
 
 
@@ -51,7 +51,7 @@ class CornerShape(Protocol):
         ...
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w in (0, 1) of a corner with these `params` (4,) at which two of its pieces meet."""
+        """Parameters w in (0, 1) of a corner with these `params` (4,) at which two of its curves meet."""
         ...
 
 

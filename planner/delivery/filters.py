@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slowed, standing_longer
+from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
 from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -120,7 +120,7 @@ class Behind:
     def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Places:
         """Where a motion leaves the tolerance behind the filters.
 
-        path : `path_shares` of any motion along the same path
+        path : `path_shares` (N,), (N+1,) of any motion along the same path
         """
         t, ratio, piece, near, near_time = self.errors(motion, self.filters.times)
         missed = np.flatnonzero(near > 1.0 - SPARE)
@@ -134,12 +134,12 @@ class Behind:
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
-        """(n,) True for the times (n,) [s] at which the filters hold something of two runs: there a longer rest is enough."""
+        """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a longer rest is enough."""
         early, late = self.runs_within(runs_of(motion), time)
         return early < late
 
     def runs_within(self, runs: MotionRuns, time: FloatArray) -> tuple[Array, Array]:
-        """First and last (n,) of the runs of which the filters hold something at the times (n,) [s]."""
+        """First and last (n,) of the runs of which the filters hold something at `time` (n,) [s]."""
         early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
         late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
         return np.minimum(early, late), late
@@ -217,7 +217,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
     made = motion
     for n in range(ROUNDS):
-        slower = slowed(motion, runs, factor)
+        slower = slower_runs(motion, runs, factor)
         rest = np.maximum(behind.rests(slower, runs_of(slower)), least)
         made = standing_longer(slower, runs, np.maximum(rest - gap, 0.0))
         places = behind.places(made, path)

@@ -73,7 +73,7 @@ def _rests(motion: AxisMotion) -> Array:
     return still
 
 
-def slowed(motion: TimedT, runs: MotionRuns, factor: FloatArray) -> TimedT:
+def slower_runs(motion: TimedT, runs: MotionRuns, factor: FloatArray) -> TimedT:
     """The motion with every run slowed down; its pieces stay the same, and so do its standstills.
 
     factor : (G,) by which each run takes longer [-], >= 1

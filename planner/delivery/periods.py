@@ -48,7 +48,10 @@ LEFT_MIN = 0.1
 
 
 def settled(motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool) -> MotionInTime:
-    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance."""
+    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance.
+
+    jerk_limited : whether the motion leaves a full stop with limited jerk, not with full acceleration at once
+    """
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
@@ -90,11 +93,11 @@ def _waits(
     gap = np.append(arrival[1:] - departure[:-1], np.inf)
     rows = max(CHUNK // len(tau), 1)
     for first in range(0, len(arrival), rows):
-        part = slice(first, first + rows)
-        before = _off(motion, arrival[part, None] - tau, place[part], dt)
-        behind = _off(motion, departure[part, None] + tau, place[part], dt)
+        some = slice(first, first + rows)
+        before = _off(motion, arrival[some, None] - tau, place[some], dt)
+        behind = _off(motion, departure[some, None] + tau, place[some], dt)
         apart = [np.linalg.norm(off, axis=2) for off in (before, behind[:, ::-1])]
-        risky = np.minimum(*apart).max(axis=1) > allowed[part]
+        risky = np.minimum(*apart).max(axis=1) > allowed[some]
         for r in np.flatnonzero(risky):
             k = first + r
             since = (arrival[k] + waited) % dt  # from the last sample
@@ -153,11 +156,11 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
     at = np.flatnonzero(moving)
     rows = max(CHUNK // shift.size, 1)
     for first in range(0, len(at), rows):
-        part = at[first : first + rows]
-        off = _positions(motion, when[part, None, None] + shift, dt) - vertex[part, None, None]
-        far[part] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
-        fine_off = _positions(motion, when[part, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
-        near[part] = np.linalg.norm(fine_off - vertex[part, None], axis=2).min(axis=1)
+        some = at[first : first + rows]
+        off = _positions(motion, when[some, None, None] + shift, dt) - vertex[some, None, None]
+        far[some] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
+        fine_off = _positions(motion, when[some, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
+        near[some] = np.linalg.norm(fine_off - vertex[some, None], axis=2).min(axis=1)
     return near, far
 
 

@@ -144,9 +144,9 @@ def _costates(limits, profile):
                 continue
             best, k_best = ALONE, -1
             for k in range(axes):
-                part = abs(d2_right[i, k]) * x[i] / limit[i, k]
-                if part > best:
-                    best, k_best = part, k
+                ratio = abs(d2_right[i, k]) * x[i] / limit[i, k]
+                if ratio > best:
+                    best, k_best = ratio, k
             if k_best >= 0:
                 rows[i, k_best, 0] -= over * limit[i, k_best] / d2_right[i, k_best]
     return rows, feed, pi

@@ -59,7 +59,7 @@ def chosen_rows(first: Array, chosen: Array) -> dict[str, Array]:
 
 
 def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
-    """The given rows (`chosen_rows`) of all columns, by name."""
+    """The given rows (n,) of "run", "leg" and "joint" (`chosen_rows`) of all columns, by name."""
     return {
         one.name: getattr(record, one.name)[rows[one.metadata["rows"]]]
         for one in fields(record)
@@ -68,8 +68,9 @@ def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
 
 
 def put(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
-    """All columns of a record, by name, with the given rows from `chosen`; the joint at the end of a run belongs to the next one.
+    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run belongs to the next one.
 
+    rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
     chosen : a record of these rows alone
     """
     columns: dict[str, Any] = {}

@@ -64,24 +64,24 @@ class Filters:
         return sum(T * T for T in self.times) / 12.0
 
     def kernel(self, t: FloatArray) -> FloatArray:
-        """h(t) [1/s] at times t of any shape [s]."""
+        """h(t) (n,) [1/s] at times t (n,) [s]."""
         return self._response(t, 0)
 
     def step(self, t: FloatArray) -> FloatArray:
-        """S(t), the answer to a unit step [-], at times t of any shape [s]."""
+        """S(t) (n,), the answer to a unit step [-], at times t (n,) [s]."""
         return self._response(t, 1)
 
     def ramp(self, t: FloatArray) -> FloatArray:
-        """R(t), the integral of S [s], at times t of any shape [s]."""
+        """R(t) (n,), the integral of S [s], at times t (n,) [s]."""
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """Velocity [mm/s] at times t of any shape [s] of a pulse of `speed` [mm/s] and any `duration` Tv [s] from 0 on (eq. 5)."""
+        """Velocity (n,) [mm/s] at times t (n,) [s] of a pulse of `speed` [mm/s] and any `duration` Tv [s] from 0 on (eq. 5)."""
         t = np.asarray(t, float)
         return speed * (self.step(t) - self.step(t - duration))
 
     def taps(self, dt: float) -> FloatArray:
-        """The discrete kernel (sum N_i - n + 1,) at the period dt [s], of unit sum; each length in whole periods N_i, one at least.
+        """(K,) the discrete kernel at the period dt [s], of unit sum; each length in whole periods N_i, one at least.
 
         Its variance is dt^2 (sum N_i^2 - n) / 12.
         """
@@ -92,7 +92,7 @@ class Filters:
         return taps
 
     def magnitude(self, w: FloatArray) -> FloatArray:
-        """|M| [-] at frequencies w of any shape [rad/s]: prod |sinc| (eq. 8, 9)."""
+        """|M| (W,) [-] at frequencies w (W,) [rad/s]: prod |sinc| (eq. 8, 9)."""
         return np.prod([np.abs(np.sinc(np.asarray(w) * T / (2.0 * np.pi))) for T in self.times], axis=0)
 
     def residue(self, frequency: float, damping: float) -> float:
@@ -102,7 +102,7 @@ class Filters:
         return float(np.prod([np.abs((1.0 - np.exp(-pole * T)) / (pole * T)) for T in self.times]))
 
     def move_spectrum(self, w: FloatArray, speed: float, duration: float) -> FloatArray:
-        """|A| [mm/s] of the acceleration of a full move at frequencies w of any shape [rad/s] (eq. 6); a pulse of `speed` [mm/s] and
+        """(W,) |A| [mm/s] of the acceleration of a full move at frequencies w (W,) [rad/s] (eq. 6): a pulse of `speed` [mm/s] and
         `duration` [s]."""
         return speed * np.abs(1.0 - np.exp(-1j * np.asarray(w) * duration)) * self.magnitude(w)
 
@@ -128,9 +128,9 @@ class Filters:
 def lengths_from_limits(
     V: FloatArray, A: FloatArray, J: FloatArray, margin: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 = V/A and T2 = margin A/J [s] (paper 001 par. 19), or both sqrt(margin V/J) where V is too small to reach A.
+    """T1 = V/A and T2 = margin A/J (S,) [s] (paper 001 par. 19), or both sqrt(margin V/J) where V is too small to reach A.
 
-    V, A, J : speed, acceleration and jerk along a line, of one shape [mm/s, mm/s2, mm/s3]
+    V, A, J : (S,) speed, acceleration and jerk along a line [mm/s, mm/s2, mm/s3]
     margin  : 1 is enough for a pulse that is no shorter than Td; an isolated corner needs `corner_margin`, chains of pulses 2 to 4
     """
     T1, T2 = np.asarray(V / A), np.asarray(margin * A / J)
@@ -210,10 +210,13 @@ def residual_vibration(
 ) -> FloatArray:
     """Amplitude (A,) [mm] at which a mode still rings when the motion is over.
 
-    Each axis carries an oscillator x'' + 2 z w x' + w^2 x = -a(t), at rest before; a is straight between its samples (T, A) at
-    times t (T,). By Duhamel's integral the state at the end is that of the pole, and its envelope |pole integral| / w_d.
+    Each axis carries an oscillator x'' + 2 z w x' + w^2 x = -a(t), at rest before; a is straight between its samples. By Duhamel's
+    integral the state at the end is that of the pole, and its envelope |pole integral| / w_d.
 
-    frequency : of the undamped mode [Hz];  damping : ratio z, 0 <= z < 1
+    t            : (T,) [s], ascending
+    acceleration : (T, A) [mm/s2]
+    frequency    : of the undamped mode [Hz]
+    damping      : ratio z, 0 <= z < 1
     """
     w = 2.0 * np.pi * frequency
     damped = w * np.sqrt(1.0 - damping**2)

@@ -54,6 +54,8 @@ def overlap_within(
 
     At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of it. What is left for
     the corner is reckoned with the overlap that the whole tolerance would allow, the longer one, and is half of it at least.
+
+    V, sin_half, T1, T2 : (n,) as of `corner_error`
     """
     whole = overlap_time(tol, V, sin_half, T1, T2)
     bend = 2 * V * sin_half * np.minimum(whole / 2 / T2, 1.0) / T1

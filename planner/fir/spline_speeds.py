@@ -38,7 +38,12 @@ MEAN_OVER = 0.02
 
 
 def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) how far inside circles of radius rho (n,) [mm] the filtered point runs at speed v (n,) [mm/s]: exact (module text)."""
+    """(n,) how far inside a circle the filtered point runs [mm]: exact (module text).
+
+    rho    : (n,) radius [mm]
+    v      : (n,) speed [mm/s]
+    T1, T2 : (n,) filters [s]
+    """
     lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
     return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
 

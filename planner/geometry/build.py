@@ -95,7 +95,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
-    """Angles between unit vectors u1 and u2, (n, A) each, row by row (n,) [rad]. Exact to rounding near 0 and pi, unlike acos."""
+    """(n,) angles between the unit vectors u1 and u2 (n, A), row by row [rad]. Exact to rounding near 0 and pi, unlike acos."""
     return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
 
 

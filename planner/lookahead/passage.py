@@ -83,5 +83,5 @@ def _table(record: LegLimits | Passage, dtype: np.dtype) -> Array:
 
 
 def passage_of(ways: Array) -> Passage:
-    """The record of a table (n+1,) of `WAY`."""
+    """The record of a table of ways (n+1,), records `WAY`."""
     return Passage(**{name: ways[name] for name in WAY.names or ()})

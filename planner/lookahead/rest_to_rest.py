@@ -36,7 +36,11 @@ def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: Floa
 def rest_to_rest_phases(
     length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Durations [s] and jerks along the block [mm/s3], each (n, 7), of the moves of `rest_to_rest_times`; arguments as there."""
+    """Durations [s] and jerks along the block [mm/s3], each (n, 7), of the moves of `rest_to_rest_times`.
+
+    length  : (n,) [mm]
+    v, a, j : (n,) limits as there
+    """
     peak = _peak(length, v, a, j)
     largest = np.minimum(a, np.sqrt(peak * j))
     rise = largest / j

@@ -28,7 +28,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.constraints.own import ratios
 from planner.delivery.filters import Behind
-from planner.delivery.pacing import runs_of, slowed, standing_longer
+from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job
@@ -165,7 +165,7 @@ class _Settling:
         slower, first = np.ones(len(runs)), np.ones(len(planned.problem))
         delivered = ShapedMotion(plain, self.shaper)
         for n in range(ROUNDS):
-            motion = slowed(plain, runs, slower)
+            motion = slower_runs(plain, runs, slower)
             motion = standing_longer(motion, runs_of(motion), self._rests(motion, planned))
             delivered = ShapedMotion(motion, self.shaper)
             factor = self._factor(motion, delivered)

@@ -17,7 +17,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.constraints import normal_limit
 from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
-from planner.delivery.pacing import runs_of, slowed
+from planner.delivery.pacing import runs_of, slower_runs
 from planner.geometry.toolpath import Toolpath
 from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
@@ -186,4 +186,4 @@ def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion 
 
 def slower(motion: Motion, factor: FloatArray) -> Motion:
     """Every run (G,) slowed down by its factor."""
-    return slowed(motion, runs_of(motion), factor)
+    return slower_runs(motion, runs_of(motion), factor)

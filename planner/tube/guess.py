@@ -61,12 +61,16 @@ class Guess:
         return len(self.h)
 
     def slower(self, by: float) -> Guess:
-        """The same way in `by` times the time."""
+        """The same path in `by` times the time."""
         return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
 
 
 def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> Guess:
-    """Cut a motion along the run into steps. vertex_time: (R+1,) when it passes the vertices [s], strictly ascending."""
+    """Cut a motion along a run of R legs into steps.
+
+    motion      : along this run alone, at rest at both ends
+    vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
+    """
     leg, nodes = _steps(run, motion, vertex_time)
     of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
     state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
@@ -98,6 +102,7 @@ def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> tuple[A
 
 
 def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArray:
+    """(n, A) a column (T, A) at times t (T,), interpolated at the times (n,)."""
     return np.stack([np.interp(at, t, values) for values in column.T], axis=1)
 
 

@@ -114,7 +114,11 @@ class TubeSolution:
 
 @dataclass(frozen=True, kw_only=True)
 class TubeNLP:
-    """The free optimum by ipopt. tol: relative tolerance of optimality [-]; max_iterations: per run and start."""
+    """The free optimum by ipopt.
+
+    tol            : relative tolerance of optimality [-], > 0
+    max_iterations : per run and start
+    """
 
     tol: float = 1e-5
     max_iterations: int = 300
@@ -124,7 +128,10 @@ class TubeNLP:
             raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
-        """The best motion near the guess, never slower than it; a failure from every start is the status of the last."""
+        """The best motion near the guess, never slower than it; a failure from every start is the status of the last.
+
+        Raises InputError if casadi is missing.
+        """
         iterations, took = 0, 0.0
         for slower in SLOWER:
             found = self._solve(run, guess.slower(slower))
@@ -152,8 +159,8 @@ class TubeNLP:
 
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
-        part = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
-        unit = ca.DM(part / length).T
+        mean_step = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
+        unit = ca.DM(mean_step / length).T
         w_node, w_step = (
             ca.MX.sym("node", 3 * axes + 1, steps + 1),
             ca.MX.sym("step", axes + 3 + watched, steps),
@@ -186,14 +193,15 @@ class TubeNLP:
             "feed",
             "feed_end",
             "normal",
-            "part",
+            "mean_step",
             "pace",
         )
-        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace = map(
+        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace = map(
             ca.SX.sym, scalars
         )
 
         def apart(point: Any, place: Any) -> Any:
+            """Squared distance of a point from the place on its leg."""
             turned = rate * (place - begin)
             circle = ca.cos(turned) * e1 + ca.sin(turned) * e2
             return ca.sumsqr(point - base - drift * (place - begin) - radius * circle)
@@ -203,7 +211,7 @@ class TubeNLP:
             (gap, 0.0, 0.0),
             (ca.vertcat(apart(p + h * v / 3, s1), apart(p1 - h * v1 / 3, s2)) / room**2, -np.inf, 1.0),
             (apart(p1, s3) / room_end**2, -np.inf, 1.0),
-            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_part, 0.0, np.inf),
+            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_mean, 0.0, np.inf),
         ]
         if (run.feed > run.velocity.min()).any():
             rows.append((ordinate / v_max, -1.0, 1.0))
@@ -223,10 +231,10 @@ class TubeNLP:
         states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2, along)]
         numbers = ca.vertcat(
             *(base, drift, e1, e2),
-            *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace),
+            *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace),
         )
         of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
-        data = ca.DM(step_numbers(run, guess, part[:-1], length, speed, acc).T)
+        data = ca.DM(step_numbers(run, guess, mean_step[:-1], length, speed, acc).T)
         constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
         row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
         row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
@@ -234,10 +242,10 @@ class TubeNLP:
         # ---- limits and boundary ----------------------------------------------------------------------------------------------
         node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
         node_min = -node_max
-        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (run.offset[leg] / part[:-1])[at_vertex]
+        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (run.offset[leg] / mean_step[:-1])[at_vertex]
         for end in (0, -1):
             rest = np.concatenate(
-                [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / part[end]]]
+                [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / mean_step[end]]]
             )
             node_min[end] = node_max[end] = rest
         longer = LONGER_WATCHED if watched else LONGER
@@ -250,13 +258,13 @@ class TubeNLP:
 
         # ---- initial guess ----------------------------------------------------------------------------------------------------
         p0, v0, a0 = guess.state[:, 0] / length, guess.state[:, 1] / speed, guess.state[:, 2] / acc
-        place = np.append(guess.place[:, 0], run.offset[-1]) / part
+        place = np.append(guess.place[:, 0], run.offset[-1]) / mean_step
         node_start = np.column_stack([p0, v0, a0, place])
         step_start = np.column_stack(
             [
                 np.diff(a0, axis=0) / h_guess[:, None],
                 h_guess,
-                guess.place[:, 1:3] / part[:-1, None],
+                guess.place[:, 1:3] / mean_step[:-1, None],
                 np.tile(acceleration_along(guess)[:, None] / acc, (1, watched)),
             ]
         )
@@ -286,11 +294,12 @@ class TubeNLP:
             solve_time=took,
             h=found[:, axes] * second,
             jerk=found[:, :axes] * jerk,
-            place=nodes[:, -1] * part,
+            place=nodes[:, -1] * mean_step,
         )
 
 
 def _options(settings: TubeNLP) -> dict[str, Any]:
+    """What ipopt is asked for."""
     return {
         "print_time": False,
         "ipopt.print_level": 0,

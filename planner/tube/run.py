@@ -84,7 +84,8 @@ class TubeRun:
 
     @property
     def step_max(self) -> FloatArray:
-        """(R,) largest part of a leg that one step may cover [mm]: where it bends away by `ARC_FRACTION` of the budget; inf on lines."""
+        """(R,) largest length on a leg that one step may cover [mm]: where it bends away by `ARC_FRACTION` of the budget; inf on
+        lines."""
         with np.errstate(divide="ignore"):
             return np.sqrt(8.0 * ARC_FRACTION * self.budget / self.curvature)
 
@@ -99,13 +100,13 @@ class TubeRun:
         return np.append(0.0, np.cumsum(self.length))
 
     def points(self, leg: Array, x: FloatArray) -> FloatArray:
-        """(n, A) the path at the places x (n,) [mm] on the legs (n,)."""
+        """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
         circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
         return self.base[leg] + self.drift[leg] * x[:, None] + self.radius[leg, None] * circle
 
     def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
-        """(n, A) dP/dx there [-]."""
+        """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
         across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
         return self.drift[leg] + (self.radius * self.rate)[leg, None] * across

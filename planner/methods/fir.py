@@ -38,6 +38,8 @@ class FirMethod(Method):
 
     plain           : the paper's rules as they are, whatever they exceed
     profile_filters : lengths of the two filters that the setpoints are made with [s]; None to choose them
+
+    Raises InputError unless these are two positive lengths.
     """
 
     plain: bool = False
@@ -80,6 +82,7 @@ def motion_of(guide: LegGuide, motion: Filtered) -> AxisMotion:
 
 
 def _sentence(plan: Schedule) -> str:
+    """What the plan says of its corners and filters."""
     waits = int((plan.gap()[plan.guide.inner] > 0).sum())
     turns = int((plan.guide.sin_half > 0).sum())
     longest = plan.T1 + plan.T2

@@ -61,6 +61,8 @@ class FirSplineMethod(Method):
     plain           : the paper's speeds and filters as they are, whatever they exceed
     profile_filters : lengths of the two filters that the setpoints are made with [s]; None to choose them
     phase_lag       : phi of v_ph [rad], for `plain`
+
+    Raises InputError unless the lengths and phi are positive and finite.
     """
 
     plain: bool = False
@@ -92,9 +94,13 @@ class FirSplineMethod(Method):
         tolerance: float | None = None,
         progress: Progress | None = None,
     ) -> Plan:
-        """Plan the motion along a curve at `feed` [mm/s]. The plan's program are chords of it, within which it is verified.
+        """Plan the motion along a curve. The plan's program are chords of it, within which it is verified.
 
-        Raises InputError for what cannot be planned.
+        feed      : programmed feed [mm/s]
+        tolerance : contour tolerance [mm]; None for that of the machine
+        progress  : called with the stage's name and the fraction done; None for nobody
+
+        Raises InputError for a feed, a tolerance or a curve that cannot be planned.
         """
         stages = Stages(progress)
         with stages.stage("geometry"):
@@ -119,6 +125,7 @@ class FirSplineMethod(Method):
         return best
 
     def _finish(self, job: Job, guide: ChordGuide, corner: str | None) -> Plan:
+        """Plan speeds and filters along a guide, and deliver the motion."""
         with job.stage("solve"):
             alone = guide.pick(np.ones(guide.runs, bool))
             speeds = self._plain(alone, job.machine) if self.plain else fastest_speeds(alone, job.machine)
@@ -156,7 +163,7 @@ class FirSplineMethod(Method):
         return dataclasses.replace(toolpath, joint=best)
 
     def _plain(self, guide: ChordGuide, machine: Machine) -> ChordSpeeds:
-        """Paper 001 as it is: T1 = v_p/a, T2 = a/j with the largest v_p of each run, and v_sc."""
+        """Paper 001 as it is: T1 = v_p/a, T2 = a/j (par. 19) with the largest v_p of each run, and v_sc (par. 29)."""
         acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
         T1, T2 = guide.largest(guide.feed) / acceleration, acceleration / jerk
         T1, T2 = (np.maximum(T1, T2), np.minimum(T1, T2)) if guide.own is None else guide.given_filters()

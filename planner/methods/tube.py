@@ -185,6 +185,7 @@ class _Starts:
 
 
 def _check_size(runs: list[TubeRun], program: Program) -> None:
+    """Raise InputError for a job with more legs, or steps on arcs, than `LEGS_MAX`."""
     legs = sum(float(np.maximum(np.ceil(run.length / run.step_max), 1.0).sum()) for run in runs)
     if legs > LEGS_MAX:
         raise InputError(
@@ -281,4 +282,5 @@ def _spliced(toolpath: Toolpath, found: _Found) -> SplicedRun:
 
 
 def _lines(run: TubeRun, toolpath: Toolpath) -> str:
+    """The source lines of a run."""
     return f"{toolpath.line[run.first[0]]} to {toolpath.line[run.first[-1] - 1]}"

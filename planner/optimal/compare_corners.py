@@ -72,7 +72,7 @@ def with_corners(
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
-    job.tell("bound on corners", found=corners.time.sum(), stretches=len(ranked), left=len(left))
+    job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
     for _ in range(2):  # the second time on those that turned out to be faster
         fits = shape.laid.fits & ~chosen[piece]
         if (fits == shape.laid.fits).all():
@@ -86,7 +86,7 @@ def with_corners(
             found=planned.solution.cycle_time,
             before=best.solution.cycle_time,
             kept=planned.faster_than(best),
-            stretches=int(chosen.sum()),
+            runs=int(chosen.sum()),
         )
         slower = chosen & (planned.stop_to_stop() >= best.stop_to_stop())
         if not slower.any():

@@ -61,7 +61,7 @@ class ThirdOrder:
 class SecondOrder:
     """All limits but jerk; multipliers are found from the profile (feedrate/costates.py).
 
-    to_tighten : limits will be tightened in places, on straight stretches too, which then need points inside
+    to_tighten : limits will be tightened in places, on straight elements too, which then need points inside
     """
 
     solver: FeedrateSolver
@@ -90,7 +90,7 @@ def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolve
 
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
-    """Solve, add the points where the profile switches on straight stretches, and solve again; a failure is the solution's status."""
+    """Solve, add the points where the profile switches on straight elements, and solve again; a failure is the solution's status."""
     problem = feedrate_problem(samples, machine, measured=True)
     solution = solver.solve(problem)
     if solution.solved:
@@ -101,7 +101,7 @@ def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solve
 
 
 def _tell(job: Job, planned: OnPath, finer: float) -> None:
-    facts: dict[str, Any] = {"points": len(planned.samples), "stretches": len(planned.samples.piece) - 1}
+    facts: dict[str, Any] = {"points": len(planned.samples), "runs": len(planned.samples.piece) - 1}
     if finer != 1.0:
         facts["resolution"] = finer
     if planned.solution.iterations:

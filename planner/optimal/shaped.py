@@ -255,7 +255,7 @@ def _miss(into: FloatArray, out: FloatArray, rest: FloatArray, shaper: Shaper) -
 
 
 def shaped_plan(job: Job, settings: Settings) -> Plan:
-    """The plan of a job with shaped set points. Raises InputError for a machine without vibration modes; else as `shaped`."""
+    """The plan of a job with shaped setpoints. Raises InputError for a machine without vibration modes; else as `shaped`."""
     if not job.machine.modes:
         raise InputError(
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "

@@ -213,7 +213,7 @@ def _joints(path: SmoothPath) -> Joints:
 
 def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
     """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the free part of each leg
-    is stretched from its first and last block's ends, and the margins stay as they are."""
+    is scaled from its first and last block's ends, and the margins stay as they are."""
     legs, element, segment = path.legs, samples.element, samples.segment
     free = element >= 0
     leg = np.maximum(element, 0)

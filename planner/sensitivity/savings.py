@@ -41,7 +41,7 @@ from planner.machine import Machine
 from planner.path.samples import PathSamples, moved_grid
 
 STEP = 0.1  # of an interval of the thinned grid [a/j]; with 0.2 more jerk came out up to twice as valuable (pentagon)
-CELLS_MIN = 12  # intervals that a piece keeps at least, as far as it has them
+INTERVALS_MIN = 12  # intervals that a piece keeps at least, as far as it has them
 POINTS = 25_000  # of all thinned problems together, at least; a quarter of the job's grid if that is more
 WINDOW = 1_000  # points of a window, where the thinned grid is too large
 SOLVER = JerkLimited(tol=1e-5)  # with a gap a tenth of the usual one: differences of times are wanted
@@ -188,10 +188,10 @@ def _kept(samples: PathSamples, solution: FeedrateSolution, machine: Machine, *,
     count = beyond - first
     t = np.cumsum(solution.duration) - solution.duration
     lasting = t[beyond - 1] - t[first]
-    cells = np.maximum(np.ceil(lasting / step), np.minimum(CELLS_MIN, count))
-    cell = np.floor((t - np.repeat(t[first], count)) / np.repeat(lasting / cells, count))
-    few = np.repeat(count <= 2 * CELLS_MIN, count)
-    keep = few | np.append(True, cell[1:] != cell[:-1])
+    steps = np.maximum(np.ceil(lasting / step), np.minimum(INTERVALS_MIN, count))
+    number = np.floor((t - np.repeat(t[first], count)) / np.repeat(lasting / steps, count))
+    few = np.repeat(count <= 2 * INTERVALS_MIN, count)
+    keep = few | np.append(True, number[1:] != number[:-1])
     x = solution.feed_sq
     keep[1:-1] |= (x[1:-1] <= x[:-2]) & (x[1:-1] < x[2:])
     if elements:
@@ -215,7 +215,7 @@ def windows_of_grid(piece: Array, kept: Array, most: int) -> tuple[Array, Array,
         )
         whole = np.isin(edges, start)  # parts of pieces need room to start and stop
         for (a, b), ends in zip(pairwise(edges), pairwise(whole), strict=True):
-            if all(ends) or b - a > CELLS_MIN:
+            if all(ends) or b - a > INTERVALS_MIN:
                 chosen.append(np.arange(a, b))
     sizes = np.cumsum([0, *(len(part) for part in chosen)])
     return sizes, kept[np.concatenate(chosen)], True

@@ -44,7 +44,7 @@ def plans(request) -> list[SpeedPlan]:
     return plans_along(request.param)
 
 
-def test_stretches_picked_and_put_back_are_the_plan(plans):
+def test_runs_picked_and_put_back_are_the_plan(plans):
     one, other = plans[0], plans[-1]
     assert one.guide.runs == 3
     chosen = np.array([True, False, True])
@@ -81,7 +81,7 @@ def test_slowed_down_a_plan_keeps_everything(plans):
         assert (slower.time() >= plan.time() * (1 - 1e-12)).all()
 
 
-def test_each_stretch_gets_the_plan_that_is_fastest_for_it(plans):
+def test_each_run_gets_the_plan_that_is_fastest_for_it(plans):
     times = np.array([plan.time() for plan in plans])
     alone = np.array([slow_down(plan, MACHINE).time() for plan in plans])
     best = settled_fastest(plans, times, MACHINE).time()

@@ -49,8 +49,11 @@ class Prices:
     def from_relative(
         cls, problem: FeedrateProblem, acceleration: FloatArray, jerk: FloatArray, feed_sq_max: FloatArray
     ) -> Prices:
-        """From dT/d(ln limit) [s]: of the rows of each axis (A,), and of every point's feed_sq_max (P,), which counts for the axis
-        limit it comes from."""
+        """From dT/d(ln limit) [s].
+
+        acceleration, jerk : (A,) of the rows of each axis
+        feed_sq_max        : (P,) of every point's bound, which counts for the axis limit it comes from
+        """
         names = np.array(problem.bound_names)[problem.feed_sq_bound]
         velocity = np.array([2.0 * feed_sq_max[names == f"velocity.{axis}"].sum() for axis in problem.axes])
         jump = np.array([feed_sq_max[names == f"curvature_jump.{axis}"].sum() for axis in problem.axes])
@@ -149,7 +152,11 @@ class FeedrateSolution:
         solver: str,
         solve_time: float,
     ) -> FeedrateSolution:
-        """A second-order optimum: constant acceleration on every interval."""
+        """A second-order optimum: constant acceleration on every interval.
+
+        feed_sq : (P,) [mm2/s2]
+        acc_s   : (P,) acceleration along the path on the interval to the right [mm/s2]
+        """
         return cls(
             status=Status.OPTIMAL,
             sentence=sentence,
@@ -195,8 +202,12 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1});
-    0 at the end of a piece. Solutions carry their own `duration`, exact at any order."""
+    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}).
+
+    0 at the end of a piece. Solutions carry their own `duration`, exact at any order.
+
+    feed_sq : (P,) [mm2/s2]
+    """
     feed = np.sqrt(feed_sq)
     times = np.zeros(len(problem))
     inner = np.flatnonzero(problem.interval)

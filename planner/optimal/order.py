@@ -30,10 +30,15 @@ class Order(Protocol):
     jerk_limited: ClassVar[bool]
 
     @property
-    def solver(self) -> FeedrateSolver: ...
+    def solver(self) -> FeedrateSolver:
+        """What finds the feed along a path."""
+        ...
 
     def solve(self, path: SmoothPath, job: Job, finer: float = 1.0) -> OnPath:
-        """The time-optimal motion on a path, on a grid of `finer` times the usual resolution."""
+        """The time-optimal motion on a path; a failure is the solution's status.
+
+        finer : factor on the grid's usual resolution [-]
+        """
         ...
 
 
@@ -46,6 +51,7 @@ class ThirdOrder:
     jerk_limited: ClassVar[bool] = True
 
     def solve(self, path: SmoothPath, job: Job, finer: float = 1.0) -> OnPath:
+        """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; `finer` as of `Order`."""
         with job.stage("geometry"):
             samples = sample_path(path, job.machine, _resolution(finer), third_order=True)
         with job.stage("solve") as progress:
@@ -70,6 +76,7 @@ class SecondOrder:
     jerk_limited: ClassVar[bool] = False
 
     def solve(self, path: SmoothPath, job: Job, finer: float = 1.0) -> OnPath:
+        """The time-optimal motion without jerk limits, on a grid with points where the profile switches; `finer` as of `Order`."""
         with job.stage("geometry"):
             samples = sample_path(path, job.machine, _resolution(finer))
         with job.stage("solve"):

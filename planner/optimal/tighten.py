@@ -98,7 +98,7 @@ def _most(y: FloatArray, smooth: Array) -> FloatArray:
 
 
 def fastest_inside(law: TimeLaw) -> FloatArray:
-    """When the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
     lasting = np.diff(np.append(law.t, law.end))
     braking = np.flatnonzero(law.jerk_s < 0.0)
     tau = -law.acc_s[braking] / law.jerk_s[braking]

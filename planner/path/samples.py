@@ -107,7 +107,7 @@ class PathSamples:
 
     @property
     def intervals(self) -> Array:
-        """Indices of the points that have an interval to their right."""
+        """(n,) indices of the points that have an interval to their right."""
         inner = np.ones(len(self), dtype=bool)
         inner[self.piece[1:] - 1] = False
         return np.flatnonzero(inner)
@@ -240,7 +240,7 @@ def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
 
 
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
-    """Add grid points at arc lengths `s` (n,) inside straight intervals (n,), sorted by place.
+    """Add grid points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by place.
 
     Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
     """
@@ -283,7 +283,7 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
 
 
 def straight(legs: Array, element: Array) -> Array:
-    """True for the elements that are the free part of a straight leg."""
+    """(n,) True where `element` (n,) is what is free of a straight leg; `legs` (R,) are records of geometry/legs.py."""
     leg = (element >= 0) & (element < len(legs))
     return leg & ~legs["round"][np.where(leg, element, 0)]
 

@@ -202,7 +202,12 @@ def _kept(samples: PathSamples, solution: FeedrateSolution, machine: Machine, *,
 
 
 def windows_of_grid(piece: Array, kept: Array, most: int) -> tuple[Array, Array, bool]:
-    """Pieces (G+1,) of a thinned grid and its points, at most so many in windows spread over all of them; True if that is not all."""
+    """Pieces (G+1,) of a thinned grid and its points (k,), in windows spread over all of them; True if these are not all points.
+
+    piece : (G+1,) of the grid that was thinned
+    kept  : (n,) its points that the thinned grid keeps
+    most  : number of points in the windows, at most
+    """
     start = np.searchsorted(kept, piece)
     if len(kept) <= most:
         return start, kept, False
@@ -213,11 +218,11 @@ def windows_of_grid(piece: Array, kept: Array, most: int) -> tuple[Array, Array,
         edges = np.unique(
             np.concatenate([[begin, begin + WINDOW], start[(start > begin) & (start < begin + WINDOW)]])
         )
-        whole = np.isin(edges, start)  # parts of pieces need room to start and stop
+        whole = np.isin(edges, start)  # what is cut from a piece needs room to start and stop
         for (a, b), ends in zip(pairwise(edges), pairwise(whole), strict=True):
             if all(ends) or b - a > INTERVALS_MIN:
                 chosen.append(np.arange(a, b))
-    sizes = np.cumsum([0, *(len(part) for part in chosen)])
+    sizes = np.cumsum([0, *(len(window) for window in chosen)])
     return sizes, kept[np.concatenate(chosen)], True
 
 

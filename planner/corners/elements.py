@@ -1,6 +1,6 @@
-"""Elements: the smooth path as a sequence of curves, the free part of a leg, a corner or a span, each over its own parameter w.
+"""Elements: the smooth path as a sequence of curves, what is free of a leg, a corner or a span, each over its own parameter w.
 
-Of a path with R legs an element is numbered r in [0, R) for the free part of leg r (w is the leg's x [mm]), ~k < 0 for the corner at
+Of a path with R legs an element is numbered r in [0, R) for what is free of leg r (w is the leg's x [mm]), ~k < 0 for the corner at
 joint k (w in [0, 1]), and R + i for span i of the spline (w in [0, 1]).
 This file is the one place where an element's geometry is turned from w to arc length:
 
@@ -62,7 +62,7 @@ def element_table(path: SmoothPath) -> ElementTable:
 
 @njit(cache=True, error_model="numpy")
 def is_straight(legs, element):
-    """True on the free part of a straight leg."""
+    """True for the element that is free of a straight leg; legs (R,): records of geometry/legs.py."""
     return 0 <= element < len(legs) and not legs[element].round
 
 

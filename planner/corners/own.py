@@ -62,6 +62,7 @@ class PolynomialCorner(ABC):
         return coefficients
 
     def _refuse(self, why: str) -> None:
+        """Raise InputError."""
         raise InputError(f"corner '{self.name or type(self).__name__}': retreat(w): {why}")
 
     @cached_property

@@ -29,6 +29,7 @@ def per_joint(dtype: type = np.float64, *, finite: bool = True, axes: bool = Fal
 
 
 def _column(rows: str, dtype: type, width: int | None, finite: bool = True) -> Any:
+    """A field with its rows, type and width in the metadata; width -1 for one column per axis."""
     return field(metadata={"rows": rows, "dtype": dtype, "width": width, "finite": finite})
 
 

@@ -107,6 +107,7 @@ class Filters:
         return speed * np.abs(1.0 - np.exp(-1j * np.asarray(w) * duration)) * self.magnitude(w)
 
     def _response(self, t: FloatArray, integrals: int) -> FloatArray:
+        """The kernel, integrated 0, 1 or 2 times, at times t (n,) [s] (module text)."""
         t = np.asarray(t, float)
         early = np.clip(np.minimum(t, self.delay - t), 0.0, None)
         power = len(self.times) + integrals - 1
@@ -181,6 +182,7 @@ def damped_period(frequency: float, damping: float) -> float:
 
 
 def _multiple(T: FloatArray, period: float) -> FloatArray:
+    """T (S,) [s] rounded up to whole periods, one at least."""
     return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
 
 

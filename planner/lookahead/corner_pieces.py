@@ -123,6 +123,7 @@ def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[
 
 
 def _empty(count: int) -> PieceRows:
+    """Room for so many pieces."""
     return PieceRows(
         joint=np.zeros(count, np.int64),
         leg=np.zeros(count, np.int64),

@@ -113,6 +113,7 @@ class FirSplineMethod(Method):
         job = Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
 
         def within(fraction: float) -> Plan:
+            """The plan within this fraction of what the chords leave of the tolerance."""
             with job.stage("geometry"):
                 guide = guide_of_curve(
                     curve, machine, feed, fraction * (whole - chords), ends, back, self.profile_filters

@@ -82,6 +82,7 @@ class TubeMethod(Method):
     def _plan(
         self, job: Job, made: Delivered | None, status: Status, sentence: str, grid_points: int
     ) -> Plan:
+        """The plan of this method with what was delivered."""
         return job.plan(
             made,
             method="tube",

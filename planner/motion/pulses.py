@@ -162,6 +162,7 @@ def _resolution(axis: str, steps: float) -> float:
 
 
 def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
+    """The pulses of axis k."""
     K = _resolution(trajectory.axes[k], steps)
     place = K * (trajectory.position[:, k] - trajectory.position[0, k])
     rate = K * trajectory.velocity[:, k]
@@ -215,6 +216,7 @@ def _cubic(moved, v0, v1):
 
 @njit(cache=True, error_model="numpy")
 def _value(a, b, c, q):
+    """a q^3 + b q^2 + c q."""
     return q * (c + q * (b + q * a))
 
 

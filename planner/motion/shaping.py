@@ -116,6 +116,7 @@ class ShapedMotion:
 
     @cached_property
     def _ends(self) -> tuple[Trajectory, Trajectory]:
+        """The first and the last moment of the motion."""
         first, last = (self.motion.at(np.array([time]), 1.0) for time in (0.0, self.motion.end))
         return first, last
 

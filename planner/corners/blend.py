@@ -172,7 +172,7 @@ def _own_shape(d, c, w):
 def shape_at(corner, w, w_ref):
     """Retreat X and advance Y of a corner record at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
 
-    w_ref : a parameter inside the interval that is meant; it chooses the branch where two pieces meet
+    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner meet
     """
     p = corner.params
     if corner.shape == SHAPE_BEZIER:

@@ -1,14 +1,14 @@
 """Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
 
-The path is a chain of straight links (lines, and arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted
-is for every point n a link i(n) that never goes back, within the link's budget, such that every vertex between i(n-1) and i(n) is
-within `MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
+The path is a chain of straight pieces (arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is for every
+point n a piece i(n) that never goes back, within the piece's budget, such that every vertex between i(n-1) and i(n) is within
+`MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
 
-    sum of |point - link|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
+    sum of |point - piece|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
                               +  budget^2 for every point that is faster than its block's feed allows
 
-is found by dynamic programming over the links that can be reached from the point before, a window of about two budgets, so that
-time and memory are linear in points and links. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
+is found by dynamic programming over the pieces that can be reached from the point before, a window of about two budgets, so that
+time and memory are linear in points and pieces. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
 the vertices last is taken: a motion that stands on a vertex is still at the block before.
 
 A motion that keeps the tolerance has such an assignment. Where nothing can be reached the budgets are widened, up to `WIDEST` times.
@@ -37,19 +37,18 @@ FIRST_WIDER, WIDEST = (
 ENTERED, THROUGH = (
     1,
     2,
-)  # bits of a mark: best entered on the chord before its point; best entered when left on the same chord
+)  # bits of a cell: best entered on the chord before its point; best entered when left on the same chord
 
 
 class Chain(NamedTuple):
-    """K straight links and the K+1 vertices around them.
+    """K straight pieces and the K+1 vertices around them.
 
     vertex    : (K+1, A) [mm]
     at_vertex : (K+1,) budget there [mm]
-    budget    : (K,) of each link, the larger one of its block's two joints [mm]
-    skipped   : (K,) price of leaving a link without a point [mm2], 0 for the chords of an arc
+    budget    : (K,) of each piece, the larger one of its block's two joints [mm]
+    skipped   : (K,) price of leaving a piece without a point [mm2], 0 for the parts of an arc
     feed      : (K,) programmed [mm/s]
-    segment   : (K,) segment of the toolpath that each link stands for, all or some of it
-    first     : (M+1,) first link of each of M segments, then K
+    segment   : (K,) of the toolpath; first (M+1,) piece of each segment
     """
 
     vertex: FloatArray
@@ -62,16 +61,16 @@ class Chain(NamedTuple):
 
 
 def chain_of(toolpath: Toolpath) -> Chain:
-    """A toolpath as straight links."""
+    """The pieces of a toolpath."""
     count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
     first = np.concatenate([[0], np.cumsum(count)])
     segment = np.repeat(np.arange(len(toolpath)), count)
     vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])
-    number = np.arange(len(segment)) - first[segment]  # of a link within its segment
-    inner = np.flatnonzero(number)
+    part = np.arange(len(segment)) - first[segment]
+    inner = np.flatnonzero(part)
     at = segment[inner]
     vertex[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(
-        toolpath, at, toolpath.length[at] * number[inner] / count[at]
+        toolpath, at, toolpath.length[at] * part[inner] / count[at]
     )
     budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
     at_vertex = np.append(budget, toolpath.tolerance[-1])
@@ -81,41 +80,34 @@ def chain_of(toolpath: Toolpath) -> Chain:
 
 
 def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Array | None:
-    """(T,) segment of the toolpath that each point of a motion is at; None if the motion leaves the path, or ends elsewhere.
-
-    point : (T, A) in the order of the motion [mm]
-    feed  : (T,) speed there [mm/s]
-    """
+    """(T,) segment of the toolpath that each point (T, A) of a motion is at, moving at `feed` (T,) [mm/s]; None where that cannot be
+    told: the motion leaves the path, or does not end where it ends."""
     chain = chain_of(toolpath)
-    found, link, _ = in_order(chain, np.ascontiguousarray(point, dtype=np.float64), feed)
-    return chain.segment[link] if found else None
+    found, piece, _ = in_order(chain, np.ascontiguousarray(point, dtype=np.float64), feed)
+    return chain.segment[piece] if found else None
 
 
 @njit(cache=True, error_model="numpy")
 def _from_chord(begin, end, point):
-    """Squared distance of a point (A,) from a chord, and the fraction of the chord at its foot."""
+    """Squared distance of a point (A,) from a chord, and the share of the chord at its foot."""
     along, length_sq = 0.0, 0.0
     for k in range(len(point)):
         u = end[k] - begin[k]
         along += (point[k] - begin[k]) * u
         length_sq += u * u
-    fraction = min(max(along / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0
+    share = min(max(along / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0
     off_sq = 0.0
     for k in range(len(point)):
-        off_sq += (point[k] - begin[k] - fraction * (end[k] - begin[k])) ** 2
-    return (off_sq if off_sq > SAME_PLACE * SAME_PLACE else 0.0), fraction
+        off_sq += (point[k] - begin[k] - share * (end[k] - begin[k])) ** 2
+    return (off_sq if off_sq > SAME_PLACE * SAME_PLACE else 0.0), share
 
 
 @njit(cache=True, error_model="numpy")
 def in_order(chain, point, feed):
-    """Match points with a chain (module text).
+    """Match points (n, A) with feeds (n,) with a chain.
 
-    chain : `Chain`
-    point : (n, A) in the order of the motion [mm]
-    feed  : (n,) speed there [mm/s]
-
-    Returns whether that succeeds; (n,) the link of each point; (K+1,) where each vertex is passed: the number of the point before plus
-    the fraction of the chord behind it.
+    Returns whether that succeeds; (n,) the piece of each point; (K+1,) where each vertex is passed, the point before plus the share of
+    the chord behind it.
     """
     vertex, at_vertex, budget, skipped, cap = (
         chain.vertex,
@@ -124,19 +116,19 @@ def in_order(chain, point, feed):
         chain.skipped,
         chain.feed,
     )
-    count, links = len(point), len(budget)
-    cost, new = np.empty(links), np.empty(links)
+    count, pieces = len(point), len(budget)
+    cost, new = np.empty(pieces), np.empty(pieces)
     first, begin = np.empty(count, np.int64), np.empty(count, np.int64)
-    marks, used = np.empty(4 * count + 64, np.uint8), 0
-    link, crossed = np.empty(count, np.int64), np.empty(links + 1)
-    low, high = 0, 0  # the links that the point before can be at
+    cells, used = np.empty(4 * count + 64, np.uint8), 0
+    piece, crossed = np.empty(count, np.int64), np.empty(pieces + 1)
+    low, high = 0, 0  # the pieces that the point before can be at
     for n in range(count):
         before = point[max(n - 1, 0)]
         wide = 1.0
         while True:
-            lowest, highest, mark = links, -1, used
+            lowest, highest, cell = pieces, -1, used
             stay, enter = np.inf, 0.0 if n == 0 else np.inf
-            for i in range(low, links):
+            for i in range(low, pieces):
                 if i > low:
                     off_sq, _ = _from_chord(before, point[n], vertex[i])
                     within = off_sq <= (wide * MISSED * at_vertex[i] + SAME_PLACE) ** 2
@@ -144,14 +136,14 @@ def in_order(chain, point, feed):
                 stay = cost[i] if n > 0 and i <= high else np.inf
                 if i > high and enter == np.inf:
                     break
-                if mark == len(marks):
-                    more = np.empty(2 * mark, np.uint8)
-                    for k in range(mark):
-                        more[k] = marks[k]
-                    marks = more
-                through = THROUGH if i + 1 < links and enter + skipped[i] < stay else 0
-                marks[mark] = through | (ENTERED if enter < np.inf and enter <= stay else 0)
-                mark += 1
+                if cell == len(cells):
+                    more = np.empty(2 * cell, np.uint8)
+                    for k in range(cell):
+                        more[k] = cells[k]
+                    cells = more
+                through = THROUGH if i + 1 < pieces and enter + skipped[i] < stay else 0
+                cells[cell] = through | (ENTERED if enter < np.inf and enter <= stay else 0)
+                cell += 1
                 off_sq, _ = _from_chord(vertex[i], vertex[i + 1], point[n])
                 new[i] = np.inf
                 if off_sq <= (wide * budget[i] + SAME_PLACE) ** 2:
@@ -164,22 +156,22 @@ def in_order(chain, point, feed):
                 break
             wide = 2.0 * wide if wide > 1.0 else FIRST_WIDER
             if wide > WIDEST:
-                return False, link, crossed
-        first[n], begin[n], used = low, used, mark
+                return False, piece, crossed
+        first[n], begin[n], used = low, used, cell
         low, high = lowest, highest
         cost, new = new, cost
-    if high != links - 1:
-        return False, link, crossed
+    if high != pieces - 1:
+        return False, piece, crossed
     i = high
-    crossed[0], crossed[links] = 0.0, count - 1.0
+    crossed[0], crossed[pieces] = 0.0, count - 1.0
     for n in range(count - 1, -1, -1):
-        link[n] = i
+        piece[n] = i
         bit = ENTERED
-        while i > first[n] and marks[begin[n] + i - first[n]] & bit:
-            _, fraction = _from_chord(point[max(n - 1, 0)], point[n], vertex[i])
-            crossed[i] = max(n - 1, 0) + fraction * min(n, 1)
+        while i > first[n] and cells[begin[n] + i - first[n]] & bit:
+            _, share = _from_chord(point[max(n - 1, 0)], point[n], vertex[i])
+            crossed[i] = max(n - 1, 0) + share * min(n, 1)
             i -= 1
             bit = THROUGH
-    for i in range(links):
+    for i in range(pieces):
         crossed[i + 1] = max(crossed[i + 1], crossed[i])
-    return True, link, crossed
+    return True, piece, crossed

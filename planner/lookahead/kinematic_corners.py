@@ -45,9 +45,9 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     if machine.fir is not None:
         tolerance = toolpath.tolerance[path.first]
         a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_rate(machine))
-    fraction = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
+    share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
-    return LegLimits(length=path.length, v=fraction * v, a=fraction * a, j=fraction * j, turning=turning)
+    return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
 
 
 def candidates(

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.tube.guess import Guess
-from planner.tube.nlp import TubeSolution
+from planner.tube.outcome import TubeSolution
 from planner.tube.run import TubeRun
 
 # Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.

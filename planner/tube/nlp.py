@@ -38,11 +38,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.packages import import_needed
-from planner.feedrate.solution import Status
 from planner.tube.guess import Guess
 from planner.tube.numbers import acceleration_along, step_numbers
+from planner.tube.outcome import BROKE_DOWN, OUTCOMES, SOLVED, STUCK, TubeSolution
 from planner.tube.run import TubeRun
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
@@ -67,49 +66,6 @@ NOT_SLOWER = 1e-4
 FEASIBILITY = 1e-6
 # Complementarity at which the search may end [-]: the time is then good to 1e-4.
 COMPLEMENTARITY = 1e-4
-
-SOLVED = (Status.OPTIMAL, Status.ACCEPTABLE)
-OUTCOMES = {
-    "Solve_Succeeded": (Status.OPTIMAL, "the best motion near its start, geometry and feed together"),
-    "Solved_To_Acceptable_Level": (
-        Status.ACCEPTABLE,
-        "the best motion near its start, geometry and feed together, to about 1e-4 of its time",
-    ),
-    "Maximum_Iterations_Exceeded": (
-        Status.ITERATION_LIMIT,
-        "not converged within the iterations allowed; raise max_iterations, or plan with method optimal",
-    ),
-    "Infeasible_Problem_Detected": (
-        Status.INFEASIBLE,
-        "no motion inside the tolerance was found from its start; raise the tolerance, or plan with method optimal",
-    ),
-}
-BROKE_DOWN = (
-    Status.NUMERICAL_ERROR,
-    "the solver broke down; change the tolerance a little, or plan with method optimal",
-)
-STUCK = (
-    Status.ITERATION_LIMIT,
-    "the search came to rest at a motion slower than its start; change the tolerance a little, or plan with method optimal",
-)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TubeSolution:
-    """How the search ended, and N steps over A axes unless it failed (then None).
-
-    h        : (N,) durations [s]
-    jerk     : (N, A) [mm/s3]
-    place    : (N+1,) places of the nodes along the run [mm]
-    """
-
-    status: Status
-    sentence: str
-    iterations: int
-    solve_time: float
-    h: FloatArray | None = None
-    jerk: FloatArray | None = None
-    place: FloatArray | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

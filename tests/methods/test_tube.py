@@ -174,7 +174,7 @@ def test_a_job_that_is_too_long_is_refused_before_any_work():
     with pytest.raises(InputError, match=f"at most {LEGS_MAX}.*split the program"):
         TubeMethod(starts=(NeverAsked(),)).plan(problems.polyline(points), MACHINE)
     turns = parse_program(f"G21 G17 G90 F6000\nG2 X0 Y0 I50 P{LEGS_MAX}\nM2\n")
-    with pytest.raises(InputError, match="parts of arcs"):
+    with pytest.raises(InputError, match="steps on arcs"):
         TubeMethod(starts=(NeverAsked(),)).plan(turns, MACHINE)
 
 

@@ -33,7 +33,8 @@ PRODUCT_MAX = 3.0  # ... and up to here for sigma1 sigma2
 class BezierCorner:
     """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given.
 
-    Raises InputError for shape numbers for which the error bound of corners/blend.py is not proved.
+    Raises InputError for shape numbers outside the ranges in which the error bound of corners/blend.py holds, and, of sigma2, the G3
+    condition has a solution.
     """
 
     sigma2: float = 0.9

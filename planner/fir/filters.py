@@ -76,7 +76,11 @@ class Filters:
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """Velocity (n,) [mm/s] at times t (n,) [s] of a pulse of `speed` [mm/s] and any `duration` Tv [s] from 0 on (eq. 5)."""
+        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, and its general form for Tv < Td).
+
+        speed    : V [mm/s]
+        duration : Tv [s], any
+        """
         t = np.asarray(t, float)
         return speed * (self.step(t) - self.step(t - duration))
 

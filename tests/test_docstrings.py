@@ -21,6 +21,10 @@ def is_public(name: str) -> bool:
     return not name.startswith("_")
 
 
+def is_protocol(node: ast.ClassDef) -> bool:
+    return any(ast.unparse(base).partition("[")[0] == "Protocol" for base in node.bases)
+
+
 def documented_methods(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
     """Methods with a docstring of all classes, by the name of the class."""
     return {
@@ -34,10 +38,13 @@ def documented_methods(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
 
 
 def faults(trees: dict[str, ast.Module]) -> list[str]:
-    """What lacks a docstring, or in its docstring a shape or the name of an array; a method may have it from a base class."""
+    """What lacks a docstring, or in its docstring a shape or the name of an array.
+
+    A method may have it from a base class, or from a protocol in its module.
+    """
     known, found = documented_methods(trees), []
 
-    def look(body: list[ast.stmt], where: str, inherited: set[str]) -> None:
+    def look(body: list[ast.stmt], where: str, inherited: set[str], asked: set[str]) -> None:
         for node in body:
             if not isinstance(node, ast.FunctionDef | ast.ClassDef) or not is_public(node.name):
                 continue
@@ -45,7 +52,7 @@ def faults(trees: dict[str, ast.Module]) -> list[str]:
             if isinstance(node, ast.ClassDef):
                 bases = [ast.unparse(base).partition("[")[0] for base in node.bases]
                 found.extend([] if text else [f"{place}: no docstring"])
-                look(node.body, place, set().union(*(known.get(base, set()) for base in bases)))
+                look(node.body, place, asked.union(*(known.get(base, set()) for base in bases)), asked)
             elif text is None:
                 found.extend([] if node.name in inherited else [f"{place}: no docstring"])
             else:
@@ -53,7 +60,8 @@ def faults(trees: dict[str, ast.Module]) -> list[str]:
 
     for module, tree in trees.items():
         found += [] if ast.get_docstring(tree) else [f"{module}: no docstring"]
-        look(tree.body, module, set())
+        protocols = [node.name for node in tree.body if isinstance(node, ast.ClassDef) and is_protocol(node)]
+        look(tree.body, module, set(), set().union(*(known[name] for name in protocols)))
     return found
 
 
@@ -91,11 +99,26 @@ class Derived(Base):
     def silent(self):
         return 2
 
+class Asked(Protocol):
+    """What is asked of others."""
+
+    def value(self):
+        """A number."""
+
+class Own:
+    """Conforms to it."""
+
+    def value(self):
+        return 3
+
 def bare(x: FloatArray) -> float:
     """Its sum."""
 
 def shaped(x: FloatArray, y: FloatArray) -> FloatArray:
     """(n,) sums of x (n,)."""
+
+def value():
+    return 4
 
 def whole(x: FloatArray) -> FloatArray:
     """(n,) squares of x (n, A)."""
@@ -109,5 +132,6 @@ def test_what_lacks_is_found() -> None:
         "a.py.Derived.silent: no docstring",
         "a.py.bare: no shape",
         "a.py.shaped: y is not named",
+        "a.py.value: no docstring",
     ]
     assert faults({"b.py": ast.parse("x = 1")}) == ["b.py: no docstring"]

@@ -74,9 +74,9 @@ def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
     """
     change = np.flatnonzero((guide.programmed[1:] != guide.programmed[:-1]) & guide.inner[1:-1]) + 1
     before, after = guide.programmed[change - 1], guide.programmed[change]
-    way = np.where(before < after, before, -after)[:, None] * CUTS
+    beside = np.where(before < after, before, -after)[:, None] * CUTS
     run = np.repeat(guide.run[change], len(CUTS))
-    s = (guide.s[change, None] + way).ravel()
+    s = (guide.s[change, None] + beside).ravel()
     inside = (s > guide.s[guide.first[run]]) & (s < guide.s[guide.first[run + 1]])
     s = np.setdiff1d(s[inside], guide.s)
     at = np.searchsorted(guide.s, s, side="right") - 1  # the chord that is cut
@@ -225,14 +225,14 @@ def _guide(
     first   : (S+1,) first row of each run
     columns : of the record, (P,); `feed` as programmed, `tol` with what the chords use of it
     """
-    way = end[:, 0] - start[:, 0]
-    way[first[1:] - 1] = 0.0
-    length = np.linalg.norm(way, axis=1)
+    chord = end[:, 0] - start[:, 0]
+    chord[first[1:] - 1] = 0.0
+    length = np.linalg.norm(chord, axis=1)
     moving = length > 0
-    start, end, way, length = start[moving], end[moving], way[moving], length[moving]
+    start, end, chord, length = start[moving], end[moving], chord[moving], length[moving]
     columns = {name: column[moving] for name, column in columns.items()}
     with np.errstate(divide="ignore", over="ignore"):
-        axes_allow = length * (machine.limits("velocity", axes) / np.abs(way)).min(axis=1)
+        axes_allow = length * (machine.limits("velocity", axes) / np.abs(chord)).min(axis=1)
     speeds = [_circle_speeds(side, machine, axes) for side in (start, end)]
     programmed = columns.pop("feed")
     columns["tol"] = columns["tol"] * (1 - SAGITTA)
@@ -244,7 +244,7 @@ def _guide(
         point=np.vstack([start[:, 0], end[-1:, 0]]),
         s=np.append(0.0, np.cumsum(length)),
         length=length,
-        direction=way / length[:, None],
+        direction=chord / length[:, None],
         feed=np.minimum(programmed, axes_allow),
         programmed=programmed,
         kappa=np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end))),

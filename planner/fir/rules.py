@@ -15,7 +15,7 @@ Where there are very many of them E and a come from the mean of the path with th
 
     D = p(s_i + V x) + p(s_i - V x) - 2 p(s_i),      E = w |D|,      a = D / x^2,      x^2 = mu4/mu2,  w = mu2^2 / (2 mu4).
 
-Where the command comes to rest before V x, its way ends there, and D is corrected by what that shifts along the path.
+Where the command comes to rest before V x, the path ends there, and D is corrected by what that shifts along the path.
 What constant speed leaves out is measured afterwards (measure.py).
 
 A speed that a joint or a slow block asks for holds on V Td/2 of the guide to both sides: the mean time the command spends there

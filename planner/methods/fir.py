@@ -21,10 +21,10 @@ import numpy as np
 
 from planner.feedrate.solution import Status
 from planner.fir.design import plain_plan
-from planner.fir.filtered import axes_of, check_profile_filters, reached
+from planner.fir.fastest_schedule import fastest_schedule
+from planner.fir.filtered_axes import axes_of, check_profile_filters, reached
 from planner.fir.leg_guide import LegGuide, guide_of_legs
 from planner.fir.schedule import Schedule
-from planner.fir.search import fastest_schedule
 from planner.fir.superpose import Filtered, superpose
 from planner.job.job import Job
 from planner.job.method import Method

@@ -25,7 +25,7 @@ from planner.corners.smooth import round_corners
 from planner.feedrate.solution import Status
 from planner.fir.chord_guide import ChordGuide, guide_of_curve, guide_of_path
 from planner.fir.chord_speeds import ChordSpeeds, fastest_speeds, promised
-from planner.fir.filtered import axes_of, check_profile_filters, reached
+from planner.fir.filtered_axes import axes_of, check_profile_filters, reached
 from planner.fir.spline_speeds import v_sc
 from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program

@@ -22,19 +22,29 @@ def is_public(name: str) -> bool:
 
 
 def is_protocol(node: ast.ClassDef) -> bool:
-    return any(ast.unparse(base).partition("[")[0] == "Protocol" for base in node.bases)
+    return "Protocol" in bases(node)
 
 
 def documented_methods(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
-    """Methods with a docstring of all classes, by the name of the class."""
-    return {
-        node.name: {
-            one.name for one in node.body if isinstance(one, ast.FunctionDef) and ast.get_docstring(one)
-        }
+    """Methods with a docstring of all classes, their own and those of their base classes, by the name of the class."""
+    classes = {
+        node.name: node
         for tree in trees.values()
         for node in ast.walk(tree)
         if isinstance(node, ast.ClassDef)
     }
+
+    def of(name: str) -> set[str]:
+        if name not in classes:
+            return set()
+        own = [one for one in classes[name].body if isinstance(one, ast.FunctionDef)]
+        return {one.name for one in own if ast.get_docstring(one)}.union(*map(of, bases(classes[name])))
+
+    return {name: of(name) for name in classes}
+
+
+def bases(node: ast.ClassDef) -> list[str]:
+    return [ast.unparse(base).partition("[")[0] for base in node.bases]
 
 
 def faults(trees: dict[str, ast.Module]) -> list[str]:
@@ -50,9 +60,8 @@ def faults(trees: dict[str, ast.Module]) -> list[str]:
                 continue
             place, text = f"{where}.{node.name}", ast.get_docstring(node)
             if isinstance(node, ast.ClassDef):
-                bases = [ast.unparse(base).partition("[")[0] for base in node.bases]
                 found.extend([] if text else [f"{place}: no docstring"])
-                look(node.body, place, asked.union(*(known.get(base, set()) for base in bases)), asked)
+                look(node.body, place, asked | known[node.name], asked)
             elif text is None:
                 found.extend([] if node.name in inherited else [f"{place}: no docstring"])
             else:
@@ -90,8 +99,11 @@ class Base:
     def said(self):
         """Something."""
 
-class Derived(Base):
+class Between(Base):
     """Another."""
+
+class Derived(Between):
+    """And another."""
 
     def said(self):
         return 1

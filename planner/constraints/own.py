@@ -181,7 +181,10 @@ def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[F
 def along_path(
     velocity: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(3, n) speed, acceleration and jerk along the path of a motion (n, A), and its direction (n, A); none at rest."""
+    """(3, n) speed, acceleration and jerk along the path of a motion, and its direction (n, A); none at rest.
+
+    velocity, acceleration, jerk : (n, A) of the axes [mm/s], [mm/s2], [mm/s3]
+    """
     speed = np.linalg.norm(velocity, axis=1)
     moving = speed > AT_REST
     direction = np.divide(velocity, speed[:, None], out=np.zeros_like(velocity), where=moving[:, None])

@@ -68,7 +68,7 @@ from planner.smoothing.spline_path import SplineShape, with_spline
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
 # Factors on a run's force after a gain and after a loss. With 0.5 and 0.85 for the first 11 jobs end 3e-4 and 4e-4 slower on the mean,
 # 2e-3 and 4e-3 at worst; with 5 for the second 4e-4, with 2 the same.
-LESS, MORE = 0.7, 3.0
+LESS, MORE = 0.85, 3.0
 SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 1e-4 to 1e-3 slower (pentagon, zig-zag, spiral)
 # Without jerk limits a failed round teaches what holds its shape; so more of them may fail, with less pull each. With the numbers
 # above, 4 of 40 random polylines stayed where they began, up to 4.5 % behind the motion with jerk limits.

@@ -54,16 +54,16 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
 
 @njit(cache=True, error_model="numpy")
 def _pass(position, s, t, vertex, length, slack, times):
-    """Write when the polyline position (T, A) with lengths s and times t (T,) is nearest to each vertex (M+1, A) into times (M+1,)."""
+    """Write when the polyline position (T, A) with way s and times t (T,) is nearest to each vertex (N+1, A)."""
     last = len(t) - 2
-    k, fraction = 0, 0.0  # the place reached: chord and fraction of it
+    k, share = 0, 0.0  # the place reached: chord and share of it
     times[0] = t[0]
     for i in range(1, len(vertex)):
-        here = s[k] + fraction * (s[k + 1] - s[k])
+        here = s[k] + share * (s[k + 1] - s[k])
         begin, end = here + length[i - 1] - slack[i - 1], here + length[i - 1] + slack[i - 1]
         while k < last and s[k + 1] < begin:
-            k, fraction = k + 1, 0.0
-        nearest, best, best_fraction = np.inf, k, fraction
+            k, share = k + 1, 0.0
+        nearest, best, best_share = np.inf, k, share
         n = k
         while n <= last and (n == k or s[n] <= end):
             along, size = 0.0, 0.0
@@ -73,13 +73,13 @@ def _pass(position, s, t, vertex, length, slack, times):
                 size += step * step
             q = min(max(along / size, 0.0), 1.0) if size > 0.0 else 0.0
             if n == k:
-                q = max(q, fraction)
+                q = max(q, share)
             apart = 0.0
             for axis in range(position.shape[1]):
                 there = position[n, axis] + q * (position[n + 1, axis] - position[n, axis])
                 apart += (vertex[i, axis] - there) ** 2
             if apart < nearest:
-                nearest, best, best_fraction = apart, n, q
+                nearest, best, best_share = apart, n, q
             n += 1
-        k, fraction = best, best_fraction
-        times[i] = t[k] + fraction * (t[k + 1] - t[k])
+        k, share = best, best_share
+        times[i] = t[k] + share * (t[k + 1] - t[k])

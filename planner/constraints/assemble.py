@@ -135,7 +135,7 @@ def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
 
 
 def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
-    """Index of the interval to the left and to the right of every point; at a piece's ends the only one there is."""
+    """Indices (P,) of the interval to the left and (P,) to the right of every point; at a piece's ends the only one there is."""
     right = np.arange(len(samples))
     left = right - 1
     left[samples.piece[:-1]] += 1

@@ -34,24 +34,25 @@ def axis_velocity(d1: FloatArray, limits: FloatArray) -> tuple[FloatArray, Array
 
 
 def chord_error(kappa: FloatArray, tol: FloatArray, dt: float) -> FloatArray:
-    """kappa x dt^2/8 <= tol [mm] for the interpolation period dt [s]."""
+    """(P,) kappa x dt^2/8 <= tol for kappa (P,) [1/mm], tol (P,) [mm] and the interpolation period dt [s]."""
     return _over(tol, kappa * dt**2 / 8.0)
 
 
 def filter_error(
     kappa: FloatArray, tol: FloatArray, time_constants: Sequence[FloatArray | float]
 ) -> FloatArray:
-    """kappa x sum T^2/24 <= tol [mm] for moving averages of lengths T [s]."""
+    """(P,) kappa x sum T^2/24 <= tol for kappa (P,) [1/mm], tol (P,) [mm] and averages of lengths T = time_constants [s]."""
     return _over(tol, kappa * sum(T * T for T in time_constants) / 24.0)
 
 
 def phase_lag(kappa: FloatArray, angle: float, time_constants: Sequence[FloatArray | float]) -> FloatArray:
-    """feed kappa sum T/2 <= angle [rad]: on a circle the filtered point lags by feed kappa times the filters' delay."""
+    """(P,) feed kappa sum T/2 <= angle [rad] for kappa (P,) [1/mm] and T = time_constants [s]: on a circle the filtered point lags by
+    feed kappa times the filters' delay."""
     return _over(angle, kappa * sum(time_constants) / 2.0) ** 2
 
 
 def curvature_jump(d2_left: FloatArray, d2_right: FloatArray, limits: FloatArray) -> tuple[FloatArray, Array]:
-    """|jump of r''_k| x <= a_k for every axis; also the index (P,) of the axis that limits."""
+    """|d2_right - d2_left| x <= limits for r'' (P, A) on both sides and every axis; also the index (P,) of the axis that limits."""
     ratio = np.abs(d2_right - d2_left) / limits
     axis = ratio.argmax(axis=1)
     return _over(1.0, ratio[np.arange(len(ratio)), axis]), axis

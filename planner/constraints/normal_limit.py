@@ -70,5 +70,10 @@ def anywhere(machine: Machine, axes: tuple[str, ...]) -> float:
 
 
 def within_budget(tol: FloatArray, tol_ap: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
-    """X [mm/s2]: the largest kappa feed^2 that leaves eps_ap + c X within the budget, and at most A."""
+    """(n,) X [mm/s2]: the largest kappa feed^2 that leaves eps_ap + c X within the budget, and at most A.
+
+    tol, tol_ap  : (n,) budget eps and what the rounding uses of it, eps_ap [mm]
+    acceleration : (n,) A [mm/s2]
+    rate         : c, from `error_rate` [s2]
+    """
     return np.minimum(acceleration, (tol - tol_ap) / rate)

@@ -26,6 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints import axis_jerk
 from planner.constraints.assemble import feedrate_problem, interval_feed_sq_max
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
@@ -104,9 +105,8 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
     """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the feed."""
-    turning = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right)) / problem.jerk_limit
-    with np.errstate(divide="ignore"):
-        allowed = turning.max(axis=1) ** (-2.0 / 3.0)
+    d3 = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right))
+    allowed = axis_jerk.feed_sq_at_constant_speed(d3, problem.jerk_limit)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 

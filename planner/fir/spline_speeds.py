@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.bounds import filter_error, phase_lag
+from planner.constraints import filter_error, phase_lag
 from planner.corners.fir import overlap_time
 from planner.fir.guide import ChordGuide
 from planner.machine import Machine
@@ -45,12 +45,12 @@ def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray)
 
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
     """Speed at which the filters' error is `tol` [mm], to second order; inf where the path is straight."""
-    return np.sqrt(filter_error(kappa, tol, (T1, T2)))
+    return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
     """Speed at which the filtered point lags by the angle phi [rad]; inf where the path is straight."""
-    return np.sqrt(phase_lag(kappa, phi, (T1, T2)))
+    return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
 
 
 def filter_lengths(

@@ -129,6 +129,24 @@ class JointLimit(ABC):
         return self.joint(at)
 
 
+class ScaledLimit:
+    """A limit with `factor` times the bounds of one of its quantities ("velocity", "acceleration", "jerk"), else the same."""
+
+    def __init__(self, limit: OwnLimit, quantity: str, factor: float):
+        self.name, self.unit, self.turn = limit.name, limit.unit, limit.turn
+        self._limit, self._which, self._factor = limit, QUANTITIES.index(quantity), factor
+
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        velocity, acceleration, jerk = (
+            bound * self._factor if k == self._which else bound
+            for k, bound in enumerate(self._limit.bounds(at))
+        )
+        return velocity, acceleration, jerk
+
+    def value(self, at: Place) -> Any:
+        return self._limit.value(at)
+
+
 def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
     """Raise InputError unless every limit has a name of its own."""
     for limit in limits:

@@ -164,7 +164,8 @@ def corner_prices(
         by = np.where(own, growth, 0.0)
         grown = dataclasses.replace(path, stretch=path.stretch * (1.0 + by)[:, None])
         moved = feedrate_problem(moved_grid(samples, grown), machine)
-        there = lagrangian(dataclasses.replace(moved, limit_scale=problem.limit_scale), solution)
+        moved = dataclasses.replace(moved, limit_scale=problem.limit_scale, margin=problem.margin)
+        there = lagrangian(moved, solution)
         change = there.value - now.value
         total += sums(~samples.element[corner], change[corner], len(joints))
         on_leg = sums(leg[~corner], change[~corner], len(joints) - 1)

@@ -34,6 +34,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints import chord_error
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.limits import ACCELERATION, FEED, OF_AXES, VELOCITY
 from planner.constraints.problem import FeedrateProblem
@@ -253,7 +254,7 @@ def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machin
     """The largest share of the tolerance that chords between samples use, kappa v^2 dt^2 / 8 over eps, eq. (18)."""
     kappa = np.maximum(samples.kappa_left, samples.kappa_right)
     tolerance = samples.path.toolpath.tolerance[samples.segment]
-    chord = kappa * solution.feed_sq * machine.dt**2 / 8.0
+    chord = kappa * solution.feed_sq * chord_error.rate(machine)
     return float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())
 
 

@@ -42,8 +42,8 @@ from planner.machine import Machine
 from planner.path.samples import PathSamples, moved_grid
 
 STEP = 0.1  # of an interval of the thinned grid [a/j]; with 0.2 more jerk came out up to twice as valuable (pentagon)
-# The same with limits of one's own, whose rows bend on straight legs, too: with 0.1 a job that a joint holds everywhere was 4.6 % slower
-# on the thinned grid, and more jerk of x saved 1.2 times what a new plan found; with 0.025 it is 0.7 % slower, and that is 0.98.
+# The same with limits of one's own, whose rows bend on straight legs, too: with 0.1 a job that a joint holds everywhere was 4.6 %
+# slower on the thinned grid, and more jerk of x saved 1.2 times what a new plan found; with 0.025 it is 0.7 % slower, and that is 0.98.
 STEP_OWN = 0.025
 CELLS_MIN = 12  # intervals that a piece keeps at least, as far as it has them
 POINTS = 25_000  # of all thinned problems together, at least; a quarter of the job's grid if that is more

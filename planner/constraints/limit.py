@@ -9,7 +9,7 @@ A limit takes part in the feedrate problem (problem.py) in one of two forms, x =
     a row    |row(r', r'', r'''; x, u, j)| <= limit of the axis, at both ends of every interval      axis acceleration, axis jerk
 
 Limits of one's own (own.py) are functions of the position with rows of the same two kinds. The judge knows nothing of these objects: it
-has code of its own for every limit (verify/), and tests/constraints/test_laws_of_limits.py holds one against the other.
+has code of its own for every limit (verify/), and tests/verify/test_laws_of_limits.py holds one against the other.
 """
 
 from __future__ import annotations

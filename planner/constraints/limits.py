@@ -1,7 +1,7 @@
 """All limits of the planner, in the order in which they are asked: of equal caps the first gives its name.
 
 A limit that is to be built in is a file like the ones imported here and a line in `LIMITS`; the judge needs code of its own for it
-(verify/limits.py), and tests/constraints/test_laws_of_limits.py a motion on which the two agree. One of a user's own needs none of
+(verify/limits.py), and tests/verify/test_laws_of_limits.py a motion on which the two agree. One of a user's own needs none of
 that: own.py, docs/extending.md.
 """
 

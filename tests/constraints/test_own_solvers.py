@@ -59,7 +59,7 @@ def program():
 
 def planned(program, limits, **settings):
     """A plan that passes, with all limits reached."""
-    plan = planner.plan(program, MILL, corner="bezier", limits=limits, **settings).require()
+    plan = planner.plan(program, MILL, corner="bezier", effort="quick", limits=limits, **settings).require()
     assert plan.verdict.passed, plan.verdict.faults
     for limit in limits:
         checks = [c for name, c in plan.verdict.limits.items() if name.endswith(limit.name) and c.limited]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.limit import AxisLimit, Cap, RowPoint, by_axis, over
+from planner.constraints.limit import Cap, RowLimit, RowPoint, by_axis, over
 
 if TYPE_CHECKING:
     from planner.constraints.on_grid import OnGrid
@@ -32,7 +32,7 @@ def feed_sq_at_jump(
     return over(1.0, ratio[np.arange(len(ratio)), axis]), axis
 
 
-class AxisAcceleration(AxisLimit):
+class AxisAcceleration(RowLimit):
     """|r'_k u + r''_k x| <= a_k."""
 
     name, unit, order = "acceleration", "mm/s2", 2

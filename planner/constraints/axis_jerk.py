@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.limit import AxisLimit, RowPoint
+from planner.constraints.limit import RowLimit, RowPoint
 
 
 def feed_sq_at_constant_speed(d3: FloatArray, limits: FloatArray) -> FloatArray:
@@ -19,7 +19,7 @@ def feed_sq_at_constant_speed(d3: FloatArray, limits: FloatArray) -> FloatArray:
         return (np.abs(d3) / limits).max(axis=1) ** (-2.0 / 3.0)
 
 
-class AxisJerk(AxisLimit):
+class AxisJerk(RowLimit):
     """|r'_k j + 3 r''_k feed u + r'''_k feed^3| <= j_k."""
 
     name, unit, order = "jerk", "mm/s3", 3

@@ -14,6 +14,7 @@ has code of its own for every limit (verify/), and tests/verify/test_laws_of_lim
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
@@ -90,9 +91,13 @@ class AxisLimit(Limit):
         """(A,) the limits of the axes, in mm or rad. Raises InputError if the machine lacks one of the axes."""
         return machine.limits(cls.name, axes)  # type: ignore[arg-type]
 
+
+class RowLimit(AxisLimit, ABC):
+    """A limit of every axis with rows in the problem."""
+
+    @abstractmethod
     def row(self, at: RowPoint) -> FloatArray:
-        """(n,) what the axis limit bounds the size of, at n grid points; of limits with rows only."""
-        raise NotImplementedError
+        """(n,) what the axis limit bounds the size of, at n grid points [`unit`]."""
 
 
 def over(value: FloatArray | float, by: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from planner.constraints.axis_jerk import AxisJerk
 from planner.constraints.axis_velocity import AxisVelocity
 from planner.constraints.chord_error import ChordError
 from planner.constraints.filter_error import FilterError
-from planner.constraints.limit import AxisLimit, Limit
+from planner.constraints.limit import AxisLimit, Limit, RowLimit
 from planner.constraints.normal_limit import NormalAcceleration
 from planner.constraints.phase_lag import PhaseLag
 from planner.constraints.programmed_feed import ProgrammedFeed
@@ -30,5 +30,5 @@ LIMITS: tuple[Limit, ...] = (
     ACCELERATION,
     JERK,
 )
-ROWS: tuple[AxisLimit, ...] = (ACCELERATION, JERK)  # as rows of the problem, in the order of their indices
+ROWS: tuple[RowLimit, ...] = (ACCELERATION, JERK)  # as rows of the problem, in the order of their indices
 OF_AXES: tuple[AxisLimit, ...] = (VELOCITY, ACCELERATION, JERK)  # with a limit for every axis

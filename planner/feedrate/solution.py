@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import NotSolvedError
-from planner.constraints.limit import AxisLimit, RowPoint
+from planner.constraints.limit import RowLimit, RowPoint
 from planner.constraints.limits import ACCELERATION, JERK, ROWS, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 
@@ -240,7 +240,7 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
         (inner + 1, u[inner] + gained, problem.d2_left, problem.d3_left),
     )
     first, axes = len(problem.bound_names), len(problem.axes)
-    rows: list[tuple[AxisLimit, FloatArray, FloatArray | float]] = [
+    rows: list[tuple[RowLimit, FloatArray, FloatArray | float]] = [
         (ACCELERATION, problem.acceleration_limit, 1.0 - problem.margin[inner])
     ]
     if solution.jerk_limited:

@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.bounds import filter_error, phase_lag
+from planner.constraints import filter_error, phase_lag
 from planner.corners.fir import overlap_time
 from planner.fir.chord_guide import ChordGuide
 from planner.machine import Machine
@@ -54,7 +54,7 @@ def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) ->
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
     """
-    return np.sqrt(filter_error(kappa, tol, (T1, T2)))
+    return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
@@ -63,7 +63,7 @@ def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> Float
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
     """
-    return np.sqrt(phase_lag(kappa, phi, (T1, T2)))
+    return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
 
 
 def filter_lengths(

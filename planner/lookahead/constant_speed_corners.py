@@ -17,8 +17,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.constraints import filter_error
 from planner.constraints.assemble import feedrate_problem
-from planner.corners.allocation import filter_rate
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.geometry.toolpath import Toolpath
 from planner.lookahead.passage import LegLimits, Passage
@@ -144,7 +144,9 @@ def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
     by them."""
     v, a, j = block_limits(toolpath, machine)
     if machine.fir is not None:
-        a = np.minimum(a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_rate(machine))
+        a = np.minimum(
+            a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_error.rate(machine)
+        )
     return np.stack([v, a, j])
 
 

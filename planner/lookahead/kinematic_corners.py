@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import normal_limit
+from planner.constraints import filter_error, normal_limit
 from planner.corners import kinematic as corner
-from planner.corners.allocation import error_rate, filter_rate
+from planner.corners.allocation import error_rate
 from planner.corners.sharing import share_legs
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.legs import Legs
@@ -44,7 +44,7 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
     if machine.fir is not None:
         tolerance = toolpath.tolerance[path.first]
-        a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_rate(machine))
+        a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_error.rate(machine))
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
     return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)

@@ -14,7 +14,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import normal_limit
+from planner.constraints.limits import LIMITS
 from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import runs_of, slower_runs
@@ -41,7 +41,7 @@ SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
-ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, normal_limit.NAME: 2, "jerk": 3}
+ORDER = {limit.name: limit.order for limit in LIMITS}
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:

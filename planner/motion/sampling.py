@@ -1,11 +1,18 @@
-"""The kernel behind motion/timing.py: a motion along a path at given times.
+"""The kernels behind motion/timing.py: a motion along a path at given times.
 
 A time gives an arc length s by the time law; the place on the path is the parameter w of the grid interval there. On curves w(s) has
-no closed form. Per interval, a quintic in the arc length that matches w and two derivatives at both ends comes first (`_invert`);
-where it is not good enough, every sample takes a step on s(w) from there (`_refine`), s(w) by Gauss' rule (corners/elements.py).
+no closed form. `inverses` makes one polynomial for each interval, once for all looks at the motions on a grid. With
+q = (s - s0)/h and W = (w - w0)/(w1 - w0) it matches W and three derivatives at both ends: with the speed S = |B'(w)| of the curve
 
-Of a span, which most intervals of a long job lie on, the coefficients are copied once per interval, and lengths and points are
-evaluated from the copy: the same operations in the same order as in geometry/spline.py, all nodes of Gauss' rule side by side.
+    dw/ds = 1/S,     d2w/ds2 = -S'/S^3,     d3w/ds3 = (3 S'^2 - S S'')/S^5,
+    S' = B'.B''/S,     S'' = (B''.B'' + B'.B''' - S'^2)/S.
+
+How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule. Where that is more than
+`LENGTH_ROUNDING`, every sample takes a step from there by the slope of the polynomial, and where that is not enough, steps by the
+curve itself (`_refine`).
+
+Of a span, which most intervals of a long job lie on, the coefficients are copied once per interval, and all nodes of Gauss' rule are
+evaluated side by side.
 """
 
 from __future__ import annotations
@@ -30,8 +37,10 @@ from planner.geometry.spline import DEGREE
 # Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of coordinates, so that
 # accelerations by differences of nearby positions are as good as the columns.
 LENGTH_ROUNDING = 1e-13
-# Steps on s(w) at most; one is the rule where the interpolated inverse is not good enough by itself. Halves alone take 43 for
-# `LENGTH_ROUNDING`.
+# The polynomial's slope is off by at most 4 times what its values are off by [share of the interval]: 256 q^4 (1-q)^4, the shape of
+# their error, is nowhere steeper. Where they are off by less than this, a step by its slope leaves less than `LENGTH_ROUNDING`.
+ONE_STEP = 1e-7
+# Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
 CUBE_ROOT_ROUNDING = 4e-5
@@ -73,35 +82,58 @@ class _Interval(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """What an interval is evaluated with: coef (6, A) of its span and slope (5, A) of its derivative; work (2, 4, A), speed (8,)."""
+    """What an interval is evaluated with: coefficients of its span (6, A) and of its derivatives (5, A), (4, A), (3, A); work (2, 4, A),
+    speed (8,)."""
 
     coef: FloatArray
-    slope: FloatArray
+    first: FloatArray
+    second: FloatArray
+    third: FloatArray
     work: FloatArray
     speed: FloatArray
 
 
 @njit(cache=True, error_model="numpy")
-def _copy_span(spans, i, coef, slope):
-    """Coefficients of span i and of its derivative."""
-    given = spans[i].coef
-    for k in range(coef.shape[1]):
-        coef[0, k] = given[0, k]
-        for m in range(1, DEGREE + 1):
-            coef[m, k] = given[m, k]
-            slope[m - 1, k] = m * given[m, k]
+def _room(axes):
+    return _Room(
+        np.empty((DEGREE + 1, axes)),
+        np.empty((DEGREE, axes)),
+        np.empty((DEGREE - 1, axes)),
+        np.empty((DEGREE - 2, axes)),
+        np.empty((2, 4, axes)),
+        np.empty(len(GAUSS_NODES)),
+    )
 
 
 @njit(cache=True, error_model="numpy")
+def _interval(table, grid, i, room):
+    """Interval i of the grid, with the coefficients of its span in `room`."""
+    legs, _, spans = table
+    span = grid.element[i] - len(legs)
+    if span >= 0:
+        given = spans[span].coef
+        for k in range(room.coef.shape[1]):
+            for m in range(DEGREE + 1):
+                room.coef[m, k] = given[m, k]
+            for m in range(1, DEGREE + 1):
+                room.first[m - 1, k] = m * given[m, k]
+            for m in range(2, DEGREE + 1):
+                room.second[m - 2, k] = m * (m - 1) * given[m, k]
+            for m in range(3, DEGREE + 1):
+                room.third[m - 3, k] = m * (m - 1) * (m - 2) * given[m, k]
+    return _Interval(grid.element[i], grid.w0[i], grid.w1[i], grid.s[i + 1] - grid.s[i], span >= 0)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _length(table, on, room, w, out):
     """Arc length of the interval's element from its start to w [mm]; out (4, A) is scratch."""
     if not on.span:
         return element_length(table[0], table[1], table[2], on.element, on.w0, w, 0.5 * (on.w0 + on.w1), out)
-    slope, speed, step = room.slope, room.speed, w - on.w0
+    first, speed, step = room.first, room.speed, w - on.w0
     for g in range(len(GAUSS_NODES)):
         speed[g] = 0.0
-    for k in range(slope.shape[1]):
-        d0, d1, d2, d3, d4 = slope[0, k], slope[1, k], slope[2, k], slope[3, k], slope[4, k]
+    for k in range(first.shape[1]):
+        d0, d1, d2, d3, d4 = first[0, k], first[1, k], first[2, k], first[3, k], first[4, k]
         for g in range(len(GAUSS_NODES)):
             tau = on.w0 + step * GAUSS_NODES[g]
             rate = (((d4 * tau + d3) * tau + d2) * tau + d1) * tau + d0
@@ -114,59 +146,90 @@ def _length(table, on, room, w, out):
     return total * step
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _point(table, on, room, w, out):
     """Point and three w-derivatives of the interval's element at w, into out (4, A)."""
     if not on.span:
         element_point(table[0], table[1], table[2], on.element, w, 0.5 * (on.w0 + on.w1), room.work, out)
         return
-    coef = room.coef
+    p, d, b, t = room.coef, room.first, room.second, room.third
     for k in range(out.shape[1]):
-        value, first, second, third = 0.0, 0.0, 0.0, 0.0
-        for m in range(DEGREE, -1, -1):
-            third = third * w + 3.0 * second
-            second = second * w + 2.0 * first
-            first = first * w + value
-            value = value * w + coef[m, k]
-        out[0, k], out[1, k], out[2, k], out[3, k] = value, first, second, third
+        out[0, k] = ((((p[5, k] * w + p[4, k]) * w + p[3, k]) * w + p[2, k]) * w + p[1, k]) * w + p[0, k]
+        out[1, k] = (((d[4, k] * w + d[3, k]) * w + d[2, k]) * w + d[1, k]) * w + d[0, k]
+        out[2, k] = ((b[3, k] * w + b[2, k]) * w + b[1, k]) * w + b[0, k]
+        out[3, k] = (t[2, k] * w + t[1, k]) * w + t[0, k]
+
+
+@njit(cache=True, error_model="numpy")
+def inverses(table, grid, axes):
+    """(P, 8) for the interval to the right of each point: how far the polynomial is off [share of the interval], c_1 .. c_7 of
+    W = sum c_n q^n; zeros at the ends of pieces."""
+    found = np.zeros((len(grid.s), 8))
+    room, out = _room(axes), np.empty((4, axes))
+    for g in range(len(grid.piece) - 1):
+        for i in range(grid.piece[g], grid.piece[g + 1] - 1):
+            on = _interval(table, grid, i, room)
+            if is_straight(table[0], on.element):
+                found[i, 1] = 1.0
+            else:
+                _invert(table, on, room, out, found[i])
+    return found
 
 
 @njit(cache=True, error_model="numpy")
 def _invert(table, on, room, out, c):
-    """Quintic c (6,) with w = w0 + (w1 - w0) sum c_n q^n, q = ds/h, matching w(s) and two derivatives at both ends.
-
-    Returns whether it is accurate to `LENGTH_ROUNDING` in the middle, where it is worst as a rule, and at its quarters.
-    """
-    w0, w1, h = on.w0, on.w1, on.h
-    c[:] = 0.0
-    c[1] = 1.0
-    if is_straight(table[0], on.element):
-        return True
-    dw = w1 - w0
-    slope, bend = np.empty(2), np.empty(2)  # dw/dq and d2w/dq2 over dw, at both ends
+    """The polynomial of an interval on a curve, into c (8,) as `inverses` has it."""
+    w0, dw, h = on.w0, on.w1 - on.w0, on.h
+    slope, bend, third = np.empty(2), np.empty(2), np.empty(2)  # derivatives of W by q at both ends
     for e in range(2):
-        _point(table, on, room, w1 if e else w0, out)
-        speed_sq, along = 0.0, 0.0
+        _point(table, on, room, on.w1 if e else w0, out)
+        speed_sq, along, bend_sq, along3 = 0.0, 0.0, 0.0, 0.0
         for k in range(out.shape[1]):
             speed_sq += out[1, k] * out[1, k]
             along += out[1, k] * out[2, k]
-        slope[e] = h / (np.sqrt(speed_sq) * dw)
-        bend[e] = -along * h * h / (speed_sq * speed_sq * dw)
-    c[1], c[2] = slope[0], 0.5 * bend[0]
-    p, v, a = 1.0 - c[1] - c[2], slope[1] - c[1] - 2.0 * c[2], bend[1] - 2.0 * c[2]
-    c[3], c[4], c[5] = 10.0 * p - 4.0 * v + 0.5 * a, -15.0 * p + 7.0 * v - a, 6.0 * p - 3.0 * v + 0.5 * a
+            bend_sq += out[2, k] * out[2, k]
+            along3 += out[1, k] * out[3, k]
+        speed = np.sqrt(speed_sq)
+        rate = along / speed
+        slope[e] = h / (speed * dw)
+        bend[e] = -h * h * rate / (speed * speed_sq * dw)
+        third[e] = h**3 * (4.0 * rate * rate - bend_sq - along3) / (speed * speed_sq * speed_sq * dw)
+    c[1], c[2], c[3] = slope[0], 0.5 * bend[0], third[0] / 6.0
+    p, v = 1.0 - c[1] - c[2] - c[3], slope[1] - c[1] - 2.0 * c[2] - 3.0 * c[3]
+    a, j = bend[1] - 2.0 * c[2] - 6.0 * c[3], third[1] - 6.0 * c[3]
+    c[4], c[5] = 35.0 * p - 15.0 * v + 2.5 * a - j / 6.0, -84.0 * p + 39.0 * v - 7.0 * a + 0.5 * j
+    c[6], c[7] = 70.0 * p - 34.0 * v + 6.5 * a - 0.5 * j, -20.0 * p + 10.0 * v - 2.0 * a + j / 6.0
+    c[0] = 0.0
     for q in (0.5, 0.25, 0.75):
-        w = w0 + dw * _horner(c, q)
-        if not w0 <= w <= w1:
-            return False
-        if abs(_length(table, on, room, w, out) / h - q) > LENGTH_ROUNDING:
-            return False
-    return True
+        w = w0 + dw * _at(c, q)
+        if not w0 <= w <= on.w1:
+            c[0] = np.inf
+            return
+        c[0] = max(c[0], abs(_length(table, on, room, w, out) / h - q))
 
 
-@njit(cache=True, error_model="numpy")
-def _horner(c, q):
-    return q * (c[1] + q * (c[2] + q * (c[3] + q * (c[4] + q * c[5]))))
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _at(c, q):
+    return q * (c[1] + q * (c[2] + q * (c[3] + q * (c[4] + q * (c[5] + q * (c[6] + q * c[7]))))))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _slope_at(c, q):
+    high = 4.0 * c[4] + q * (5.0 * c[5] + q * (6.0 * c[6] + q * 7.0 * c[7]))
+    return c[1] + q * (2.0 * c[2] + q * (3.0 * c[3] + q * high))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _parameter(table, on, room, c, ds, out):
+    """The parameter w at the arc length ds into the interval, from its polynomial c (8,)."""
+    dw, q = on.w1 - on.w0, ds / on.h
+    w = on.w0 + dw * _at(c, q)
+    if c[0] <= LENGTH_ROUNDING:
+        return w
+    if c[0] > ONE_STEP:
+        return _refine(table, on, room, w, ds, out)
+    miss = _length(table, on, room, w, out) / on.h - q
+    return min(max(w - miss * dw * _slope_at(c, q), on.w0), on.w1)
 
 
 @njit(cache=True, error_model="numpy")
@@ -200,9 +263,12 @@ def _refine(table, on, room, w, ds, out):
 
 
 @njit(cache=True, error_model="numpy")
-def sample(table, law, grid, times, axes):
+def sample(table, law, grid, inverse, times, axes):
     """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that each lies at; an interval
-    of a span may cover several."""
+    of a span may cover several.
+
+    inverse : (P, 8), from `inverses`
+    """
     legs, _, spans = table
     t, s_law, feed, acc_s, jerk_s, run, end = law
     piece, s, element, w0, w1, of_interval, passed = grid
@@ -210,10 +276,8 @@ def sample(table, law, grid, times, axes):
     out_position, out_velocity = np.empty((count, axes)), np.empty((count, axes))
     out_acceleration, out_jerk = np.empty((count, axes)), np.empty((count, axes))
     out_s, out_feed, segment = np.empty(count), np.empty(count), np.empty(count, np.int64)
-    here = np.empty((4, axes))
-    room = _Room(np.empty((DEGREE + 1, axes)), np.empty((DEGREE, axes)), np.empty((2, 4, axes)), np.empty(8))
-    inverse, inverse_of, exact = np.zeros(6), -1, False
-    on = _Interval(element[0], w0[0], w1[0], 0.0, False)
+    here, room = np.empty((4, axes)), _room(axes)
+    on, on_of = _Interval(element[0], w0[0], w1[0], 0.0, False), -1
     begin, width = 0.0, 0.0  # of the span, along the programmed path
     m = last_not_after(t, times[0], 0, len(t) - 1)
     i, joint = -1, 0
@@ -235,19 +299,12 @@ def sample(table, law, grid, times, axes):
             i = last_not_after(s, s_here, first, last)
         while i < last and s[i + 1] <= s_here:
             i += 1
-        h = s[i + 1] - s[i]
-        ds = min(max(s_here - s[i], 0.0), h)
-        if inverse_of != i:
-            span = element[i] - len(legs)
-            on = _Interval(element[i], w0[i], w1[i], h, span >= 0)
-            if span >= 0:
-                _copy_span(spans, span, room.coef, room.slope)
-                begin, width = spans[span].begin, spans[span].width
-            exact = _invert(table, on, room, here, inverse)
-            inverse_of = i
-        w = w0[i] + (w1[i] - w0[i]) * _horner(inverse, ds / h)
-        if not exact:
-            w = _refine(table, on, room, w, ds, here)
+        if on_of != i:
+            on, on_of = _interval(table, grid, i, room), i
+            if on.span:
+                begin, width = spans[element[i] - len(legs)].begin, spans[element[i] - len(legs)].width
+        ds = min(max(s_here - s[i], 0.0), on.h)
+        w = _parameter(table, on, room, inverse[i], ds, here)
         segment[n] = of_interval[i]
         if on.span:
             place = begin + width * w

@@ -15,13 +15,14 @@ import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.search import nearest
-from planner.motion.sampling import Grid, Law, sample
+from planner.motion.sampling import Grid, Law, inverses, sample
 from planner.motion.time_law import TimeLaw
 from planner.motion.trajectory import Trajectory
 from planner.path.samples import PathSamples
@@ -35,6 +36,10 @@ SHORTEST_PIECE = 1e-9
 SAMPLES_MAX = 1e8
 # Samples per chunk of a finely sampled motion: 20 MB with three axes.
 CHUNK = 100_000
+
+
+# `inverses` of the grids in use: motions on one grid differ in their time laws only.
+_inverses: WeakKeyDictionary[PathSamples, FloatArray] = WeakKeyDictionary()
 
 
 class MotionInTime(Protocol):
@@ -143,12 +148,14 @@ def _sample_times(end: float, dt: float) -> FloatArray:
 
 def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     samples, law = motion.samples, motion.law
-    toolpath = samples.path.toolpath
+    toolpath, axes = samples.path.toolpath, samples.position.shape[1]
     timed = Law(law.t, law.s, law.feed, law.acc_s, law.jerk_s, law.run, float(law.end))
     grid = Grid(
         samples.piece, samples.s, samples.element, samples.w0, samples.w1, samples.segment, samples.path.passed
     )
-    *columns, segment = sample(samples.table, timed, grid, times, samples.position.shape[1])
+    if samples not in _inverses:
+        _inverses[samples] = inverses(samples.table, grid, axes)
+    *columns, segment = sample(samples.table, timed, grid, _inverses[samples], times, axes)
     names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
     return Trajectory(
         axes=toolpath.axes,

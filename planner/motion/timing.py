@@ -22,6 +22,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.search import nearest
+from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.sampling import Grid, Law, inverses, sample
 from planner.motion.time_law import TimeLaw
 from planner.motion.trajectory import Trajectory
@@ -32,8 +33,10 @@ WATCHED = np.array([0.05, 0.5, 0.95])
 # Pieces shorter than this get no samples of their own [s]: the rounding of times puts them into their neighbours, and what happens
 # there moves nothing (2e5 mm/s3 for 1e-9 s are 1e-13 mm/s).
 SHORTEST_PIECE = 1e-9
-# More samples than this are refused: with three axes they fill 14 GB.
+# More samples than this are refused: a day at 1 ms, and with three axes 14 GB of files.
 SAMPLES_MAX = 1e8
+# Up to so many are kept, 138 MB with three axes; more are evaluated again for the verdict and for the files.
+SAMPLES_KEPT = 2**20
 # Samples per chunk of a finely sampled motion: 20 MB with three axes.
 CHUNK = 100_000
 
@@ -99,8 +102,10 @@ class Motion:
 
 
 def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
-    """The motion at the interpolation period dt [s], last partial period included."""
-    return motion.at(_sample_times(motion.end, dt), dt)
+    """The motion at the interpolation period dt [s], last partial period included; of more samples than `SAMPLES_KEPT` they are
+    evaluated when they are asked for."""
+    count, times = _sample_times(motion.end, dt)
+    return TrajectoryOnDemand(motion, dt, count) if times is None else motion.at(times, dt)
 
 
 def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
@@ -135,15 +140,18 @@ def require_samples(end: float, dt: float) -> None:
         )
 
 
-def _sample_times(end: float, dt: float) -> FloatArray:
-    """0, dt, 2 dt, ..., end; a remainder below a millionth of dt is rounding and joins the period before."""
+def _sample_times(end: float, dt: float) -> tuple[int, FloatArray | None]:
+    """How many samples 0, dt, 2 dt, ..., end are, and their times, None for more than `SAMPLES_KEPT`; a remainder below a millionth of
+    dt is rounding and joins the period before."""
     require_samples(end, dt)
     count = int(np.floor(end / dt * (1 + 1e-12)))
+    if not count or end - count * dt > 1e-6 * dt:
+        count += 1
+    if count + 1 > SAMPLES_KEPT:
+        return count + 1, None
     times: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
-    if count and end - times[-1] <= 1e-6 * dt:
-        times[-1] = end
-        return times
-    return np.append(times, end)
+    times[-1] = end
+    return count + 1, times
 
 
 def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:

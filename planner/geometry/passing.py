@@ -121,7 +121,7 @@ class SegmentsInOrder:
     def runs(self) -> tuple[Array, Array] | None:
         """(R,) at which point each run of points at one segment begins, and (R,) that segment; None where it cannot be told."""
         last = len(self._chain.budget) - 1
-        if self._lost or not self._count and not self._open or self._high != last:
+        if self._lost or (not self._count and not self._open) or self._high != last:
             return None
         self._settle(self._open, last)
         self._open = []

@@ -75,7 +75,9 @@ class TrajectoryOnDemand(Trajectory):
     def first_not_before(self, times: FloatArray) -> Array:
         """(n,) index of the first sample at or after each time [s]; T where there is none."""
         k = np.clip(np.ceil(np.asarray(times) / self.dt), 0, len(self) - 1).astype(np.int64)
-        k = np.where((k > 0) & (self._times(np.maximum(k - 1, 0)) >= times), k - 1, k)  # the quotient is rounded
+        k = np.where(
+            (k > 0) & (self._times(np.maximum(k - 1, 0)) >= times), k - 1, k
+        )  # the quotient is rounded
         found: Array = np.where(self._times(k) < times, k + 1, k)
         return found
 

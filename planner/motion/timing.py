@@ -159,7 +159,13 @@ def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     toolpath, axes = samples.path.toolpath, samples.position.shape[1]
     timed = Law(law.t, law.s, law.feed, law.acc_s, law.jerk_s, law.run, float(law.end))
     grid = Grid(
-        samples.piece, samples.s, samples.element, samples.w0, samples.w1, samples.segment, samples.path.passed
+        samples.piece,
+        samples.s,
+        samples.element,
+        samples.w0,
+        samples.w1,
+        samples.segment,
+        samples.path.passed,
     )
     if samples not in _inverses:
         _inverses[samples] = inverses(samples.table, grid, axes)

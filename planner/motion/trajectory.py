@@ -11,7 +11,6 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 
-
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
 
 

@@ -97,7 +97,11 @@ def _worst(feed, motions, limits, smooth, out):
             values, most = motions[order], 0.0
             for k in range(values.shape[1]):
                 limit = limits[order, k]
-                y0, y1, y2 = values[3 * n, k] / limit, values[3 * n + 1, k] / limit, values[3 * n + 2, k] / limit
+                y0, y1, y2 = (
+                    values[3 * n, k] / limit,
+                    values[3 * n + 1, k] / limit,
+                    values[3 * n + 2, k] / limit,
+                )
                 seen = max(abs(y0), abs(y1), abs(y2))
                 slope = (y2 - y0) / apart
                 bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)

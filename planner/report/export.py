@@ -24,7 +24,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.report.optimum import optimum_summary
-from planner.report.planned import LeftOut, planned_notes, planned_program
+from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
@@ -186,8 +186,7 @@ def _planned(plan: Plan, directory: Path) -> tuple[bytes | None, list[str]]:
     if _is_source(plan, directory / PLANNED):
         return None, [f"{PLANNED} is the program that was planned, and stays as it is"]
     try:
-        text = planned_program(plan)
-        return text, planned_notes(plan, text)
+        return planned_program(plan)
     except LeftOut as why:
         return None, [f"{PLANNED} is left out: {why}"]
 

@@ -64,5 +64,7 @@ class Comparison:
             )
         bound = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION)) * (1 + RATIO_ROUNDING)
         for axis in np.flatnonzero(self.excess > bound):
-            said.append(f"motion: not the delivered one: {self.axes[axis]} differs at t = {self.time[axis]:.6g} s")
+            said.append(
+                f"motion: not the delivered one: {self.axes[axis]} differs at t = {self.time[axis]:.6g} s"
+            )
         return said

@@ -211,7 +211,9 @@ def _nearest_point(
 
 
 def _joined(readings: list[_Reading]) -> _Reading:
-    return _Reading(**{name: np.concatenate([getattr(one, name) for one in readings]) for name in vars(readings[0])})
+    return _Reading(
+        **{name: np.concatenate([getattr(one, name) for one in readings]) for name in vars(readings[0])}
+    )
 
 
 def _nearer(a: _Reading, b: _Reading) -> _Reading:

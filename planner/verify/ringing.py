@@ -29,7 +29,9 @@ from planner.motion.trajectory import Trajectory
 from planner.verify.pieces import kernel
 
 STEP = 0.2  # [rad] of the mode's phase between two looks: a peak is missed by less than 1 - cos(0.1) = 0.5 %
-DEFLECTION, SLOPE, MOST = range(3)  # of an axis in a mode: where it is, how fast, and the largest deflection so far
+DEFLECTION, SLOPE, MOST = range(
+    3
+)  # of an axis in a mode: where it is, how fast, and the largest deflection so far
 STATE = 3
 
 
@@ -76,7 +78,9 @@ def ringing_of(trajectory: Trajectory, machine: Machine) -> tuple[Ringing, ...]:
         for mode, of_mode in zip(machine.modes, state, strict=True):
             _shake(carried[0], carried[1], carried[2], 2.0 * math.pi * mode.frequency, mode.damping, of_mode)
         carried = [column[-1:].copy() for column in carried]
-    return tuple(_ringing(mode, of_mode, trajectory.axes) for mode, of_mode in zip(machine.modes, state, strict=True))
+    return tuple(
+        _ringing(mode, of_mode, trajectory.axes) for mode, of_mode in zip(machine.modes, state, strict=True)
+    )
 
 
 def _ringing(mode: Mode, state: FloatArray, axes: tuple[str, ...]) -> Ringing:

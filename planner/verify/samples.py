@@ -84,7 +84,9 @@ class Delivered:
         }
         t = np.concatenate([before["t"], columns["t"]])
         self.run += float(
-            np.linalg.norm(np.diff(np.concatenate([before["position"], columns["position"]]), axis=0), axis=1).sum()
+            np.linalg.norm(
+                np.diff(np.concatenate([before["position"], columns["position"]]), axis=0), axis=1
+            ).sum()
         )
         when, periods = np.append(self._last[0], t[:-1]), np.append(self._last[1], np.diff(t))
         self._last = when[-1:], periods[-1:]

@@ -82,8 +82,8 @@ class _Interval(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """What an interval is evaluated with: coefficients of its span (6, A) and of its derivatives (5, A), (4, A), (3, A); work (2, 4, A),
-    speed (8,)."""
+    """What an interval is evaluated with: coefficients of its span (6, A) and of the derivatives (5, A), (4, A), (3, A) of that;
+    work (2, 4, A), speed (8,)."""
 
     coef: FloatArray
     first: FloatArray
@@ -105,22 +105,19 @@ def _room(axes):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _interval(table, grid, i, room):
     """Interval i of the grid, with the coefficients of its span in `room`."""
     legs, _, spans = table
     span = grid.element[i] - len(legs)
     if span >= 0:
-        given = spans[span].coef
-        for k in range(room.coef.shape[1]):
-            for m in range(DEGREE + 1):
-                room.coef[m, k] = given[m, k]
-            for m in range(1, DEGREE + 1):
-                room.first[m - 1, k] = m * given[m, k]
-            for m in range(2, DEGREE + 1):
-                room.second[m - 2, k] = m * (m - 1) * given[m, k]
-            for m in range(3, DEGREE + 1):
-                room.third[m - 3, k] = m * (m - 1) * (m - 2) * given[m, k]
+        given, p, d, b, t = spans[span].coef, room.coef, room.first, room.second, room.third
+        for k in range(p.shape[1]):
+            c1, c2, c3, c4, c5 = given[1, k], given[2, k], given[3, k], given[4, k], given[5, k]
+            p[0, k], p[1, k], p[2, k], p[3, k], p[4, k], p[5, k] = given[0, k], c1, c2, c3, c4, c5
+            d[0, k], d[1, k], d[2, k], d[3, k], d[4, k] = c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5
+            b[0, k], b[1, k], b[2, k], b[3, k] = 2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5
+            t[0, k], t[1, k], t[2, k] = 6.0 * c3, 24.0 * c4, 60.0 * c5
     return _Interval(grid.element[i], grid.w0[i], grid.w1[i], grid.s[i + 1] - grid.s[i], span >= 0)
 
 

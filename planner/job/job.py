@@ -133,11 +133,20 @@ class Job:
         machine, toolpath = self.real
         with self.stage("sample"):
             motion = self.settled(motion, not_limited)
-            trajectory = self._named(sample_motion(motion, machine.dt))
-        self.motion_of[trajectory] = motion
+            trajectory = sample_motion(motion, machine.dt)
+            places = SegmentsInOrder(toolpath)
+
+            def take(chunk: Trajectory) -> None:
+                places.take(chunk.position, chunk.feed)
+
+            if isinstance(trajectory, TrajectoryOnDemand):
+                judged: Trajectory = trajectory.heard_by(take)
+            else:
+                take(trajectory)
+                judged = trajectory
         with self.stage("verify") as progress:
             verdict = verify(
-                trajectory,
+                judged,
                 toolpath,
                 machine,
                 motion=motion,
@@ -145,6 +154,8 @@ class Job:
                 not_limited=not_limited,
                 progress=progress,
             )
+        trajectory = self._named(trajectory, places)
+        self.motion_of[trajectory] = motion
         return trajectory, verdict
 
     def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
@@ -152,14 +163,10 @@ class Job:
         machine, toolpath = self.real
         return settled(motion, toolpath, machine, "jerk" not in not_limited)
 
-    def _named(self, trajectory: Trajectory) -> Trajectory:
+    def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
         method's own blocks and a note."""
-        _, toolpath = self.real
-        found = SegmentsInOrder(toolpath)
-        for chunk in trajectory.chunks():
-            found.take(chunk.position, chunk.feed)
-        runs = found.runs()
+        toolpath, runs = self.real[1], places.runs()
         if runs is None:
             self.note(
                 "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"

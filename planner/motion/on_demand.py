@@ -7,7 +7,7 @@ each time. Whoever asks for a whole column gets all of them, kept from then on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -58,14 +58,23 @@ class TrajectoryOnDemand(Trajectory):
         """The same with other blocks and lines: sample first[n] is the first of those at block[n], line[n] (R,)."""
         return TrajectoryOnDemand(self._motion, self.dt, len(self), _Places(first, block, line))
 
+    def heard_by(self, take: Callable[[Trajectory], object]) -> TrajectoryOnDemand:
+        """The same; whoever first goes through its chunks lets `take` have them too, so that they are evaluated once for both."""
+        heard = TrajectoryOnDemand(self._motion, self.dt, len(self), self._places)
+        object.__setattr__(heard, "_take", take)
+        return heard
+
     def chunks(self) -> Iterator[Trajectory]:
         """All samples in order, `CHUNK` at a time."""
-        whole = vars(self).get("_whole")
-        if whole is not None:
-            yield whole
+        if "_whole" in vars(self):
+            yield self._whole
             return
+        take = vars(self).pop("_take", None)
         for first in range(0, len(self), CHUNK):
-            yield self.rows(np.arange(first, min(first + CHUNK, len(self))))
+            chunk = self.rows(np.arange(first, min(first + CHUNK, len(self))))
+            if take is not None:
+                take(chunk)
+            yield chunk
 
     def rows(self, k: Array) -> Trajectory:
         """The samples with the ascending indices k (n,)."""

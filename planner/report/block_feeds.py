@@ -94,34 +94,52 @@ def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
 
 
 def planned_blocks(trajectory: Trajectory, toolpath: Toolpath) -> PlannedBlocks:
-    """Times and highest feeds of the blocks of a path.
+    """Times and highest feeds of the blocks of a path, see `BlockWatch`."""
+    watch = BlockWatch(toolpath)
+    for chunk in trajectory.chunks():
+        watch.take(chunk)
+    return watch.planned(trajectory)
+
+
+class BlockWatch:
+    """Times and highest feeds of the blocks of a path, from a trajectory that comes chunk by chunk.
 
     The highest feed of a block is that at its samples, half-way between them, as far as feeds and accelerations at both tell, and at
     its joints. Its mean at least; twice that where both joints are passed at less than half of it, as between two full stops without a
     sample: from rest to rest no jerk-limited motion is faster.
     """
-    joint, passed = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath) + 1)  # when, how fast
-    highest = np.zeros(len(toolpath))
-    along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
-    last: Trajectory | None = None
-    for chunk in trajectory.chunks():
-        first = last is None
-        part = chunk if last is None else joined([last, chunk])
-        segment = np.searchsorted(toolpath.block, part.block)
+
+    def __init__(self, toolpath: Toolpath):
+        self._toolpath = toolpath
+        self._joint, self._passed = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath) + 1)  # when, how fast
+        self._highest = np.zeros(len(toolpath))
+        self._along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
+        self._last: Trajectory | None = None
+
+    def take(self, chunk: Trajectory) -> None:
+        """The next samples."""
+        part = chunk if self._last is None else joined([self._last, chunk])
+        segment = np.searchsorted(self._toolpath.block, part.block)
         joints = np.arange(segment[0] + 1, segment[-1] + 1)
-        joint[joints], passed[joints] = _passed(part, segment, joints, toolpath, along)
-        _look_between(part, segment, highest, first)
-        last = part.rows(np.array([len(part) - 1]))
-    assert last is not None
-    joint[-1], passed[-1] = last.t[-1], last.feed[-1]
-    joint[0] = last.t[-1] - trajectory.cycle_time + toolpath.dwell[0]
-    at = np.clip(trajectory.first_not_before(joint[:1])[0], 1, len(trajectory) - 1)
-    beside = trajectory.rows(np.array([at - 1, at]))
-    passed[0] = np.interp(joint[0], beside.t, beside.feed)
-    duration = np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
-    highest = np.maximum(highest, np.maximum(passed[:-1], passed[1:]))
-    mean = np.divide(toolpath.length, duration, out=np.zeros(len(toolpath)), where=duration > 0)
-    return PlannedBlocks(duration, np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean))
+        self._joint[joints], self._passed[joints] = _passed(
+            part, segment, joints, self._toolpath, self._along
+        )
+        _look_between(part, segment, self._highest, self._last is None)
+        self._last = part.rows(np.array([len(part) - 1]))
+
+    def planned(self, trajectory: Trajectory) -> PlannedBlocks:
+        """What was found, all samples of the trajectory taken."""
+        toolpath, joint, passed, last = self._toolpath, self._joint, self._passed, self._last
+        assert last is not None
+        joint[-1], passed[-1] = last.t[-1], last.feed[-1]
+        joint[0] = last.t[-1] - trajectory.cycle_time + toolpath.dwell[0]
+        at = np.clip(trajectory.first_not_before(joint[:1])[0], 1, len(trajectory) - 1)
+        beside = trajectory.rows(np.array([at - 1, at]))
+        passed[0] = np.interp(joint[0], beside.t, beside.feed)
+        duration = np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
+        highest = np.maximum(self._highest, np.maximum(passed[:-1], passed[1:]))
+        mean = np.divide(toolpath.length, duration, out=np.zeros(len(toolpath)), where=duration > 0)
+        return PlannedBlocks(duration, np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean))
 
 
 def _look_between(part: Trajectory, segment: Array, highest: FloatArray, first: bool) -> None:

@@ -38,9 +38,11 @@ class LeftOut(Exception):
     """There is no program with planned feeds; the message says why."""
 
 
-def planned_program(plan: Plan) -> tuple[bytes, list[str]]:
+def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[bytes, list[str]]:
     """The program file of a plan, with an F word where the planned feed changes, and notes on blocks for which a control gains nothing
     from it.
+
+    planned : what the blocks are planned to take, if it is known already
 
     Raises LeftOut if the file has changed since it was planned, or if the result does not read back as the same motion, for example
     because a line would become too long.
@@ -53,7 +55,7 @@ def planned_program(plan: Plan) -> tuple[bytes, list[str]]:
         raise LeftOut(f"the program was not read from a file, or {source} is no longer there") from None
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
-    planned = planned_blocks(plan.trajectory, plan.toolpath)
+    planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
     feeds = feeds_of(planned, plan.toolpath, plan.machine, len(plan.program))
     if is_plotter_file(data, plan.program.source):
         text = _written_anew(plan, feeds)

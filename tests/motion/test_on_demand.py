@@ -12,6 +12,7 @@ from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.trajectory import COLUMNS, Trajectory
 from planner.report import trajectory_file
 from planner.report.block_feeds import planned_blocks
+from planner.report.export import write_plan
 from planner.report.trajectory_file import write_trajectory
 
 METHODS = ("stop", "bezier", "fir", "kinematic")
@@ -92,3 +93,16 @@ def test_times_of_blocks_are_the_same(both):
     kept, asked = (planned_blocks(plan.trajectory, plan.toolpath) for plan in both)
     np.testing.assert_allclose(asked.duration, kept.duration, atol=1e-12)
     np.testing.assert_allclose(asked.highest, kept.highest, rtol=1e-9)
+
+
+def test_a_directory_holds_the_same_program(tmp_path, monkeypatch):
+    program = tmp_path / "turns.ngc"
+    program.write_text("G21 G90 F6000\nG1 X2\nY2\nX4\nY4\nX6\nG3 X6 Y0 J-2\nG1 X0\nM2\n")
+    written = {}
+    for kept in (2**20, 50):
+        monkeypatch.setattr(timing, "SAMPLES_KEPT", kept)
+        made = planner.plan(program, problems.machine(), method="bezier")
+        assert isinstance(made.trajectory, TrajectoryOnDemand) == (kept == 50)
+        write_plan(made, tmp_path / str(kept))
+        written[kept] = (tmp_path / str(kept) / "planned.ngc").read_bytes()
+    assert written[50] == written[2**20] != program.read_bytes()

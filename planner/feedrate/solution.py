@@ -51,9 +51,13 @@ class Prices:
     ) -> Prices:
         """From dT/d(ln limit) [s]: of the rows of each axis (A,), and of every point's feed_sq_max (P,), which counts for the axis
         limit it comes from."""
-        names = np.array(problem.bound_names)[problem.feed_sq_bound]
-        velocity = np.array([2.0 * feed_sq_max[names == f"velocity.{axis}"].sum() for axis in problem.axes])
-        jump = np.array([feed_sq_max[names == f"curvature_jump.{axis}"].sum() for axis in problem.axes])
+        number = {name: k for k, name in enumerate(problem.bound_names)}
+
+        def of_bounds(kind: str) -> FloatArray:
+            found = [problem.feed_sq_bound == number.get(f"{kind}.{axis}", -1) for axis in problem.axes]
+            return np.array([feed_sq_max[points].sum() for points in found])
+
+        velocity, jump = 2.0 * of_bounds("velocity"), of_bounds("curvature_jump")
         return cls(
             velocity=velocity / problem.velocity,
             acceleration=(acceleration + jump) / problem.acceleration,

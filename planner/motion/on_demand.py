@@ -31,6 +31,10 @@ class _AnyMotion(Protocol):
 class TrajectoryOnDemand(Trajectory):
     """A `Trajectory` with the columns of a motion at 0, dt, 2 dt, ... and at its end, evaluated when they are asked for."""
 
+    def __new__(cls, *given: Any, **fields: Any) -> Any:
+        """With the fields of a `Trajectory`, as from `dataclasses.replace`, such a one."""
+        return Trajectory(**fields) if "position" in fields else super().__new__(cls)
+
     def __init__(self, motion: _AnyMotion, dt: float, count: int, places: _Places | None = None):
         values = {
             "axes": motion.at(np.zeros(1), dt).axes,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,9 @@ def test_the_samples_are_the_same_by_chunks_by_rows_and_as_a_whole(both):
         np.testing.assert_allclose(getattr(asked, name), wanted, atol=1e-12 * scale)
     with pytest.raises(AttributeError):
         _ = asked.colour
+    later = dataclasses.replace(asked, t=asked.t + 1.0)
+    assert type(later) is Trajectory
+    assert later.t[0] == 1.0
 
 
 def test_a_sample_is_found_by_its_time(both):

@@ -20,6 +20,7 @@ and speeds up along another.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -27,8 +28,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
-from planner.motion.trajectory import joined
-from planner.motion.vertex_times import STANDING, passing_times
+from planner.motion.trajectory import Trajectory, joined
+from planner.motion.vertex_times import STANDING, passing_times_of
 
 # Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
 # changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
@@ -146,11 +147,18 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
     Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the chords miss it in the worst
     phase of the samples; 0 where the motion rests.
     """
-    fine = np.arange(0.0, motion.end, dt / PER_PERIOD)
-    seen = joined(list(in_chunks(motion, dt, np.concatenate([fine, motion.t, [motion.end]]))))
-    when = passing_times(seen, toolpath)
+    fastest = 0.0
+
+    def seen() -> Iterator[Trajectory]:
+        nonlocal fastest
+        for part in _looks(motion, dt / PER_PERIOD, dt):
+            fastest = max(fastest, float(part.feed.max()))
+            yield part
+
+    when = passing_times_of(seen(), toolpath)
     vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
-    moving = np.interp(when, seen.t, seen.feed) > STANDING * seen.feed.max()
+    place, of = np.unique(np.minimum(when, motion.end), return_inverse=True)
+    moving = motion.at(place, dt).feed[of] > STANDING * fastest
     near, far = np.zeros(len(vertex)), np.zeros(len(vertex))
     shift = (np.arange(-1, 3)[None, :] - np.arange(PHASES)[:, None] / PHASES) * dt
     at = np.flatnonzero(moving)
@@ -162,6 +170,19 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
         fine_off = _positions(motion, when[some, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
         near[some] = np.linalg.norm(fine_off - vertex[some, None], axis=2).min(axis=1)
     return near, far
+
+
+def _looks(motion: MotionInTime, step: float, dt: float) -> Iterator[Trajectory]:
+    """The motion every `step` [s], at the ends of its pieces and at its own, in chunks."""
+    count, pieces = int(np.ceil(motion.end / step)), motion.t
+    for first in range(0, count, CHUNK):
+        beyond = min(first + CHUNK, count)
+        begin, end = first * step, beyond * step if beyond < count else motion.end
+        low, high = np.searchsorted(pieces, [begin, end], side="right")
+        times = np.concatenate(
+            [np.arange(first, beyond) * step, pieces[low:high], [motion.end] * (beyond == count)]
+        )
+        yield motion.at(np.unique(np.clip(times, 0.0, motion.end)), dt)
 
 
 def with_less_tolerance(

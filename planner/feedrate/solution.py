@@ -56,10 +56,11 @@ class Prices:
         acceleration, jerk : (A,) of the rows of each axis
         feed_sq_max        : (P,) of every point's bound, which counts for the axis limit it comes from
         """
-        names = np.array(problem.bound_names)[problem.feed_sq_bound]
+        number = {name: k for k, name in enumerate(problem.bound_names)}
 
         def of_caps(called: Callable[[str], str]) -> FloatArray:
-            return np.array([feed_sq_max[names == called(axis)].sum() for axis in problem.axes])
+            found = [problem.feed_sq_bound == number.get(called(axis), -1) for axis in problem.axes]
+            return np.array([feed_sq_max[points].sum() for points in found])
 
         velocity = 2.0 * of_caps(VELOCITY.called)
         jump = of_caps(ACCELERATION.called_at_jump)

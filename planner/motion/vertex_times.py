@@ -9,6 +9,8 @@ apart. (Which block each point of a motion is at, by distances and budgets, is i
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from planner.base.arrays import FloatArray
@@ -29,10 +31,27 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
     motion : sampled so often that between samples it runs straight to within the tolerance
     """
+    return passing_times_of([motion], toolpath)
+
+
+def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
+    """The same of a motion in parts, each of which may begin with the last sample of the one before."""
     vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
     times = np.empty(len(vertex))
-    eps = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
-    _pass(motion.position, motion.s, motion.t, vertex, toolpath.length, SLACK * eps, times)
+    slack = SLACK * np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
+    seen: tuple[FloatArray, ...] | None = None  # position, s and t from the chord on that was reached
+    done, share = 1, 0.0
+    for chunk in chunks:
+        new = chunk.position, chunk.s, chunk.t
+        if seen is None:
+            seen, times[0] = new, chunk.t[0]
+        else:
+            fresh = int(np.searchsorted(chunk.t, seen[2][-1], side="right"))
+            seen = tuple(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True))
+        done, k, share = _pass(*seen, vertex, toolpath.length, slack, times, done, share, False)
+        seen = tuple(column[k:].copy() for column in seen)
+    assert seen is not None
+    _pass(*seen, vertex, toolpath.length, slack, times, done, share, True)
     return times
 
 
@@ -53,14 +72,19 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
 
 
 @njit(cache=True, error_model="numpy")
-def _pass(position, s, t, vertex, length, slack, times):
-    """Write when the polyline position (T, A) with way s and times t (T,) is nearest to each vertex (N+1, A)."""
+def _pass(position, s, t, vertex, length, slack, times, i, share, last_part):
+    """Write when the polyline position (T, A) with way s and times t (T,) is nearest to each vertex (N+1, A) from vertex i on, as
+    far as it goes; of the last part to the end. The place reached is at the `share` of the first chord.
+
+    Returns the next vertex, and the place reached: chord and share of it.
+    """
     last = len(t) - 2
-    k, share = 0, 0.0  # the place reached: chord and share of it
-    times[0] = t[0]
-    for i in range(1, len(vertex)):
+    k = 0
+    while i < len(vertex) and last >= 0:
         here = s[k] + share * (s[k + 1] - s[k])
         begin, end = here + length[i - 1] - slack[i - 1], here + length[i - 1] + slack[i - 1]
+        if s[last + 1] <= end and not last_part:
+            break
         while k < last and s[k + 1] < begin:
             k, share = k + 1, 0.0
         nearest, best, best_share = np.inf, k, share
@@ -83,3 +107,5 @@ def _pass(position, s, t, vertex, length, slack, times):
             n += 1
         k, share = best, best_share
         times[i] = t[k] + share * (t[k + 1] - t[k])
+        i += 1
+    return i, k, share

@@ -35,9 +35,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
-from planner.feedrate.jerk.window import ScaledWindow, Window
-from planner.feedrate.lagrangian import acceleration_limits, lagrangian
+from planner.feedrate.jerk.window import ScaledWindow, Window, columns_of
+from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 # Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4 of some profiles' time, 5
@@ -153,7 +154,7 @@ class _Profile:
         self.windows = self.other_starts = self.other_ends = self.divided = 0
         self.stops: list[int] = []  # points where the profile rests because nothing better was found
         self._rest: Window | None = None  # what the window before knew of the way ahead, down to its stop
-        self.acceleration = acceleration_limits(problem)
+        self.columns, self.room = columns_of(problem), Room()
 
     def solve_piece(self, first: int, last: int) -> None:
         """Solve the points first..last in windows."""
@@ -209,7 +210,7 @@ class _Profile:
         return end
 
     def _scaled(self, begin: int, end: int) -> ScaledWindow:
-        return ScaledWindow.of(self.problem, self.acceleration, begin, end, self.solver.settings)
+        return ScaledWindow.of(self.problem, self.columns, begin, end, self.room, self.solver.settings)
 
     def _solve_window(self, begin: int, end: int) -> Window | None:
         """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
@@ -262,7 +263,7 @@ class _Profile:
         ):
             d1, d2, d3 = problem.d1[points], d2[points], d3[points]
             x_here, v_here, u_here = self.x[points, None], v[points, None], u[points, None]
-            acceleration = np.abs(d1 * u_here + d2 * x_here) / self.acceleration[points]
+            acceleration = np.abs(d1 * u_here + d2 * x_here) / self.columns.acceleration[points]
             jerk = np.abs(d1 * j[inner, None] + v_here * (3.0 * d2 * u_here + d3 * x_here))
             jerk = jerk / problem.jerk_limit[points]
             worst = np.maximum(np.sqrt(acceleration), np.cbrt(jerk)).reshape(-1, axes).max(axis=1)

@@ -13,11 +13,31 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
-from planner.feedrate.jerk.rows import Grid, Profile, at_profile, empty_model, linearise
+from planner.feedrate.jerk.layout import (
+    LAM_LOW,
+    LAM_UP,
+    LANES,
+    PI,
+    ROW,
+    VALUE,
+    Blocks,
+    Columns,
+    Room,
+    H,
+    P,
+    profile,
+    put,
+    rows_of,
+    slow,
+)
+from planner.feedrate.jerk.rows import PASSING, linearise
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
+from planner.feedrate.jerk.track import track
+from planner.feedrate.lagrangian import acceleration_limits
 
 # A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
 START_ROOM = 0.9
@@ -31,7 +51,21 @@ POLISHED = 1e-14  # defect, share of the largest feed [-]
 GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
-JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
+
+
+def columns_of(problem: FeedrateProblem) -> Columns:
+    """What the kernel needs to know of a problem."""
+    return Columns(
+        s=problem.s,
+        x_max=problem.feed_sq_limit,
+        d1=problem.d1,
+        d2_left=problem.d2_left,
+        d2_right=problem.d2_right,
+        d3_left=problem.d3_left,
+        d3_right=problem.d3_right,
+        acceleration=acceleration_limits(problem),
+        jerk=problem.jerk_limit,
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,15 +99,18 @@ class Window:
 class ScaledWindow:
     """A window's problem in units of its own: fastest feed 1, largest acceleration 1.
 
-    jumps : 1 if r'' jumps at an inner point, else 0
-    asked : (N+1,) its envelope (start.py)
-    feed  : unit of speed [mm/s]
-    time  : unit of time [s]
+    blocks : the problem, with room for profile and multipliers, which are worked on in place
+    s      : (N+1,) arc length [mm]
+    asked  : (N+1,) feed^2 of the envelope (start.py) [mm2/s2]
+    jerk   : of the slowest axis, scaled
+    feed   : unit of speed [mm/s]
+    time   : unit of time [s]
     """
 
-    grid: Grid
-    jumps: int
+    blocks: Blocks
+    s: FloatArray
     asked: FloatArray
+    jerk: float
     feed: float
     time: float
     settings: InteriorPointSettings = SETTINGS
@@ -82,31 +119,21 @@ class ScaledWindow:
     def of(
         cls,
         problem: FeedrateProblem,
-        acceleration: FloatArray,
+        columns: Columns,
         begin: int,
         end: int,
+        room: Room,
         settings: InteriorPointSettings = SETTINGS,
     ) -> ScaledWindow:
-        """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
+        """The points begin..end of a problem, until `room` is used for another window."""
         own = slice(begin, end + 1)
-        feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
+        feed = float(np.sqrt(columns.x_max[own].max()))
         t = float(feed / problem.acceleration[: problem.machine_axes].max())
-        length = feed * t
-        grid = Grid(
-            ds=np.diff(problem.s[own]) / length,
-            x_max=problem.feed_sq_limit[own] / feed**2,
-            d1=problem.d1[own],
-            d2_left=problem.d2_left[own] * length,
-            d2_right=problem.d2_right[own] * length,
-            d3_left=problem.d3_left[own] * length**2,
-            d3_right=problem.d3_right[own] * length**2,
-            per_acceleration=feed / t / acceleration[own],
-            per_jerk=feed / (t * t) / problem.jerk_limit[own],
-        )
         return cls(
-            grid=grid,
-            jumps=_jumps(grid),
-            asked=envelope(problem, begin, end) / feed**2,
+            blocks=room.blocks(columns, begin, end, feed, t),
+            s=problem.s[own],
+            asked=envelope(columns, begin, end),
+            jerk=float(columns.jerk[own].min()) * t * t / feed,
             feed=feed,
             time=t,
             settings=settings,
@@ -116,114 +143,92 @@ class ScaledWindow:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
         Also the iterations of the longest try, and from how many starts it was tried."""
         most = starts = 0
-        for starts, start in enumerate(self._starts(behind), start=1):
-            found = kernel.minimise_time(self.grid, start, self.jumps, tol, iterations, self.settings)
+        for starts, (x, u) in enumerate(self._starts(behind), start=1):
+            put(self.blocks, x, u)
+            found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
             if _accepted(found):
-                profile, _ = self._track(found.profile, 0.0, POLISHING_ROUNDS, POLISHED)
-                return self._window(profile, found.lam, found.pi), most, starts
+                self._track(0.0, POLISHING_ROUNDS, POLISHED)
+                return self._window(), most, starts
         return None, most, starts
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""
-        profile = self._slowed(self._plain(1.0))
-        n = len(profile.p)
-        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+        self._slowed(*self._plain(1.0))
+        return self._without_multipliers()
 
     def near(self, x: FloatArray, u: FloatArray) -> Window | None:
         """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
         none. It may exceed its limits a little, and has no multipliers."""
-        rate = u * self.time / self.feed
-        profile, defect = self._track(
-            Profile(x / self.feed**2, rate, np.diff(rate)), 0.0, TRACKING_ROUNDS, POLISHED
-        )
-        if defect > self.settings.defect:
+        put(self.blocks, x / self.feed**2, u * self.time / self.feed)
+        if self._track(0.0, TRACKING_ROUNDS, POLISHED) > self.settings.defect:
             return None
-        n = len(profile.p)
-        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+        return self._without_multipliers()
 
-    def _starts(self, behind: Window | None) -> Iterator[Profile]:
-        """Profiles to start from, the best first."""
-        for start in self._from_rest():
+    def _starts(self, behind: Window | None) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Profiles x, u (N+1,) to start from, scaled, the best first."""
+        for x, u in self._from_rest():
             if behind is None:
-                yield start
+                yield x, u
             else:
-                joined = self._joined(behind, start)
-                yield self._tracked(joined) or joined
+                joined = self._joined(behind, x, u)
+                yield self._tracked(*joined) or joined
 
-    def _from_rest(self) -> Iterator[Profile]:
+    def _from_rest(self) -> Iterator[tuple[FloatArray, FloatArray]]:
         """The same from rest."""
-        asked, rate = envelope_profile(self.asked, self.grid.ds)
-        near = Profile(asked, rate, np.diff(rate))
-        tracked = self._tracked(near)
+        x, u = envelope_profile(self.asked, self.s)
+        near = x / self.feed**2, u * self.time / self.feed
+        tracked = self._tracked(*near)
         if tracked is not None:
-            yield self._slowed(tracked, SLOWER_MAX)
-        yield self._slowed(near, SLOWER_MAX)
-        yield self._slowed(self._plain(asked.max()), SLOWER_MAX)
+            yield self._slowed(*tracked, SLOWER_MAX)
+        yield self._slowed(*near, SLOWER_MAX)
+        yield self._slowed(*self._plain(near[0].max()), SLOWER_MAX)
 
-    def _joined(self, behind: Window, start: Profile) -> Profile:
+    def _joined(self, behind: Window, x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
         ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
-        beyond = 1 + int(np.flatnonzero(ahead > start.x[: len(ahead)])[-1])  # the first at least
-        x, u = np.append(ahead[:beyond], start.x[beyond:]), np.append(rate[:beyond], start.u[beyond:])
-        return Profile(x, u, np.diff(u))
+        beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
+        return np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
 
-    def _track(
-        self, profile: Profile, smoothing: float, rounds: int, defect_max: float
-    ) -> tuple[Profile, float]:
-        """`interior_point.track` with the jerk of the slowest axis as the machine's."""
-        jerk = float(1.0 / self.grid.per_jerk.max())
-        tracked: tuple[Profile, float] = kernel.track(
-            self.grid, jerk, profile, smoothing, rounds, defect_max, self.settings
-        )
-        return tracked
+    def _track(self, smoothing: float, rounds: int, defect_max: float) -> float:
+        """`track` with the jerk of the slowest axis as the machine's."""
+        return float(track(self.blocks, self.jerk, smoothing, rounds, defect_max, self.settings))
 
-    def _tracked(self, profile: Profile) -> Profile | None:
+    def _tracked(self, x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """A profile near to the given one with exact kinematics; None where that is not found."""
-        tracked, defect = self._track(profile, 1.0, TRACKING_ROUNDS, self.settings.defect)
-        return tracked if defect <= self.settings.defect else None
+        put(self.blocks, x, u)
+        defect = self._track(1.0, TRACKING_ROUNDS, self.settings.defect)
+        return profile(self.blocks) if defect <= self.settings.defect else None
 
-    def _plain(self, fastest: float) -> Profile:
+    def _plain(self, fastest: float) -> tuple[FloatArray, FloatArray]:
         """The plain start with a largest feed^2, whatever its limits."""
-        x, u = plain_start(np.concatenate([[0.0], np.cumsum(self.grid.ds)]))
-        return Profile(fastest * x, fastest * u, fastest * np.diff(u))
+        x, u = plain_start(self.s / (self.feed * self.time))
+        return fastest * x, fastest * u
 
-    @property
-    def _rows(self) -> int:
-        """Rows per interval."""
-        return (3 + self.jumps) * self.grid.d1.shape[1] + 2
-
-    def _slowed(self, profile: Profile, most: float = np.inf) -> Profile:
+    def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> tuple[FloatArray, FloatArray]:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
-        axes = self.grid.d1.shape[1]
-        model = empty_model(len(profile.p), self._rows)
-        linearise(self.grid, at_profile(profile, 2 * self._rows - 2), model, self.jumps)
-        worst = np.abs(model.values).max(axis=0)
-        jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
-        worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
-        slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
-        return profile.slower(slower)
+        put(self.blocks, x, u)
+        slow(self.blocks, min(_slower(self.blocks), most))
+        return profile(self.blocks)
 
-    def _window(self, profile: Profile, lam: FloatArray, pi: FloatArray) -> Window:
-        """A profile in the problem's units, with the multipliers of its rows and dynamics."""
-        x, u, p = profile
-        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
-        h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
-        feed, t, lower = self.feed, self.time, self._rows - 2
-        rows = np.zeros((len(p), self.grid.d1.shape[1], 4))
-        rows[:, :, : 3 + self.jumps] = (lam[:, :lower] - lam[:, self._rows :]).reshape(
-            len(p), -1, 3 + self.jumps
-        )
-        of_feed = lam[:, lower : self._rows].copy()
-        of_feed[[0, -1], 1] = 0.0  # these limit the kinematics, not the feed
+    def _without_multipliers(self) -> Window:
+        self.blocks.rows[:] = 0.0
+        self.blocks.work[:, PI : PI + LANES] = 0.0
+        return self._window()
+
+    def _window(self) -> Window:
+        """Profile and multipliers in the problem's units."""
+        x, u = profile(self.blocks)
+        feed, t = self.feed, self.time
+        jerk, duration, rows, of_feed, dynamics = _found(self.blocks)
         return Window(
             x=x * feed**2,
             u=u * feed / t,
-            jerk=p / h * feed / t**2,
-            duration=h * t,
+            jerk=jerk * feed / t**2,
+            duration=duration * t,
             rows=rows * t,
             feed=of_feed * t,
-            dynamics=pi * t / feed**2,
+            dynamics=dynamics * t / feed**2,
         )
 
 
@@ -237,7 +242,39 @@ def _accepted(found: kernel.Minimum) -> bool:
     )
 
 
-def _jumps(grid: Grid) -> int:
-    """1 if r'' jumps by more than rounding at an inner point."""
-    left, right = grid.d2_left[1:-1], grid.d2_right[1:-1]
-    return int((np.abs(left - right).max(axis=1) > JUMP_ROUNDING * np.abs(right).max(axis=1)).any())
+@njit(cache=True, error_model="numpy", nogil=True)
+def _slower(blocks):
+    """By what factor the profile has to be slower to keep its limits with `START_ROOM` to spare; 1 if it does."""
+    passing, defect = np.empty(PASSING), np.zeros(LANES)
+    of_axis = 3 + blocks.jumps
+    second, third = START_ROOM, START_ROOM
+    for b in range(len(blocks.work)):
+        linearise(blocks, b, passing, defect)
+        row = blocks.rows[b]
+        for r in range(rows_of(blocks.axes, blocks.jumps)):
+            jerk = r < blocks.axes * of_axis and (r % of_axis == 1 or r % of_axis == 2)
+            for i in range(min(LANES, blocks.n - b * LANES)):
+                ratio = abs(row[r * ROW + VALUE + i])
+                if jerk:
+                    third = max(third, ratio)
+                else:
+                    second = max(second, ratio)
+    return max(np.sqrt(second / START_ROOM), np.cbrt(third / START_ROOM))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _found(blocks):
+    """Jerk and duration (N,) of the intervals, and the multipliers of rows (N, A, 4), feed (N, 2) and dynamics (N,), scaled."""
+    n, of_axis = blocks.n, 3 + blocks.jumps
+    count = rows_of(blocks.axes, blocks.jumps)
+    jerk, duration, dynamics = np.empty(n), np.empty(n), np.empty(n)
+    rows, feed = np.zeros((n, blocks.axes, 4)), np.zeros((n, 2))
+    for i in range(n):
+        w, row, o = blocks.work[i // LANES], blocks.rows[i // LANES], i % LANES
+        jerk[i], duration[i], dynamics[i] = w[P + o] / w[H + o], w[H + o], w[PI + o]
+        for r in range(count - 2):
+            rows[i, r // of_axis, r % of_axis] = row[r * ROW + LAM_UP + o] - row[r * ROW + LAM_LOW + o]
+        feed[i, 0] = row[(count - 2) * ROW + LAM_UP + o]
+        if 0 < i < n - 1:  # these limit the kinematics, not the feed
+            feed[i, 1] = row[(count - 1) * ROW + LAM_UP + o]
+    return jerk, duration, rows, feed, dynamics

@@ -24,6 +24,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.feedrate.jerk.layout import (
+    BY_BARRIER,
+    BY_BENT,
     BY_P,
     BY_U,
     BY_X,
@@ -113,15 +115,16 @@ LEAST, MOST, PLAIN, ONCE, TWICE = range(0, 5 * LANES, LANES)
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _predict(w, rows, count, seen, m):
     """Newton's steps of the slacks of a block without a barrier, as shares of them, into MOVE; those of the multipliers are -(1 + share)
-    of them."""
+    of them. Also what a barrier and the steps' second-order terms dslack dlam add to the gradient."""
+    w[BY_BARRIER : BY_BARRIER + 6 * LANES] = 0.0
     for r in range(count):
         row = rows[r * ROW :]
         for i in range(m):
             s, y, s_low, y_low = row[SLACK_UP + i], row[LAM_UP + i], row[SLACK_LOW + i], row[LAM_LOW + i]
-            after = row[VALUE + i] + row[BY_X + i] * w[STEP + i]
-            after += row[BY_U + i] * w[STEP + LANES + i] + row[BY_P + i] * w[STEP + 2 * LANES + i]
-            share = (1.0 - after - s) * y * row[PER_GAP_UP + i]
-            share_low = (1.0 + after - s_low) * y_low * row[PER_GAP_LOW + i]
+            a, b, c = row[BY_X + i], row[BY_U + i], row[BY_P + i]
+            after = row[VALUE + i] + a * w[STEP + i] + b * w[STEP + LANES + i] + c * w[STEP + 2 * LANES + i]
+            per_s, per_s_low = y * row[PER_GAP_UP + i], y_low * row[PER_GAP_LOW + i]
+            share, share_low = (1.0 - after - s) * per_s, (1.0 + after - s_low) * per_s_low
             row[MOVE_UP + i], row[MOVE_LOW + i] = share, share_low
             seen[LEAST + i] = min(seen[LEAST + i], min(share, share_low))
             seen[MOST + i] = max(seen[MOST + i], max(share, share_low))
@@ -129,6 +132,13 @@ def _predict(w, rows, count, seen, m):
             seen[PLAIN + i] += gap + gap_low
             seen[ONCE + i] += gap * share + gap_low * share_low
             seen[TWICE + i] += gap * share * share + gap_low * share_low * share_low
+            push, bent = w[H + i] * (per_s - per_s_low), y * share * (1.0 + share) - y_low * share_low * (1.0 + share_low)
+            w[BY_BARRIER + i] += push * a
+            w[BY_BARRIER + LANES + i] += push * b
+            w[BY_BARRIER + 2 * LANES + i] += push * c
+            w[BY_BENT + i] += bent * a
+            w[BY_BENT + LANES + i] += bent * b
+            w[BY_BENT + 2 * LANES + i] += bent * c
 
 
 @njit(cache=True, error_model="numpy")
@@ -150,29 +160,14 @@ def predicted(blocks, settings):
 
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
-def _correct(w, rows, count, barrier, m):
-    """`correct` for a block."""
-    mu, second_order = barrier
-    for r in range(count):
-        row = rows[r * ROW :]
-        for i in range(m):
-            s, y, s_low, y_low = row[SLACK_UP + i], row[LAM_UP + i], row[SLACK_LOW + i], row[LAM_LOW + i]
-            share, share_low, asked = row[MOVE_UP + i], row[MOVE_LOW + i], mu * w[H + i]
-            push = (asked + second_order * s * y * share * (1.0 + share)) * y * row[PER_GAP_UP + i]
-            bent = second_order * s_low * y_low * share_low * (1.0 + share_low)
-            push -= (asked + bent) * y_low * row[PER_GAP_LOW + i]
-            w[GRADIENT + i] += push * row[BY_X + i]
-            w[GRADIENT + LANES + i] += push * row[BY_U + i]
-            w[GRADIENT + 2 * LANES + i] += push * row[BY_P + i]
-
-
-@njit(cache=True, error_model="numpy")
 def correct(blocks, barrier):
     """Second half of a predictor-corrector step: add the barrier mu h to the gradient, less the predicted steps' second-order terms
-    dslack dlam if they count. `barrier` is mu and 1 if they do, else 0."""
-    count = rows_of(blocks.axes, blocks.jumps)
+    if they count. `barrier` is mu and 1 if they do, else 0."""
+    mu, second_order = barrier
     for b in range(len(blocks.work)):
-        _correct(blocks.work[b], blocks.rows[b], count, barrier, min(LANES, blocks.n - b * LANES))
+        w = blocks.work[b]
+        for i in range(3 * LANES):
+            w[GRADIENT + i] += mu * w[BY_BARRIER + i] + second_order * w[BY_BENT + i]
 
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)

@@ -48,7 +48,9 @@ DYN, GRADIENT, CONVEX, CURVED, COSTATE, REST = (k * LANES for k in (6, 10, 13, 1
 GAIN, TO_GO, TO_GO_X, ALONG_P = (k * LANES for k in (27, 30, 33, 34))
 # ... step: dx, du, dp; dx at the end; dpi
 STEP, STEP_END, STEP_PI = (k * LANES for k in (35, 38, 39))
-WORK = 40 * LANES
+# ... what the corrector adds to the gradient: per mu, and for the terms of second order
+BY_BARRIER, BY_BENT = (k * LANES for k in (40, 43))
+WORK = 46 * LANES
 
 # rows, of each: value; gradient in (x, u, p); and of its upper and its lower side: slack, multiplier, one over their product, step of the
 # slack (before that the predicted step as a share of the slack)

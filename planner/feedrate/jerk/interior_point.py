@@ -132,7 +132,10 @@ def _predict(w, rows, count, seen, m):
             seen[PLAIN + i] += gap + gap_low
             seen[ONCE + i] += gap * share + gap_low * share_low
             seen[TWICE + i] += gap * share * share + gap_low * share_low * share_low
-            push, bent = w[H + i] * (per_s - per_s_low), y * share * (1.0 + share) - y_low * share_low * (1.0 + share_low)
+            push, bent = (
+                w[H + i] * (per_s - per_s_low),
+                y * share * (1.0 + share) - y_low * share_low * (1.0 + share_low),
+            )
             w[BY_BARRIER + i] += push * a
             w[BY_BARRIER + LANES + i] += push * b
             w[BY_BARRIER + 2 * LANES + i] += push * c

@@ -83,6 +83,7 @@ def rows_of(axes, jumps):
 class Columns(NamedTuple):
     """A problem of P points and A axes, in its own units."""
 
+    unit: float  # of accelerations
     s: FloatArray  # (P,)
     x_max: FloatArray  # (P,)
     d1: FloatArray  # (P, A), like the rest

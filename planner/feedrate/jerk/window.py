@@ -53,9 +53,13 @@ RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as 
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
 
 
+Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
+
+
 def columns_of(problem: FeedrateProblem) -> Columns:
     """What the kernel needs to know of a problem."""
     return Columns(
+        unit=float(problem.acceleration[: problem.machine_axes].max()),
         s=problem.s,
         x_max=problem.feed_sq_limit,
         d1=problem.d1,
@@ -118,7 +122,6 @@ class ScaledWindow:
     @classmethod
     def of(
         cls,
-        problem: FeedrateProblem,
         columns: Columns,
         begin: int,
         end: int,
@@ -128,10 +131,10 @@ class ScaledWindow:
         """The points begin..end of a problem, until `room` is used for another window."""
         own = slice(begin, end + 1)
         feed = float(np.sqrt(columns.x_max[own].max()))
-        t = float(feed / problem.acceleration[: problem.machine_axes].max())
+        t = feed / columns.unit
         return cls(
             blocks=room.blocks(columns, begin, end, feed, t),
-            s=problem.s[own],
+            s=columns.s[own],
             asked=envelope(columns, begin, end),
             jerk=float(columns.jerk[own].min()) * t * t / feed,
             feed=feed,
@@ -142,8 +145,17 @@ class ScaledWindow:
     def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
         Also the iterations of the longest try, and from how many starts it was tried."""
+        return self._from(self._starts(None if behind is None else (behind.x, behind.u)), tol, iterations)
+
+    def between(self, left: Way, right: Way, tol: float, iterations: int) -> tuple[Window | None, int, int]:
+        """The fastest profile from the first state of `left`, a way to rest or beyond the window, to the last state of `right`, a way
+        from rest or from before the window; as `solve`."""
+        return self._from(self._starts(left, right), tol, iterations)
+
+    def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
+        """What the first of these starts that converges leads to, as `solve`."""
         most = starts = 0
-        for starts, (x, u) in enumerate(self._starts(behind), start=1):
+        for starts, (x, u) in enumerate(profiles, start=1):
             put(self.blocks, x, u)
             found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
@@ -165,16 +177,24 @@ class ScaledWindow:
             return None
         return self._without_multipliers()
 
-    def _starts(self, behind: Window | None) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Profiles x, u (N+1,) to start from, scaled, the best first."""
-        for x, u in self._from_rest():
-            if behind is None:
-                yield x, u
-            else:
-                joined = self._joined(behind, x, u)
-                yield self._tracked(*joined) or joined
+    def _starts(self, left: Way | None, right: Way | None = None) -> Iterator[Way]:
+        """Profiles to start from, scaled, the best first.
 
-    def _from_rest(self) -> Iterator[tuple[FloatArray, FloatArray]]:
+        left  : the way to rest from the first point on, in the problem's units; None from rest
+        right : the same up to the last point
+        """
+        for x, u in self._from_rest():
+            if left is None:
+                yield x, u
+                continue
+            joined = self._joined(left, x, u)
+            if right is not None:
+                back, rate = self._joined(_mirrored(*right), *_mirrored(x, u))
+                faster = back[::-1] > joined[0]
+                joined = np.where(faster, back[::-1], joined[0]), np.where(faster, -rate[::-1], joined[1])
+            yield self._tracked(*joined) or joined
+
+    def _from_rest(self) -> Iterator[Way]:
         """The same from rest."""
         x, u = envelope_profile(self.asked, self.s)
         near = x / self.feed**2, u * self.time / self.feed
@@ -184,9 +204,9 @@ class ScaledWindow:
         yield self._slowed(*near, SLOWER_MAX)
         yield self._slowed(*self._plain(near[0].max()), SLOWER_MAX)
 
-    def _joined(self, behind: Window, x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
-        ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
+    def _joined(self, way: Way, x: FloatArray, u: FloatArray) -> Way:
+        """A profile from rest put behind a way in the problem's units, which leads to the last point where it is faster."""
+        ahead, rate = way[0][: len(x)] / self.feed**2, way[1] * self.time / self.feed
         beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
         return np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
 
@@ -194,18 +214,18 @@ class ScaledWindow:
         """`track` with the jerk of the slowest axis as the machine's."""
         return float(track(self.blocks, self.jerk, smoothing, rounds, defect_max, self.settings))
 
-    def _tracked(self, x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def _tracked(self, x: FloatArray, u: FloatArray) -> Way | None:
         """A profile near to the given one with exact kinematics; None where that is not found."""
         put(self.blocks, x, u)
         defect = self._track(1.0, TRACKING_ROUNDS, self.settings.defect)
         return profile(self.blocks) if defect <= self.settings.defect else None
 
-    def _plain(self, fastest: float) -> tuple[FloatArray, FloatArray]:
+    def _plain(self, fastest: float) -> Way:
         """The plain start with a largest feed^2, whatever its limits."""
         x, u = plain_start(self.s / (self.feed * self.time))
         return fastest * x, fastest * u
 
-    def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> tuple[FloatArray, FloatArray]:
+    def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> Way:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
         put(self.blocks, x, u)
         slow(self.blocks, min(_slower(self.blocks), most))
@@ -230,6 +250,11 @@ class ScaledWindow:
             feed=of_feed * t,
             dynamics=dynamics * t / feed**2,
         )
+
+
+def _mirrored(x: FloatArray, u: FloatArray) -> Way:
+    """A profile passed backward."""
+    return x[::-1].copy(), -u[::-1].copy()
 
 
 def _accepted(found: kernel.Minimum) -> bool:

@@ -71,7 +71,7 @@ def with_exact_kinematics(problem: FeedrateProblem, solution: FeedrateSolution) 
     columns: list[FloatArray] = []
     for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True):
         own = slice(first, beyond)
-        near = ScaledWindow.of(problem, limits, int(first), int(beyond) - 1, room).near(
+        near = ScaledWindow.of(limits, int(first), int(beyond) - 1, room).near(
             solution.feed_sq[own], solution.acc_s[own]
         )
         if near is None:

@@ -27,7 +27,10 @@ def threads() -> int:
 
 
 def side_by_side(
-    work: Sequence[Callable[[], None]], stop: Callable[[], None], waiting: Callable[[], None], period: float = 0.1
+    work: Sequence[Callable[[], None]],
+    stop: Callable[[], None],
+    waiting: Callable[[], None],
+    period: float = 0.1,
 ) -> None:
     """Run all of `work` in as many threads as there may be, in this order; returns when all is done.
 

@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.feedrate.jerk.layout import (
     BY_BARRIER,
@@ -48,11 +47,11 @@ from planner.feedrate.jerk.layout import (
     STEP_END,
     STEP_PI,
     VALUE,
-    X,
     X_END,
     H,
     P,
     U,
+    X,
     rows_of,
 )
 from planner.feedrate.jerk.riccati import costates, forward, offsets, riccati
@@ -114,8 +113,8 @@ LEAST, MOST, PLAIN, ONCE, TWICE = range(0, 5 * LANES, LANES)
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _predict(w, rows, count, seen, m):
-    """Newton's steps of the slacks of a block without a barrier, as shares of them, into MOVE; those of the multipliers are -(1 + share)
-    of them. Also what a barrier and the steps' second-order terms dslack dlam add to the gradient."""
+    """Newton's steps of the slacks of a block without a barrier, as shares of them, into MOVE; those of the multipliers are -(1 +
+    share) of them. Also what a barrier and the steps' second-order terms dslack dlam add to the gradient."""
     w[BY_BARRIER : BY_BARRIER + 6 * LANES] = 0.0
     for r in range(count):
         row = rows[r * ROW :]
@@ -205,7 +204,8 @@ def _direct(w, rows, count, barrier, nearest, m):
 
 @njit(cache=True, error_model="numpy")
 def direction(blocks, barrier, settings):
-    """The Newton step to the barrier mu h, after `correct`. Returns the lengths that profile and slacks, and that multipliers can go."""
+    """The Newton step to the barrier mu h, after `correct`. Returns the lengths that profile and slacks, and that multipliers can
+    go."""
     to_boundary, count = settings.to_boundary, rows_of(blocks.axes, blocks.jumps)
     nearest = np.zeros(2 * LANES)
     primal, dual = forward(blocks, settings.feed_sq_shrink), 1.0

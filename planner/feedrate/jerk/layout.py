@@ -21,8 +21,8 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 
 LANES = 32
-# What the compiler may do to the arithmetic of a block: multiply and add in one instruction, multiply by the inverse of a constant, take
-# -0 for 0. Sums keep their order, NaN stays NaN.
+# What the compiler may do to the arithmetic of a block: multiply and add in one instruction, multiply by the inverse of a constant,
+# take -0 for 0. Sums keep their order, NaN stays NaN.
 LANE_MATH = {"contract", "arcp", "nsz"}
 
 
@@ -33,8 +33,8 @@ def _names(count: int) -> range:
 # grid: length; 1/x_max at the start, 2/x_max in the middle; 1 but in the last interval; 1 in the first and the last interval, else 0
 DS, PER_X, PER_MIDDLE, INNER_END, EDGE = _names(5)
 FIXED = 5 * LANES
-# ... and of each axis, after `FIXED`: factors of the rows (rows.py) of x and u (acceleration), of j, v u and v x (jerk at the start and at
-# the end), of x and u (acceleration before the jump at the end)
+# ... and of each axis, after `FIXED`: factors of the rows (rows.py) of x and u (acceleration), of j, v u and v x (jerk at the start and
+# at the end), of x and u (acceleration before the jump at the end)
 A_X, A_U, B_J, B_U, B_X, C_J, C_U, C_X, D_X, D_U = _names(10)
 AXIS = 10 * LANES
 
@@ -52,8 +52,8 @@ STEP, STEP_END, STEP_PI = (k * LANES for k in (35, 38, 39))
 BY_BARRIER, BY_BENT = (k * LANES for k in (40, 43))
 WORK = 46 * LANES
 
-# rows, of each: value; gradient in (x, u, p); and of its upper and its lower side: slack, multiplier, one over their product, step of the
-# slack (before that the predicted step as a share of the slack)
+# rows, of each: value; gradient in (x, u, p); and of its upper and its lower side: slack, multiplier, one over their product, step of
+# the slack (before that the predicted step as a share of the slack)
 VALUE, BY_X, BY_U, BY_P = _names(4)
 SLACK_UP, LAM_UP, PER_GAP_UP, MOVE_UP, SLACK_LOW, LAM_LOW, PER_GAP_LOW, MOVE_LOW = (
     k * LANES for k in range(4, 12)

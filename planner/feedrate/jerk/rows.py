@@ -18,8 +18,8 @@ the time is convex, and only the jerk rows and that term are curved. Inequalitie
 With multipliers lam of the rows, sum lam g = lam_j p/h + (terms of single points) + ..., so that the second derivatives of the
 Lagrangian need one sum over the axes, lam_j = sum lam r'_k/j_k, and those of h(vm, p).
 
-All is written for a block of up to `LANES` intervals (layout.py). The rows of an axis are, in this order, acceleration at the start, jerk
-at the start, jerk at the end, and where r'' jumps acceleration at the end; after those of all axes come the two of the feed.
+All is written for a block of up to `LANES` intervals (layout.py). The rows of an axis are, in this order, acceleration at the start,
+jerk at the start, jerk at the end, and where r'' jumps acceleration at the end; after those of all axes come the two of the feed.
 """
 
 from __future__ import annotations
@@ -55,17 +55,17 @@ from planner.feedrate.jerk.layout import (
     LAM_UP,
     LANE_MATH,
     LANES,
-    P,
     PER_MIDDLE,
     PER_X,
     PI,
     REST,
     ROW,
-    U,
     VALUE,
-    X,
     X_END,
     H,
+    P,
+    U,
+    X,
 )
 
 DOMAIN = 0.95  # share of the kinematics' domain p ds <= 3 vm^2 that an interval may use [-]; a start with constant jerk uses 8/9
@@ -116,7 +116,8 @@ def kinematics(g, w, t, worst, m):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _axis_rows(g, w, t, rows, m):
-    """The rows of an axis without that before a jump, and what their multipliers add to the sums. `g` and `rows` begin with the axis."""
+    """The rows of an axis without that before a jump, and what their multipliers add to the sums. `g` and `rows` begin with the
+    axis."""
     for i in range(m):
         x0, x1, u, p, per_h = w[X + i], w[X_END + i], w[U + i], w[P + i], 1.0 / w[H + i]
         e0, e1, e2, e3 = w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i]
@@ -171,7 +172,7 @@ def _curvature(g, w, t, rows, m):
     The Lagrangian of the interval is h + lam_j p/h + pi q h^2/12 + the last row's, as a function L(mean, p, u, h), q = p (2u + p).
     """
     for i in range(m):
-        x0, x1, u, p, w_pi, h = w[X + i], w[X_END + i], w[U + i], w[P + i], w[PI + i], w[H + i]
+        x0, u, p, w_pi, h = w[X + i], w[U + i], w[P + i], w[PI + i], w[H + i]
         e0, e1, e2, e3 = w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i]
         mean, m0, m1, slope = t[MEAN + i], t[M0 + i], t[M1 + i], t[SLOPE + i]
         h_v, h_p, hx, hu, hp, h0 = t[H_V + i], t[H_P + i], t[HX + i], t[HU + i], t[HP + i], t[H0 + i]

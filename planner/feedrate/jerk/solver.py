@@ -62,7 +62,7 @@ class JerkLimited:
 
     tol: float = 1e-4
     iterations: int = 100
-    window: int = 1_000
+    window: int = 2_000
     settings: InteriorPointSettings = field(default=SETTINGS, repr=False)
 
     def solve(
@@ -111,6 +111,7 @@ class JerkLimited:
                 + sum(len(piece.joined) for piece in pieces),
                 "other starts": sum(chain.other_starts for chain in chains),
                 "other ends": sum(chain.other_ends for chain in chains),
+                "joined": sum(piece.met for piece in pieces),
                 "divided": sum(chain.divided for chain in chains),
                 "standstills": len(stops),
             },
@@ -122,7 +123,8 @@ class JerkLimited:
     def _solve_pieces(
         self, problem: FeedrateProblem, profile: Profile, progress: Callable[[float], None] | None
     ) -> tuple[list[Piece], float]:
-        """Solve all pieces into `profile`, on several cores if it is worth it; returns them and by what factor one is slowed down most."""
+        """Solve all pieces into `profile`, on several cores if it is worth it; returns them and by what factor one is slowed down
+        most."""
         columns, counted = columns_of(problem), _Counted(len(problem), progress)
         pieces = [
             Piece(self, columns, profile, int(first), int(beyond) - 1, counted.add)

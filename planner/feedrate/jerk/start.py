@@ -61,9 +61,9 @@ def envelope(columns, begin, end):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def envelope_profile(x, s):
-    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over the points s of n >= 4 intervals, in any units: harmonic
-    means of the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals grow), and
-    constant jerk on the first and the last interval, with no more of it than the next interval can take back."""
+    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over the points s of n >= 4 intervals, in any units:
+    harmonic means of the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals
+    grow), and constant jerk on the first and the last interval, with no more of it than the next interval can take back."""
     n = len(x) - 1
     x, u = x.copy(), np.zeros(n + 1)
     first, last = s[1] - s[0], s[n] - s[n - 1]

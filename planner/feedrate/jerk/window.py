@@ -25,9 +25,9 @@ from planner.feedrate.jerk.layout import (
     VALUE,
     Blocks,
     Columns,
-    Room,
     H,
     P,
+    Room,
     profile,
     put,
     rows_of,
@@ -148,8 +148,8 @@ class ScaledWindow:
         return self._from(self._starts(None if behind is None else (behind.x, behind.u)), tol, iterations)
 
     def between(self, left: Way, right: Way, tol: float, iterations: int) -> tuple[Window | None, int, int]:
-        """The fastest profile from the first state of `left`, a way to rest or beyond the window, to the last state of `right`, a way
-        from rest or from before the window; as `solve`."""
+        """The fastest profile between two ways to rest, `left` from the window's first point on and `right` from its last point on,
+        backward; as `solve`."""
         return self._from(self._starts(left, right), tol, iterations)
 
     def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
@@ -181,7 +181,7 @@ class ScaledWindow:
         """Profiles to start from, scaled, the best first.
 
         left  : the way to rest from the first point on, in the problem's units; None from rest
-        right : the same up to the last point
+        right : the same from the last point on, backward
         """
         for x, u in self._from_rest():
             if left is None:
@@ -189,7 +189,7 @@ class ScaledWindow:
                 continue
             joined = self._joined(left, x, u)
             if right is not None:
-                back, rate = self._joined(_mirrored(*right), *_mirrored(x, u))
+                back, rate = self._joined(right, *_mirrored(x, u))
                 faster = back[::-1] > joined[0]
                 joined = np.where(faster, back[::-1], joined[0]), np.where(faster, -rate[::-1], joined[1])
             yield self._tracked(*joined) or joined

@@ -74,9 +74,11 @@ SLOPE_MIN = 1e-3  # of the mean feed: floor of vm - p h/6, which is 0 at the dom
 # What the steps of `linearise` hand on, in the array `passing`: the mean of the end speeds; d mean/dx_i and d mean/dx_{i+1}; dh/dmean,
 # dh/dp, and with the dynamics put in dh/dx, dh/du, dh/dp and its defect; vm - p h/6; the end speed where it is free, else 0
 MEAN, M0, M1, H_V, H_P, HX, HU, HP, H0, SLOPE, FREE = range(0, 11 * LANES, LANES)
+# ... both end speeds, one over h;
+V0, V1, PER_H = range(11 * LANES, 14 * LANES, LANES)
 # ... the multipliers' sums: of j; of v u and v x at the start and at the end; of x before a jump at the end
-LAM_J, BEND0, TWIST0, BEND1, TWIST1, JUMP = range(11 * LANES, 17 * LANES, LANES)
-PASSING = 17 * LANES
+LAM_J, BEND0, TWIST0, BEND1, TWIST1, JUMP = range(14 * LANES, 20 * LANES, LANES)
+PASSING = 20 * LANES
 
 
 @njit(cache=True, error_model="numpy")
@@ -108,6 +110,7 @@ def kinematics(g, w, t, worst, m):
         w[H + i], w[COSTATE + i] = h, f
         w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i] = e0, e1, e2, e3
         t[MEAN + i], t[M0 + i], t[M1 + i] = mean, m0, m1
+        t[V0 + i], t[V1 + i], t[PER_H + i] = v0, v1, 1.0 / h
         t[H_V + i], t[H_P + i], t[SLOPE + i], t[FREE + i] = h_v, h_p, slope, v1 * g[INNER_END + i]
         left, right = h_v * m0, h_v * m1  # dh/dx_i, dh/dx_{i+1}
         t[HX + i], t[HU + i] = left + right * e0, right * e1
@@ -119,10 +122,10 @@ def _axis_rows(g, w, t, rows, m):
     """The rows of an axis without that before a jump, and what their multipliers add to the sums. `g` and `rows` begin with the
     axis."""
     for i in range(m):
-        x0, x1, u, p, per_h = w[X + i], w[X_END + i], w[U + i], w[P + i], 1.0 / w[H + i]
+        x0, x1, u, p, per_h = w[X + i], w[X_END + i], w[U + i], w[P + i], t[PER_H + i]
         e0, e1, e2, e3 = w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i]
         hx, hu, hp, h0 = t[HX + i], t[HU + i], t[HP + i], t[H0 + i]
-        m0, m1, v0, v1 = t[M0 + i], t[M1 + i], np.sqrt(x0), np.sqrt(x1)
+        m0, m1, v0, v1 = t[M0 + i], t[M1 + i], t[V0 + i], t[V1 + i]
         u1, j = u + p, p * per_h
         j_h = -j * per_h
 
@@ -178,7 +181,7 @@ def _curvature(g, w, t, rows, m):
         h_v, h_p, hx, hu, hp, h0 = t[H_V + i], t[H_P + i], t[HX + i], t[HU + i], t[HP + i], t[H0 + i]
         lam_j, bend0, twist0 = t[LAM_J + i], t[BEND0 + i], t[TWIST0 + i]
         bend1, twist1, free = t[BEND1 + i], t[TWIST1 + i], t[FREE + i]
-        per_h, per_mean, per_slope = 1.0 / h, 1.0 / mean, 1.0 / slope
+        per_h, per_mean, per_slope = t[PER_H + i], 1.0 / mean, 1.0 / slope
         u1, q = u + p, p * (2.0 * u + p)
 
         slope_v, slope_p = 1.0 - p * h_v / 6.0, -(h + p * h_p) / 6.0  # second derivatives of h(mean, p)

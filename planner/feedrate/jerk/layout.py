@@ -193,16 +193,3 @@ def profile(blocks):
         x[i], u[i] = w[X + o], w[U + o]
         x[i + 1], u[i + 1] = w[X_END + o], w[U + o] + w[P + o]
     return x, u
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def slow(blocks, factor):
-    """Slow the profile down as a whole."""
-    by = 1.0 / (factor * factor)
-    for b in range(len(blocks.work)):
-        w = blocks.work[b]
-        for i in range(LANES):
-            w[X + i] *= by
-            w[X_END + i] *= by
-            w[U + i] *= by
-            w[P + i] *= by

@@ -15,7 +15,8 @@ import numpy as np
 
 from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain
 from planner.feedrate.jerk.layout import Columns, Room
-from planner.feedrate.jerk.profile import Profile, backward, slower_by
+from planner.feedrate.jerk.profile import Profile, backward
+from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.window import ScaledWindow, Way
 
 if TYPE_CHECKING:
@@ -68,7 +69,10 @@ class Piece:
             self.forward.run(room, self.last)
         own = slice(self.first, self.last + 1)
         found = self.profile
-        by = float(slower_by(self.columns, (found.x, found.u, found.jerk), self.first, self.last))
+        intervals = slice(self.first, self.last)
+        by = float(
+            slower_by(self.columns, self.first, found.x[own], found.u[own], found.jerk[intervals], 1.0)
+        )
         found.x[own] /= by**2
         found.u[own] /= by**2
         found.jerk[own] /= by**3

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.kernels import njit
 from planner.feedrate.jerk.layout import Columns
 from planner.feedrate.jerk.window import Window
 
@@ -72,28 +71,3 @@ def backward(columns: Columns, first: int, last: int) -> Columns:
         acceleration=turned(columns.acceleration),
         jerk=turned(columns.jerk),
     )
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def slower_by(columns, profile, first, last):
-    """By what factor the points first..last have to be slower to keep every limit at the grid points; 1 if they do.
-
-    profile : x, u, jerk (P,)
-    """
-    x, u, jerk = profile
-    axes = columns.d1.shape[1]
-    feed, acceleration, third = 1.0, 1.0, 1.0
-    for i in range(first, last + 1):
-        feed = max(feed, x[i] / columns.x_max[i])
-        v = np.sqrt(x[i])
-        for k in range(axes):
-            d1, per_a, per_j = columns.d1[i, k], 1.0 / columns.acceleration[i, k], 1.0 / columns.jerk[i, k]
-            if i > first:
-                d2, d3 = columns.d2_left[i, k], columns.d3_left[i, k]
-                acceleration = max(acceleration, abs(d1 * u[i] + d2 * x[i]) * per_a)
-                third = max(third, abs(d1 * jerk[i - 1] + v * (3.0 * d2 * u[i] + d3 * x[i])) * per_j)
-            if i < last:
-                d2, d3 = columns.d2_right[i, k], columns.d3_right[i, k]
-                acceleration = max(acceleration, abs(d1 * u[i] + d2 * x[i]) * per_a)
-                third = max(third, abs(d1 * jerk[i] + v * (3.0 * d2 * u[i] + d3 * x[i])) * per_j)
-    return max(np.sqrt(max(feed, acceleration)), np.cbrt(third))

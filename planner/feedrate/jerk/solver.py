@@ -12,8 +12,12 @@ multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever 
 **Windows.** A long piece is solved in windows of about `window` intervals, or more if the braking distance is long beside that. Each
 window ends in a full stop, which is only there to end it. The part of the window that the stop cannot influence is kept, up to three
 braking distances before it, and the next window starts from the state reached there, at a point where the costate of the kinematics
-says that more speed would help. A start during hard braking into a bend would leave a problem with hardly any feasible points, and
-multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window.
+says that more speed would help (chain.py). A start during hard braking into a bend would leave a problem with hardly any feasible
+points, and multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window
+per thread.
+
+**Threads.** Pieces are independent, and a long one is solved from both of its ends (piece.py). What can be done side by side is, on as
+many cores as planner/base/threads.py says; the kernels let go of Python's lock. The solution is the same, byte by byte, on any number.
 
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into smaller ones if it starts
 at rest; else, or where even that fails, the profile stops: at the end of the window before, if the motion comes from there, or after

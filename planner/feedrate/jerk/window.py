@@ -17,24 +17,25 @@ from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
 from planner.feedrate.jerk.layout import (
+    DS,
     LAM_LOW,
     LAM_UP,
     LANES,
     PI,
     ROW,
-    VALUE,
+    X_END,
     Blocks,
     Columns,
-    H,
     P,
     Room,
+    X,
     profile,
     put,
     rows_of,
-    slow,
 )
-from planner.feedrate.jerk.rows import PASSING, linearise
+from planner.feedrate.jerk.rows import duration
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
+from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 from planner.feedrate.jerk.track import track
 from planner.feedrate.lagrangian import acceleration_limits
@@ -103,7 +104,8 @@ class Window:
 class ScaledWindow:
     """A window's problem in units of its own: fastest feed 1, largest acceleration 1.
 
-    blocks : the problem, with room for profile and multipliers, which are worked on in place
+    columns, begin : the problem, and where in it the window begins
+    blocks : the scaled problem, with room for profile and multipliers, which are worked on in place
     s      : (N+1,) arc length [mm]
     asked  : (N+1,) feed^2 of the envelope (start.py) [mm2/s2]
     jerk   : of the slowest axis, scaled
@@ -111,6 +113,8 @@ class ScaledWindow:
     time   : unit of time [s]
     """
 
+    columns: Columns
+    begin: int
     blocks: Blocks
     s: FloatArray
     asked: FloatArray
@@ -133,6 +137,8 @@ class ScaledWindow:
         feed = float(np.sqrt(columns.x_max[own].max()))
         t = feed / columns.unit
         return cls(
+            columns=columns,
+            begin=begin,
             blocks=room.blocks(columns, begin, end, feed, t),
             s=columns.s[own],
             asked=envelope(columns, begin, end),
@@ -166,7 +172,7 @@ class ScaledWindow:
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""
-        self._slowed(*self._plain(1.0))
+        put(self.blocks, *self._slowed(*self._plain(1.0)))
         return self._without_multipliers()
 
     def near(self, x: FloatArray, u: FloatArray) -> Window | None:
@@ -227,9 +233,10 @@ class ScaledWindow:
 
     def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> Way:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
-        put(self.blocks, x, u)
-        slow(self.blocks, min(_slower(self.blocks), most))
-        return profile(self.blocks)
+        feed_sq, rate = x * self.feed**2, u * self.feed / self.time
+        jerk = jerk_of(self.s, feed_sq, rate)
+        slower = min(float(slower_by(self.columns, self.begin, feed_sq, rate, jerk, START_ROOM)), most)
+        return x / slower**2, u / slower**2
 
     def _without_multipliers(self) -> Window:
         self.blocks.rows[:] = 0.0
@@ -240,12 +247,12 @@ class ScaledWindow:
         """Profile and multipliers in the problem's units."""
         x, u = profile(self.blocks)
         feed, t = self.feed, self.time
-        jerk, duration, rows, of_feed, dynamics = _found(self.blocks)
+        jerk, times, rows, of_feed, dynamics = _found(self.blocks)
         return Window(
             x=x * feed**2,
             u=u * feed / t,
             jerk=jerk * feed / t**2,
-            duration=duration * t,
+            duration=times * t,
             rows=rows * t,
             feed=of_feed * t,
             dynamics=dynamics * t / feed**2,
@@ -268,38 +275,20 @@ def _accepted(found: kernel.Minimum) -> bool:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _slower(blocks):
-    """By what factor the profile has to be slower to keep its limits with `START_ROOM` to spare; 1 if it does."""
-    passing, defect = np.empty(PASSING), np.zeros(LANES)
-    of_axis = 3 + blocks.jumps
-    second, third = START_ROOM, START_ROOM
-    for b in range(len(blocks.work)):
-        linearise(blocks, b, passing, defect)
-        row = blocks.rows[b]
-        for r in range(rows_of(blocks.axes, blocks.jumps)):
-            jerk = r < blocks.axes * of_axis and (r % of_axis == 1 or r % of_axis == 2)
-            for i in range(min(LANES, blocks.n - b * LANES)):
-                ratio = abs(row[r * ROW + VALUE + i])
-                if jerk:
-                    third = max(third, ratio)
-                else:
-                    second = max(second, ratio)
-    return max(np.sqrt(second / START_ROOM), np.cbrt(third / START_ROOM))
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
 def _found(blocks):
     """Jerk and duration (N,) of the intervals, and the multipliers of rows (N, A, 4), feed (N, 2) and dynamics (N,), scaled."""
     n, of_axis = blocks.n, 3 + blocks.jumps
     count = rows_of(blocks.axes, blocks.jumps)
-    jerk, duration, dynamics = np.empty(n), np.empty(n), np.empty(n)
+    jerk, times, dynamics = np.empty(n), np.empty(n), np.empty(n)
     rows, feed = np.zeros((n, blocks.axes, 4)), np.zeros((n, 2))
     for i in range(n):
-        w, row, o = blocks.work[i // LANES], blocks.rows[i // LANES], i % LANES
-        jerk[i], duration[i], dynamics[i] = w[P + o] / w[H + o], w[H + o], w[PI + o]
+        b, o = i // LANES, i % LANES
+        w, row = blocks.work[b], blocks.rows[b]
+        h = duration(np.sqrt(w[X + o]), np.sqrt(w[X_END + o]), w[P + o], blocks.grid[b, DS + o])
+        jerk[i], times[i], dynamics[i] = w[P + o] / h, h, w[PI + o]
         for r in range(count - 2):
             rows[i, r // of_axis, r % of_axis] = row[r * ROW + LAM_UP + o] - row[r * ROW + LAM_LOW + o]
         feed[i, 0] = row[(count - 2) * ROW + LAM_UP + o]
         if 0 < i < n - 1:  # these limit the kinematics, not the feed
             feed[i, 1] = row[(count - 1) * ROW + LAM_UP + o]
-    return jerk, duration, rows, feed, dynamics
+    return jerk, times, rows, feed, dynamics

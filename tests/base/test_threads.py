@@ -48,3 +48,15 @@ def test_an_error_stops_the_rest_and_is_raised():
     with pytest.raises(OSError, match="broken"):
         side_by_side([long, fail], stopped.set, lambda: None)
     assert stopped.is_set()
+
+
+def test_an_interrupt_of_the_caller_stops_the_rest():
+    use_threads(2)
+    stopped = threading.Event()
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        side_by_side([lambda: None if stopped.wait(timeout=60.0) else pytest.fail()], stopped.set, interrupt)
+    assert stopped.is_set()

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.jerk_campaign import faults
+from benchmarks.jerk_campaign import faults, small_problem
 from benchmarks.random_paths import long_path, random_path
 from planner.base.threads import use_threads
 from planner.constraints.problem import FeedrateProblem
@@ -43,6 +43,15 @@ def test_a_long_piece_is_joined_in_the_middle(points):
     assert found.cycle_time == pytest.approx(whole.cycle_time, rel=1e-4)
     values = [lagrangian(problem, solution).jerk.sum() for solution in (found, whole)]
     assert values[0] == pytest.approx(values[1], rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [1343, 1373, 1378])
+def test_the_joined_profile_has_both_given_states(seed):
+    """Here the two ways overlap: either is the faster one at the other's end."""
+    problem = small_problem(seed)
+    found = JerkLimited(window=20).solve(problem)
+    assert found.effort["joined"] == 1
+    assert not faults(problem, found)
 
 
 @pytest.mark.parametrize("count", [2, 5])

@@ -197,6 +197,7 @@ class ScaledWindow:
             if right is not None:
                 back, rate = self._joined(right, *_mirrored(x, u))
                 faster = back[::-1] > joined[0]
+                faster[0], faster[-1] = False, True  # these states are given
                 joined = np.where(faster, back[::-1], joined[0]), np.where(faster, -rate[::-1], joined[1])
             yield self._tracked(*joined) or joined
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import planner
+
 PACKAGE = Path(__file__).resolve().parent.parent / "planner"
 
 # Earlier stages first. A module is in the layer with the longest matching name; modules of one layer may import each other.
@@ -19,6 +21,7 @@ LAYERS = (
     "planner.base.arrays",
     "planner.base.files",
     "planner.base.glossary",
+    "planner.base.loading",
     "planner.base.kernels",
     "planner.base.names",
     "planner.base.search",
@@ -159,6 +162,34 @@ def test_help_and_import_load_nothing_heavy(code: str) -> None:
     loaded = set(done.stdout.rpartition("loaded:")[2].split())
     assert "planner" in loaded
     assert not loaded & HEAVY
+
+
+# What a plan does not use: oracles, pictures, trajectory files, what only compiling needs, and what other programs or options need.
+NOT_OF_A_PLAN = {
+    "casadi",
+    "matplotlib",
+    "toppra",
+    "pyarrow",
+    "pandas",
+    "scipy.linalg",
+    "scipy.interpolate",
+    "scipy.optimize",
+    "numba.np.arraymath",
+    "planner.report",
+    "planner.tube",
+}
+
+
+def test_a_plan_loads_only_what_it_uses(tmp_path: Path) -> None:
+    """Each package costs all plans its import; SciPy's linear algebra 0.3 s, and numba's readiness to compile 0.2 s."""
+    job = tmp_path / "corner.ngc"
+    job.write_text("G21 G90 G64 P0.05 F3000\nG1 X10\nX20 Y5\nM2\n")
+    planner.plan(job, "mill")  # its kernels are on the disk now
+    code = f"import planner\nplanner.plan({str(job)!r}, 'mill')\nimport sys\nprint('loaded:', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.rpartition("loaded:")[2].split())
+    assert {"planner.optimal.loop", "numba"} <= loaded
+    assert loaded & NOT_OF_A_PLAN == set()
 
 
 def test_readme_names_files_that_exist() -> None:

@@ -13,6 +13,8 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+from planner.base.loading import load_kernel
+
 # What reading an index raises that another version of the package has written: it names the classes of the kernels' arguments, and
 # those may have gone since. numba reads the whole index before it looks whether it is out of date.
 _OUT_OF_DATE = (AttributeError, ImportError)
@@ -57,7 +59,7 @@ class _Cache:
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         try:
-            found = self._numba_s.load_overload(signature, context)
+            found = load_kernel(self._numba_s, signature, context)
         except (OSError, EOFError) as fault:
             self._failed(fault)
             found = None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-import ruckig
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import needs_ruckig
 from whole_plans import CORNERS, Solved, smooth_path, solve
 
 from benchmarks import problems
@@ -169,8 +171,10 @@ def test_a_dwell_at_the_start_has_no_acceleration():
 decades = st.floats(-2.0, 2.0).map(lambda e: 10.0**e)
 
 
-def ruckigs(length: float, v: float, a: float, j: float) -> ruckig.Trajectory:
+def ruckigs(length: float, v: float, a: float, j: float) -> Any:
     """The same move by ruckig, in units in which length and jerk are 1: its own epsilons are absolute."""
+    import ruckig
+
     unit = (length / j) ** (1 / 3)
     move, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
     move.target_position, move.max_jerk = [1.0], [1.0]
@@ -179,6 +183,7 @@ def ruckigs(length: float, v: float, a: float, j: float) -> ruckig.Trajectory:
     return found
 
 
+@needs_ruckig
 @given(length=st.floats(-4.0, 3.0).map(lambda e: 10.0**e), v=decades, a=decades, j=decades)
 @settings(max_examples=150)
 def test_closed_forms_are_ruckigs(length, v, a, j):
@@ -216,9 +221,12 @@ def test_known_times():
     )  # along an axis; see methods/test_methods
 
 
+@needs_ruckig
 @pytest.mark.parametrize("length", [1e-3, 0.2, 5.0, 80.0])
 def test_the_stop_law_is_ruckigs_own_motion(length):
     """Position, velocity and acceleration at every sample against ruckig's at_time."""
+    import ruckig
+
     program = problems.polyline([[0, 0], [length, 0]])
     samples = sample_path(smooth_path(program, MACHINE), MACHINE)
     limits = [np.array([x]) for x in (length, 100.0, 2000.0, 2e5)]

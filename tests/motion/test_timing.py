@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,11 @@ from planner.path.samples import sample_path
 
 MACHINE = problems.machine()
 JOBS = problems.all_jobs()
+
+
+@cache
+def solved_job(job: str, kind: str = "bezier") -> Solved:
+    return solve(JOBS[job], MACHINE, kind)
 
 
 def sampled(solved: Solved, dt: float = 1e-3) -> Trajectory:
@@ -75,7 +81,7 @@ def test_the_last_partial_period_is_included(end, dt, count):
 @pytest.mark.parametrize("job", list(JOBS))
 @pytest.mark.parametrize("kind", CORNERS)
 def test_it_starts_and_ends_at_rest_on_the_programmed_points(job, kind):
-    solved = solve(JOBS[job], MACHINE, kind)
+    solved = solved_job(job, kind)
     got = sampled(solved)
     assert got.t[0] == 0.0
     assert got.t[-1] == solved.time
@@ -98,7 +104,7 @@ def test_it_starts_and_ends_at_rest_on_the_programmed_points(job, kind):
 def test_columns_are_derivatives_of_each_other(job, kind):
     """On samples dt apart: the position changes by the mean velocity to dt^2 jerk/12, the velocity by the mean acceleration
     where the acceleration does not step in between."""
-    solved = solve(JOBS[job], MACHINE, kind)
+    solved = solved_job(job, kind)
     got = sampled(solved, 5e-5)
     dt = np.diff(got.t)[:, None]
     by_position = np.diff(got.position, axis=0) / dt
@@ -115,14 +121,14 @@ def test_columns_are_derivatives_of_each_other(job, kind):
 @pytest.mark.parametrize("job", ["pentagon", "spiral", "arcs"])
 def test_the_speed_is_that_of_the_positions(job):
     """Chords over one period are never longer than the arc length that is claimed, and shorter by the sagitta only."""
-    got = sampled(solve(JOBS[job], MACHINE))
+    got = sampled(solved_job(job))
     chord, claimed = np.linalg.norm(np.diff(got.position, axis=0), axis=1), np.diff(got.s)
     assert (chord <= claimed + 1e-8).all()
     assert (np.linalg.norm(got.velocity, axis=1) == pytest.approx(got.feed, abs=1e-9)) is True
 
 
 def test_dense_motion_is_the_same_motion():
-    solved = solve(JOBS["pentagon"], MACHINE)
+    solved = solved_job("pentagon")
     fine = list(dense_motion(solved.motion, MACHINE.dt))
     t = np.concatenate([c.t for c in fine])
     assert t[0] == 0.0

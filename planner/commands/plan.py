@@ -14,6 +14,7 @@ from planner.base.names import OPTIMAL, users_of
 from planner.commands.options import (
     DEFAULT_MACHINE,
     CornerOption,
+    EffortOption,
     ForceOption,
     Format,
     GeometryOption,
@@ -39,11 +40,12 @@ def plan_command(
     geometry: GeometryOption = None,
     corner: CornerOption = None,
     solver: SolverOption = None,
+    effort: EffortOption = None,
     rounds: Annotated[
         int | None,
         typer.Option(
             min=0,
-            help="rounds of reshaping the splines (default: as many as the size of the job allows)",
+            help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
         ),
     ] = None,
     shaped: Annotated[
@@ -108,6 +110,7 @@ def plan_command(
             method=method,
             geometry=geometry,
             corner=corner,
+            effort=effort,
             rounds=rounds,
             solver=solver,
             shaped=shaped,

@@ -39,10 +39,20 @@ def load_kernel(kept: Any, signature: Any, context: Any) -> Any:
     from numba.core.runtime import rtsys
 
     rtsys.initialize(context)
-    context.codegen()._library_class = quick
-    with kept._guard_against_spurious_io_errors(), _no_imports():
+    with kept._guard_against_spurious_io_errors(), _read_as(quick, context.codegen()), _no_imports():
         return kept._load_overload(signature, context)
     return None  # after an error that the guard has taken
+
+
+@contextmanager
+def _read_as(quick: Any, generator: Any) -> Iterator[None]:
+    """numba's code generator makes libraries of the class `quick`."""
+    usual = generator._library_class
+    generator._library_class = quick
+    try:
+        yield
+    finally:
+        generator._library_class = usual
 
 
 @contextmanager

@@ -30,11 +30,11 @@ _USED = (
 def load_kernel(kept: Any, signature: Any, context: Any) -> Any:
     """The compiled kernel of a signature, or None if the disk has none.
 
-    kept    : numba's cache of one kernel
+    kept    : numba's cache of the kernel
     context : numba's target context
     """
     quick = _quick_library()
-    if quick is None:
+    if quick is None or not hasattr(kept, "_load_overload"):  # numba's cache where nothing can be kept
         return kept.load_overload(signature, context)
     from numba.core.runtime import rtsys
 

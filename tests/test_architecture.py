@@ -184,6 +184,7 @@ NOT_OF_A_PLAN = {
     "numba.np.arraymath",
     "planner.report",
     "planner.tube",
+    "planner.nc.hpgl.plotter",
 }
 
 

@@ -28,6 +28,7 @@ class Comparison:
     def pass_on(
         self, chunks: Iterable[Trajectory], progress: Callable[[float], None]
     ) -> Iterator[Trajectory]:
+        """The chunks themselves, compared as they pass; `progress` is told the fraction done."""
         self.last_t, self.last_position = np.empty(0), np.empty((0, len(self.excess)))
         for chunk in chunks:
             self._compare(chunk)
@@ -54,6 +55,7 @@ class Comparison:
                 self.excess[axis], self.time[axis] = off[k], t[at][k]
 
     def faults(self, limits: Limits, looks: list[Look]) -> list[str]:
+        """What differs, in sentences."""
         t, axes = self.trajectory.t, self.trajectory.axes
         said = []
         if abs(t[0]) > PERIOD_ROUNDING or abs(self.end - t[-1]) > PERIOD_ROUNDING:

@@ -166,11 +166,12 @@ class _Pace(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def _pace(limits):
     """What `_cut_span` needs of the limits."""
-    speed_sq = 0.0
+    speed_sq, acceleration_sq = 0.0, 0.0
     for k in range(len(limits.velocity)):
         speed_sq += limits.velocity[k] * limits.velocity[k]
+        acceleration_sq += limits.acceleration[k] * limits.acceleration[k]
     changes = np.flatnonzero(limits.feed[1:] != limits.feed[:-1]) + 1
-    return _Pace(limits.feed, changes, np.sqrt(speed_sq), float(np.linalg.norm(limits.acceleration)))
+    return _Pace(limits.feed, changes, np.sqrt(speed_sq), np.sqrt(acceleration_sq))
 
 
 @njit(cache=True, error_model="numpy")

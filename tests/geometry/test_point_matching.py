@@ -25,16 +25,21 @@ def path_of(text: str, tolerance: float = EPS) -> Toolpath:
 
 
 def distance(toolpath: Toolpath, point: np.ndarray, segment: int) -> float:
-    """Distance of a point from a segment: arcs by their own formula at many places."""
+    """Distance of a point from a segment: arcs by their own formula at many places, and at many between those beside the nearest."""
     if toolpath.arc[segment] < 0:
         start, u = toolpath.start[segment], toolpath.end[segment] - toolpath.start[segment]
         share = min(max((point - start) @ u / (u @ u), 0.0), 1.0)
         return float(np.linalg.norm(point - start - share * u))
     arcs, row = toolpath.arcs, toolpath.arc[segment]
-    x = np.linspace(0.0, toolpath.length[segment], 20_001)[:, None]
-    c, s = np.cos(arcs.rate[row] * x), np.sin(arcs.rate[row] * x)
-    on = arcs.center[row] + arcs.radius[row] * (c * arcs.e1[row] + s * arcs.e2[row]) + arcs.drift[row] * x
-    return float(np.linalg.norm(on - point, axis=1).min())
+    low, high = 0.0, toolpath.length[segment]
+    for _ in range(2):
+        x = np.linspace(low, high, 201)[:, None]
+        c, s = np.cos(arcs.rate[row] * x), np.sin(arcs.rate[row] * x)
+        on = arcs.center[row] + arcs.radius[row] * (c * arcs.e1[row] + s * arcs.e2[row]) + arcs.drift[row] * x
+        away = np.linalg.norm(on - point, axis=1)
+        nearest = int(away.argmin())
+        low, high = x[max(nearest - 1, 0), 0], x[min(nearest + 1, 200), 0]
+    return float(away.min())
 
 
 def at(text: str, points: list[tuple[float, float]], feed: float = 1.0) -> list[int] | None:

@@ -19,6 +19,7 @@ LAYERS = (
     "planner.base.arrays",
     "planner.base.files",
     "planner.base.glossary",
+    "planner.base.compiling",
     "planner.base.kernels",
     "planner.base.names",
     "planner.base.search",

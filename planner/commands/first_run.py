@@ -13,9 +13,14 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from planner.base.names import OPTIMAL, SECOND_ORDER, SINGLE_CORNERS
+
+if TYPE_CHECKING:
+    from planner.job.plan import Plan
 
 PROGRAM = "G21 G90 G64\nG1 X1 F600\nY1\nX2\nM2\n"
 # Plans (method, geometry) that another process makes beside a plan of a method, the first ones first.
@@ -44,7 +49,7 @@ class Helper:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "planner.commands.first_run", *self._asked],
                 env={**os.environ, "PYTHONPATH": path},
-                stdin=quiet,
+                stdin=subprocess.PIPE,  # its end tells the second process that this one has gone
                 stdout=quiet,
                 stderr=quiet,
             )
@@ -55,7 +60,7 @@ class Helper:
     def __exit__(self, *_: object) -> None:
         if self._process is not None:
             self._process.terminate()
-            self._process.wait()
+            self._process.communicate()
 
 
 def cores() -> int:
@@ -65,7 +70,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def compile_beside(machine: str, method: str) -> None:
+def compile_beside(machine: str, method: str) -> list[Plan]:
     """Make the plans of `BESIDE`."""
     from planner.machine import load_machine
     from planner.methods.registry import plan
@@ -73,10 +78,18 @@ def compile_beside(machine: str, method: str) -> None:
 
     limits = load_machine(machine)
     program = parse_program(PROGRAM, limits)
-    for name, geometry in BESIDE.get(method, OTHERS):
-        plan(program, limits, method=name, geometry=geometry)
+    return [
+        plan(program, limits, method=name, geometry=geometry) for name, geometry in BESIDE.get(method, OTHERS)
+    ]
+
+
+def _end_with_the_first() -> None:
+    """End this process when the one that has started it ends, however that happens."""
+    os.read(0, 1)
+    os._exit(1)
 
 
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches both processes
     compile_beside(*sys.argv[1:])

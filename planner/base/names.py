@@ -24,6 +24,9 @@ BEZIER, FIR, KINEMATIC = "bezier", "fir", "kinematic"
 CORNER_SHAPES = (BEZIER, FIR, KINEMATIC)
 # Every way to smooth a path, as `corner` of a method takes it: a geometry of splines, or the shape of single corners.
 SMOOTHINGS = (AUTO, SPLINE, *CORNER_SHAPES)
+# How much work a plan is worth (optimal/effort.py).
+QUICK, NORMAL, BEST = "quick", "normal", "best"
+EFFORTS = (QUICK, NORMAL, BEST)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +36,7 @@ class MethodName:
     home     : "module:class" of the method
     settings : arguments of the class that the name stands for
     solvers  : names of the solvers that it can use, the default first; empty where it has no choice
-    shapes   : whether it takes a geometry, a corner shape, rounds of reshaping, and `shaped`
+    shapes   : whether it takes a geometry, a corner shape, an effort, rounds of reshaping, and `shaped`
     """
 
     home: str
@@ -66,7 +69,7 @@ METHODS: dict[str, MethodName] = {
 METHOD_ALIASES = {"toppra": SECOND_ORDER}
 SOLVERS = tuple(dict.fromkeys(solver for method in METHODS.values() for solver in method.solvers))
 # Settings of `planner.plan` that only methods of `shapes` use.
-OF_SHAPES = ("geometry", "corner", "rounds", "shaped")
+OF_SHAPES = ("geometry", "corner", "effort", "rounds", "shaped")
 
 
 def method_name(name: str) -> str:
@@ -82,6 +85,11 @@ def solver_name(name: str) -> str:
 def geometry_name(name: str) -> str:
     """The name of a geometry, as it is. Raises InputError for another name."""
     return _known("geometry", name, GEOMETRIES)
+
+
+def effort_name(name: str) -> str:
+    """The name of an effort, as it is. Raises InputError for another name."""
+    return _known("effort", name, EFFORTS)
 
 
 def corner_name(name: str) -> str:

@@ -59,6 +59,14 @@ CornerOption = Annotated[
         "|".join(names.CORNER_SHAPES),
     ),
 ]
+EffortOption = Annotated[
+    str | None,
+    _choice(
+        "--effort",
+        names.effort_name,
+        f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
+    ),
+]
 SolverOption = Annotated[
     str | None,
     _choice(

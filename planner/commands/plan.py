@@ -15,6 +15,7 @@ from planner.commands.first_run import Helper
 from planner.commands.options import (
     DEFAULT_MACHINE,
     CornerOption,
+    EffortOption,
     ForceOption,
     Format,
     GeometryOption,
@@ -40,11 +41,12 @@ def plan_command(
     geometry: GeometryOption = None,
     corner: CornerOption = None,
     solver: SolverOption = None,
+    effort: EffortOption = None,
     rounds: Annotated[
         int | None,
         typer.Option(
             min=0,
-            help="rounds of reshaping the splines (default: as many as the size of the job allows)",
+            help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
         ),
     ] = None,
     shaped: Annotated[
@@ -112,6 +114,7 @@ def plan_command(
             method=method,
             geometry=geometry,
             corner=corner,
+            effort=effort,
             rounds=rounds,
             solver=solver,
             shaped=shaped,

@@ -24,7 +24,7 @@ and machine stay what they are. (`margin` cannot say it: it is of the accelerati
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -139,6 +139,22 @@ class FeedrateProblem:
     def machine_axes(self) -> int:
         """How many of the axes are the machine's; the others are limits of one's own."""
         return len(self.axes) - self.own
+
+    def part(self, pieces: Array) -> FeedrateProblem:
+        """The problem of some of the pieces (n,) alone, ascending."""
+        size = np.diff(self.piece)[pieces]
+        at = np.concatenate([np.arange(self.piece[g], self.piece[g + 1]) for g in pieces])
+        per_point = (
+            "s", "d1", "d2_left", "d2_right", "d3_left", "d3_right", "feed_sq_max", "feed_sq_bound", "margin", "limit_scale"
+        )  # fmt: skip
+        return replace(
+            self,
+            piece=np.concatenate([[0], np.cumsum(size)]),
+            feed_sq_start=self.feed_sq_start[pieces],
+            feed_sq_end=self.feed_sq_end[pieces],
+            own_here=None if self.own_here is None else self.own_here[:, at],
+            **{name: getattr(self, name)[at] for name in per_point},
+        )
 
     @property
     def interval(self) -> Array:

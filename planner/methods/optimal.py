@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from planner.base.names import AUTO
+from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
@@ -17,6 +17,7 @@ from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
+from planner.optimal.effort import EFFORTS
 from planner.optimal.loop import Settings, fastest_plan
 from planner.optimal.order import ThirdOrder
 from planner.optimal.shaped import shaped_plan
@@ -32,12 +33,14 @@ class OptimalMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver
-    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job allows
+    effort : "quick", "normal" or "best": grids and rounds of reshaping (optimal/effort.py)
+    rounds : of reshaping splines (optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: str | ThirdOrderSolver = OWN
+    effort: str = NORMAL
     rounds: int | None = None
     shaped: bool = False
 
@@ -57,6 +60,7 @@ class OptimalMethod(Method):
             corner=self.corner,
             order=ThirdOrder(third_order_solver(self.solver)),
             bezier=BezierCorner(sigma2=SIGMA2),
+            effort=EFFORTS[effort_name(self.effort)],
             rounds=self.rounds,
         )
         return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)

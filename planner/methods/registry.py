@@ -13,6 +13,7 @@ from planner.base.names import (
     BEZIER,
     METHODS,
     SINGLE_CORNERS,
+    effort_name,
     method_name,
     smoothing,
     solver_name,
@@ -39,6 +40,7 @@ def plan(
     geometry: str | None = None,
     corner: str | CornerShape | None = None,
     solver: str | None = None,
+    effort: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
     limits: Sequence[OwnLimit] = (),
@@ -57,8 +59,10 @@ def plan(
     corner    : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
     solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
                 the first of them
-    rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for as many
-                as the size of the job allows
+    effort    : "quick", "normal" or "best", for "optimal" and "second-order": how fine the grids are and how many rounds splines are
+                reshaped; None for "normal"
+    rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for those of
+                the effort, fewer where they gain nothing
     shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
     limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order" keep them,
                 the verdict judges every method by them
@@ -74,10 +78,24 @@ def plan(
     """
     if isinstance(method, str):
         method = method_name(method)
-    _check_used(method, geometry=geometry, corner=corner, solver=solver, rounds=rounds, shaped=shaped or None)
+    _check_used(
+        method,
+        geometry=geometry,
+        corner=corner,
+        solver=solver,
+        effort=effort,
+        rounds=rounds,
+        shaped=shaped or None,
+    )
     if isinstance(method, str):
         method = make_method(
-            method, geometry=geometry, corner=corner, solver=solver, rounds=rounds, shaped=shaped
+            method,
+            geometry=geometry,
+            corner=corner,
+            solver=solver,
+            effort=effort,
+            rounds=rounds,
+            shaped=shaped,
         )
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
@@ -98,12 +116,13 @@ def make_method(
     geometry: str | None = None,
     corner: str | CornerShape | None = None,
     solver: str | None = None,
+    effort: str | None = None,
     rounds: int | None = None,
     shaped: bool = False,
 ) -> Method:
     """The method of that name; the settings are those of `plan`, None for the method's own.
 
-    Raises InputError for an unknown name of a method, geometry, corner shape or solver, and for a negative number of rounds.
+    Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort, and for a negative number of rounds.
     """
     entry = METHODS[method_name(name)]
     settings: dict[str, Any] = dict(entry.settings)
@@ -112,6 +131,8 @@ def make_method(
         if rounds is not None and rounds < 0:
             raise InputError(f"{rounds} rounds; it must be 0 or more")
         settings |= {"corner": shape or kind, "rounds": rounds, "shaped": shaped}
+        if effort is not None:
+            settings["effort"] = effort_name(effort)
     if entry.solvers and solver is not None:
         settings["solver"] = solver_name(solver)
     module, _, class_name = entry.home.partition(":")

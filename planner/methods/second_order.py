@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.base.names import AUTO
+from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import REACHABILITY, second_order_solver
 from planner.job.job import Job
 from planner.job.method import Method
 from planner.job.plan import Plan
+from planner.optimal.effort import EFFORTS
 from planner.optimal.loop import Settings, fastest_plan
 from planner.optimal.order import SecondOrder
 from planner.optimal.shaped import shaped_plan
@@ -27,12 +28,14 @@ class SecondOrderMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
-    rounds : of reshaping splines (optimal/reshape.py); None for as many as the size of the job allows
+    effort : "quick", "normal" or "best": grids and rounds of reshaping (optimal/effort.py)
+    rounds : of reshaping splines (optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: str | FeedrateSolver = REACHABILITY
+    effort: str = NORMAL
     rounds: int | None = None
     shaped: bool = False
 
@@ -40,5 +43,8 @@ class SecondOrderMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)
-        settings = Settings(method="second-order", corner=self.corner, order=order, rounds=self.rounds)
+        effort = EFFORTS[effort_name(self.effort)]
+        settings = Settings(
+            method="second-order", corner=self.corner, order=order, effort=effort, rounds=self.rounds
+        )
         return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)

@@ -49,12 +49,13 @@ def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
 
 
 def with_corners(
-    rounded: SmoothPath, best: OnPath, corners: CornerBounds, job: Job, order: Order
+    rounded: SmoothPath, best: OnPath, corners: CornerBounds, job: Job, order: Order, resolution: float
 ) -> tuple[OnPath, Array]:
     """Corners instead of splines between the full stops where they are faster, and where that was too much to find out.
 
     rounded : the path with the corners that the splines of `best` replace
     corners : bounds on the motion on them
+    resolution : of the grid of `best`, and of the motions that compete with it
     """
     none = np.zeros(0, dtype=np.int64)
     shape = best.shape
@@ -62,7 +63,7 @@ def with_corners(
     if not best.solution.solved:
         if corners.points.sum() > COMPARED_POINTS:
             return best, none
-        planned = order.solve(rounded, job)
+        planned = order.solve(rounded, job, resolution)
         return dataclasses.replace(planned, shape=shape) if planned.solution.solved else best, none
     piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
     chosen = np.zeros(len(corners.time), dtype=bool)
@@ -78,7 +79,7 @@ def with_corners(
         if (fits == shape.laid.fits).all():
             break
         mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
-        planned = order.solve(with_spline(rounded, mixed), job)
+        planned = order.solve(with_spline(rounded, mixed), job, resolution, [best])
         if not planned.solution.solved:
             break
         job.tell(

@@ -26,9 +26,10 @@ from planner.job.trace import Tell
 from planner.optimal.compare_corners import corner_bounds
 from planner.optimal.geometry import corner_shape
 from planner.optimal.order import Order
+from planner.path.samples import RESOLUTION
 
 RIVAL_POINTS = (
-    20_000  # of the plan, and of each corner shape: as many as are solved once more on a finer grid
+    40_000  # of the plan, and of each corner shape: about as many as get the finest grid (effort.py)
 )
 SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
 # On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes
@@ -54,7 +55,7 @@ def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
         )
         if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= counted_time(best):
             continue
-        coarse = order.solve(path, job, COARSER).solution
+        coarse = order.solve(path, job, COARSER * RESOLUTION).solution
         if coarse.solved and coarse.cycle_time + dwell < CHANCE * counted_time(best):
             yield name
 

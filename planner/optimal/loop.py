@@ -18,12 +18,12 @@ What is tried more than once:
   -----------------------------  ----------------------------------------  ----------------  ------------  -----------------------------
   full stop where a run gets no  no curve inside the tolerance, or a cusp  4 times           splines anew  at last fenced by two stops,
     spline                                                                                                   with its single corners
-  round of reshaping             on splines                                WORK/points, 40;  shape, solve  faster runs keep the new one,
-                                                                             5 in vain                       others are pulled more
+  round of reshaping             on splines                                effort.py; 5 in   shape, solve  faster runs keep the new one,
+                                                                             vain                            others are pulled more
   only the runs that got faster  others got slower                         each round        solve         the fastest of three stays
   corners between full stops     "auto", a bound on their time is lower    2                 solve         splines stay where faster
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
-  finer grid                     up to FINE_POINTS points                  1                 finer solve   the faster one
+  final grid                     rounds of reshaping are on a coarse one   1                 finer solve   that of the plan
   tighter limits in places       excess above 1e-5 between points          3                 solve         stretches slower by the rest
   less feed in places            filters leave the tolerance               10                solve         waiting, slower stretches
   the whole slower               excess below 0.5 % in the verdict         3                 verdict       the verdict stands
@@ -42,7 +42,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.names import AUTO, SPLINE
+from planner.base.names import AUTO, NORMAL, SPLINE
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.job.job import Delivered, Job
@@ -53,6 +53,7 @@ from planner.motion.timing import Motion
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
+from planner.optimal.effort import COARSE, EFFORTS, Effort
 from planner.optimal.geometry import corner_shape, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
@@ -60,13 +61,9 @@ from planner.optimal.order import Order
 from planner.optimal.reshape import FIRST_FORCE, chosen, price_bands, reshape, run_times
 from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
+from planner.path.samples import sample_path
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# Budget of reshaping: rounds x grid points <= WORK; that is 8 rounds and 8 s of the 14 s of examples/bracket.ngc.
-WORK = 150_000
-# At most so many rounds: the first five gain 2e-2 of the time, the next five 2e-3, then ten 1e-3, and the last twenty 4e-4, in an
-# eighth of the computing time (means over random jobs, benchmarks/ablation.py).
-ROUNDS_MAX = 40
 # None after so many that together gained less than this [-]: half of the gap that the solver leaves.
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
 # Factors on a run's force after a gain and after a loss. With 0.5 and 0.85 for the first 11 jobs end 3e-4 and 4e-4 slower on the mean,
@@ -76,8 +73,6 @@ SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 
 # Without jerk limits a failed round teaches what holds its shape; so more of them may fail, with less pull each. With the numbers
 # above, 4 of 40 random polylines stayed where they began, up to 4.5 % behind the motion with jerk limits.
 PATIENCE, MORE_PATIENT = 10, 1.5
-# A job with fewer points than this is solved once more on a grid of this share of the resolution [-]; it gains 4e-4 of the time.
-FINE_POINTS, FINER = 20_000, 0.1
 # Of 40 random polylines one exceeded an acceleration by 4e-4 between the places looked at; each time with ten times the margin.
 SEEN_ROUNDS = 3
 
@@ -90,13 +85,15 @@ class Settings:
     corner : "auto", "spline", the name of a corner shape, or a shape
     order  : which limits are kept, and the solver for them
     bezier : the corner of "bezier", and where there is no spline
-    rounds : of reshaping; None for as many as the size of the job allows
+    effort : grids and rounds of reshaping
+    rounds : of reshaping; None for those of the effort
     """
 
     method: str
     corner: str | CornerShape
     order: Order
     bezier: CornerShape = field(default_factory=BezierCorner)
+    effort: Effort = EFFORTS[NORMAL]
     rounds: int | None = None
 
 
@@ -152,14 +149,20 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         shape = corner_shape(settings.corner, machine, job.toolpath, settings.bezier)
         given = round_corners(job.toolpath, machine, shape, blend_tangents=order.jerk_limited)
     if settings.corner not in (AUTO, SPLINE):
-        return order.solve(given, job)
+        return order.solve(given, job, final_resolution(given, job, settings))
     with job.stage("geometry"):
         rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
     if not splines.laid.fits.any():
-        return dataclasses.replace(order.solve(given, job), notes=no_spline_note(rounded, splines))
+        cornered = order.solve(given, job, final_resolution(given, job, settings))
+        return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
-    # Solve and reshape in turns.
+    # Solve and reshape in turns, on a coarse grid; then once on the final one.
     best = reshaped(rounded, splines, job, settings)
+    resolution = settings.effort.resolution(len(best.samples))
+    if best.solution.solved:
+        coarse = best
+        best = dataclasses.replace(order.solve(coarse.path, job, resolution), shape=coarse.shape)
+        _tell_of(job, "final grid", best, coarse)
     notes: tuple[str, ...] = ()
 
     # Single corners where they are faster: between full stops, and everywhere, without the stops that were added for the splines.
@@ -167,21 +170,15 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         with job.stage("solve"):
             bounds = corner_bounds(rounded, machine)
             of_given = bounds if rounded is given else corner_bounds(given, machine)
-        best, left = with_corners(rounded, best, bounds, job, order)
+        best, left = with_corners(rounded, best, bounds, job, order, resolution)
         notes = not_compared_note(rounded, left, bounds.points)
         small = of_given.points.sum() <= COMPARED_POINTS
         if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
-            without = order.solve(given, job)
+            without = order.solve(given, job, resolution, [best])
             _tell_of(job, "no added stops", without, best)
             if without.faster_than(best):
                 return without
 
-    # Once more on a finer grid.
-    if best.solution.solved and len(best.samples) <= FINE_POINTS:
-        fine = order.solve(best.path, job, FINER)
-        _tell_of(job, "finer grid", fine, best)
-        if fine.faster_than(best):
-            best = dataclasses.replace(fine, shape=best.shape)
     return dataclasses.replace(best, notes=notes)
 
 
@@ -191,8 +188,8 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
     rounded : the path with the corners that the splines replace
     """
 
-    def solve(shape: SplineShape) -> OnPath:
-        planned = settings.order.solve(with_spline(rounded, shape), job)
+    def solve(shape: SplineShape, *known: OnPath) -> OnPath:
+        planned = settings.order.solve(with_spline(rounded, shape), job, COARSE, known)
         return dataclasses.replace(planned, shape=shape)
 
     best = solve(shape)
@@ -200,7 +197,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
         return best
     jerk_limited, rounds = settings.order.jerk_limited, settings.rounds
     if rounds is None:
-        rounds = min(WORK // len(best.samples), ROUNDS_MAX)
+        rounds = min(settings.effort.work // len(best.samples), settings.effort.rounds)
     seen, more = (ROUNDS_SEEN, MORE) if jerk_limited else (PATIENCE, MORE_PATIENT)
     force = np.full(len(shape.laid.fits), FIRST_FORCE)
     paid: FloatArray | None = None  # what limits cost, mean over the rounds
@@ -212,7 +209,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
             newest, pull = price_bands(best)
             paid = newest if paid is None else paid + SHARE * (newest - paid)
             shape, _ = reshape(best, force, paid, pull)
-        before, tried = best, solve(shape)
+        before, tried = best, solve(shape, best)
         _tell_of(job, f"reshape {n}", tried, best)
         if not tried.solution.solved:
             break
@@ -220,7 +217,7 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
         if tried.faster_than(best):
             best = tried
         if faster.any() and not (faster | ~shape.laid.fits).all():
-            mixed = solve(chosen(before, shape, faster))
+            mixed = solve(chosen(before, shape, faster), before, tried)
             _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
             if mixed.faster_than(best):
                 best = mixed
@@ -229,6 +226,13 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
         force = np.where(faster, LESS * force, more * force)
         reached.append(best.solution.cycle_time)
     return best
+
+
+def final_resolution(path: SmoothPath, job: Job, settings: Settings) -> float:
+    """The resolution of the final grid for a path without splines."""
+    with job.stage("geometry"):
+        coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
+    return settings.effort.resolution(len(coarse))
 
 
 def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> None:

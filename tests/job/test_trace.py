@@ -35,7 +35,7 @@ def test_every_round_is_told_and_what_was_kept_is_the_fastest_so_far(told):
     plan, trace = told
     names = [step.name for step in trace.steps]
     assert [f"reshape {n}" in names for n in range(1, 6)] == [True] * 4 + [False]
-    assert {"splines", "solve", "finer grid", "between points", "bound on corners", "plan"} <= set(names)
+    assert {"splines", "solve", "final grid", "between points", "bound on corners", "plan"} <= set(names)
     for step in trace.steps:
         if step.kept is not None:
             assert step.kept == (step.found < step.before)

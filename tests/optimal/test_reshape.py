@@ -23,7 +23,7 @@ from planner.optimal.compare_corners import COMPARED_POINTS, CornerBounds, corne
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import second_order
 from planner.optimal.reshape import price_bands
-from planner.path.samples import sample_path
+from planner.path.samples import RESOLUTION, sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
 
 MACHINE = problems.machine()
@@ -44,7 +44,7 @@ class Recorded:
     def __init__(self):
         self.paths = []
 
-    def solve(self, path, job):
+    def solve(self, path, job, resolution, known=()):
         self.paths.append(path)
         return planned_on(path)
 
@@ -132,7 +132,7 @@ def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_ar
     pieces = len(splines.samples.piece) - 1
     assert pieces == 2
     corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
-    best, left = with_corners(rounded, slow, corners, QUIET, order)
+    best, left = with_corners(rounded, slow, corners, QUIET, order, RESOLUTION)
     assert not len(left)
     assert len(order.paths) == 1
     assert not best.shape.laid.fits.any()
@@ -145,7 +145,7 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     splines = planned_on(with_spline(rounded, shape), shape=shape)
     corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
     order = Recorded()
-    best, left = with_corners(rounded, splines, corners, QUIET, order)
+    best, left = with_corners(rounded, splines, corners, QUIET, order, RESOLUTION)
     assert not order.paths
     assert list(left) == [0]
     assert best is splines

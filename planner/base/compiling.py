@@ -5,7 +5,8 @@ optimises each of these by itself, turns each into machine code, and makes an en
 
   libraries   what is compiled inside a root stays a library of instructions that the root links: `_Inner`; the root is optimised and
               turned into machine code, with everything in it
-  entries     kernels inside a root have no entry for Python: `without_entries`
+  entries     kernels inside a root have no entry for Python: `ENTRIES`
+  values      they are not compiled once more for every number that an argument is in some call: `_without_values`
   typing      numba asks all of its definitions of an operator again at every place; here each question is asked once: `_call_type`
   settings    of which numba compares and hashes 20 values, many times for each expression: `_same_settings`, `_hash_of_settings`
   garbage     is not collected meanwhile
@@ -46,8 +47,16 @@ def root(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
         return numba.njit(**settings)(function)
     made = numba.njit(pipeline_class=_RootCompiler, **{"no_cfunc_wrapper": True, **settings})(function)
     made._compiler = _Compiler(made._compiler)
-    made.inside_others = numba.njit(**{**settings, **ENTRIES})(function)
+    made.inside_others = inside = numba.njit(**{**settings, **ENTRIES})(function)
+    inside.get_call_template = functools.partial(_without_values, inside.get_call_template)
     return made
+
+
+def _without_values(numba_s: Callable[..., Any], args: Any, kws: Any) -> Any:
+    """How a kernel is called with arguments of these types: f(x, 0) as f(x, n)."""
+    return numba_s(
+        [types.unliteral(of) for of in args], {name: types.unliteral(of) for name, of in kws.items()}
+    )
 
 
 @typeof_impl.register(registry.CPUDispatcher)

@@ -76,6 +76,16 @@ def test_a_kernel_inside_a_function_of_numba_s_own() -> None:
     assert outside(np.ones(9)) == 0.75
 
 
+def test_a_number_as_an_argument_is_no_other_kernel() -> None:
+    @njit(cache=False)
+    def sum_of(x: np.ndarray, n: int) -> float:
+        return share(x, 1) + share(x, 2) + share(x, n=4) + share(x, n)
+
+    before = len(share.inside_others.overloads)
+    assert sum_of(np.ones(9), 4) == 2.0
+    assert len(share.inside_others.overloads) <= max(before, 1)
+
+
 SOURCE = """
 from planner.base.kernels import njit
 

@@ -3,8 +3,8 @@
 A kernel that Python calls (a root) contains all the kernels that it calls, optimised once as a whole. As it comes, numba also
 optimises each of these by itself, turns each into machine code, and makes an entry for Python and one for C, none of which is used. So
 
-  libraries   what is compiled inside a root stays a library of instructions that the root links: `_Inner`; the root is optimised and
-              turned into machine code, with everything in it
+  libraries   what is compiled inside a root stays a library of instructions that the root links: `_Inner`; only the root is optimised
+              as a whole and turned into machine code, with everything in it
   entries     kernels inside a root have no entry for Python: `ENTRIES`
   values      they are not compiled once more for every number that an argument is in some call: `_without_values`
   typing      numba asks all of its definitions of an operator again at every place; here each question is asked once: `_call_type`
@@ -66,10 +66,8 @@ def _kernel_inside_another(kernel: Any, _: Any) -> Any:
 
 
 class _Inner(codegen.JITCodeLibrary):  # type: ignore[misc]
-    """What is compiled inside a root: instructions to be linked, neither optimised nor turned into machine code."""
-
-    def _optimize_functions(self, module: Any) -> None:
-        module.data_layout = self._codegen._data_layout
+    """What is compiled inside a root: instructions to be linked. Each function by itself is simplified, as numba does it, and that is
+    all: without that, roots are no faster to compile and up to twice as slow to run."""
 
     def _optimize_final_module(self) -> None:
         pass

@@ -1,4 +1,4 @@
-"""numba compiles the planner's kernels twice as fast: the same code for the processor, without work that nobody needs.
+"""numba compiles the planner's kernels in about half the time: the same code for the processor, without work that nobody needs.
 
 A kernel that Python calls (a root) contains all the kernels that it calls, optimised once as a whole. As it comes, numba also
 optimises each of these by itself, turns each into machine code, and makes an entry for Python and one for C, none of which is used. So
@@ -25,7 +25,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numba
-from numba.core import codegen, compiler, registry, targetconfig, types
+from numba.core import codegen, compiler, config, registry, targetconfig, types
 from numba.core.types import functions
 from numba.extending import typeof_impl
 
@@ -43,7 +43,7 @@ def known_numba() -> bool:
 
 def root(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
     """The kernel of a function, with these settings of `numba.njit`."""
-    if not known_numba() or numba.config.DISABLE_JIT:
+    if not known_numba() or config.DISABLE_JIT:
         return numba.njit(**settings)(function)
     made = numba.njit(pipeline_class=_RootCompiler, **{"no_cfunc_wrapper": True, **settings})(function)
     made._compiler = _Compiler(made._compiler)
@@ -65,7 +65,7 @@ def _kernel_inside_another(kernel: Any, _: Any) -> Any:
     return types.Dispatcher(getattr(kernel, "inside_others", kernel))
 
 
-class _Inner(codegen.JITCodeLibrary):  # type: ignore[misc]
+class _Inner(codegen.JITCodeLibrary):
     """What is compiled inside a root: instructions to be linked. Each function by itself is simplified, as numba does it, and that is
     all: without that, roots are no faster to compile and up to twice as slow to run."""
 
@@ -99,7 +99,7 @@ class _LaterEnvironment:
         return getattr(self._numba_s, name)
 
 
-class _RootCompiler(compiler.Compiler):  # type: ignore[misc]
+class _RootCompiler(compiler.Compiler):
     """Gives a root a library with machine code, as numba does it."""
 
     def define_pipelines(self) -> Any:

@@ -23,6 +23,7 @@ LAYERS = (
     "planner.base.files",
     "planner.base.glossary",
     "planner.base.loading",
+    "planner.base.compiling",
     "planner.base.kernels",
     "planner.base.names",
     "planner.base.search",
@@ -152,6 +153,8 @@ def test_the_verifier_is_independent() -> None:
 
 def test_kernels_are_made_where_the_cache_may_fail() -> None:
     for module, file in MODULES.items():
+        if module == "planner.base.compiling":  # where kernels.py has them made
+            continue
         made = any(
             line.startswith(("from numba", "import numba")) for line in file.read_text("utf-8").splitlines()
         )

@@ -4,7 +4,7 @@ Compiled kernels are kept on disk, beside the package or, where that is read-onl
 where neither can be written, and fails where the disk is full. A kernel that cannot be kept is compiled again by the next run, which
 takes a minute for all of them, and is nothing to fail for: one warning says so.
 
-numba itself is imported with the first kernel.
+How a kernel is compiled is in compiling.py. numba itself is imported with the first kernel.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ def at_compilation(tell: Callable[[bool], None] | None) -> None:
 
 def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]], Any]:
     """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is possible."""
-    import numba
+    from planner.base.compiling import root
 
     def compiled(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(**settings)(function)
+        dispatcher = root(function, settings)
         if cache and hasattr(dispatcher, "enable_caching"):  # a plain function with NUMBA_DISABLE_JIT
             dispatcher._cache = _Cache(function)
         return dispatcher

@@ -29,7 +29,7 @@ LINE_EVERY = 10.0  # [s] between lines of progress where there is no terminal
 # Columns where the output is no terminal: rows are for other programs there, and are not cut or folded.
 PIPE_WIDTH = 1000
 COMPILING = "compiling"
-COMPILING_ONCE = f"{COMPILING}, once: the kernels are kept for the next run"
+KEPT = "once: they are kept for the next run"
 PLAIN = {"µ": "u", "²": "2", "³": "3", "°": "deg", "…": "..."}  # for encodings that lack them
 
 
@@ -156,14 +156,17 @@ def show(*tables: RenderableType) -> None:
 class ProgressBar:
     """Progress of a long job on standard error: a bar with a clock on a terminal, a line now and then elsewhere.
 
-    quiet : print nothing
+    quiet           : print nothing
+    at_first_kernel : called once when the first kernel is about to be compiled that can be kept
 
     The number of rounds is not known beforehand, so the bar only shows that work goes on. The text beside it names the stage, the pass,
     and how much of the pass is done.
     """
 
-    def __init__(self, *, quiet: bool = False) -> None:
+    def __init__(self, *, quiet: bool = False, at_first_kernel: Callable[[], None] | None = None) -> None:
         self._quiet = quiet
+        self._at_first_kernel = at_first_kernel
+        self._compiled = 0
         self._bar: Any = None
         self._task: Any = None
         self._times: dict[str, int] = {}
@@ -189,7 +192,11 @@ class ProgressBar:
 
     def _compile(self, kept: bool) -> None:
         """Called before a kernel is compiled."""
-        self._show(COMPILING_ONCE if kept else COMPILING)
+        self._compiled += 1
+        if kept and self._at_first_kernel is not None:
+            self._at_first_kernel()
+            self._at_first_kernel = None
+        self._show(f"{COMPILING} kernel {self._compiled}{f', {KEPT}' if kept else ''}")
 
     def _text(self, stage: str, fraction: float) -> str:
         times = self._times.get(stage, 1)

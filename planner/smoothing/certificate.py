@@ -29,7 +29,8 @@ class Certificate(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _piece_error(basis, control, i, a, b, chord, bezier):
-    """Largest distance of the Bezier points of span i between tau = a and b from a chord (start, direction, length)."""
+    """Largest distance of the Bezier points of span i between tau = a and b from a chord (start, direction, length) [mm]; `bezier`
+    (6, A) is overwritten."""
     chord_start, along, length = chord
     axes = control.shape[1]
     step = b - a
@@ -70,7 +71,10 @@ def _piece_error(basis, control, i, a, b, chord, bezier):
 
 @njit(cache=True, error_model="numpy")
 def certify(corridor, knots, site_place, control):
-    """The certificate of one run; site_place (J,) is the place of each site."""
+    """The certificate of one run: its corridor, its knots, and its control points (n, A) [mm].
+
+    site_place : (J,) place of each site along the legs [mm], ascending
+    """
     place, point, along, tol, tol_chord = (
         corridor.place, corridor.point, corridor.along, corridor.tol, corridor.tol_chord
     )  # fmt: skip

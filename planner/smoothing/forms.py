@@ -42,7 +42,8 @@ class SplineMotion(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def third_derivative_bands(splines, weights):
-    """(A, n, 6) bands of the integrals of the squared third derivatives times weights (A,) along all runs."""
+    """(A, n, 6) bands of the integrals of the squared third derivatives times weights (A,) along all runs [1/mm5]: 1/2 c'Hc of the
+    control points c [mm] is the integral [1/mm3]."""
     H = np.zeros((len(weights), len(splines.control), ORDER))
     for q in range(len(splines.fits)):
         knots, begin = run_knots(splines, q), control_first(splines, q)
@@ -64,7 +65,8 @@ def add_third_derivatives(knots, weights, H):
 
 @njit(cache=True, error_model="numpy")
 def third_derivative_energy(knots, weights, c, first, last):
-    """Integral of the squared third derivatives times weights (A,) over the spans first .. last - 1."""
+    """Integral of the squared third derivatives times weights (A,) over the spans first .. last - 1 [1/mm3], from the control points
+    c (n, A) [mm] of the run."""
     cut, basis = knots
     total = 0.0
     rows = np.empty((4, ORDER))
@@ -135,7 +137,10 @@ def _add_prices(knots, control, motion, at, limits, H, Q):
 @njit(cache=True, error_model="numpy")
 def motion_bands(splines, motion, limits):
     """Two bands (A, n, 6) over the control points of all runs that fit: of what the motion pays, and of its squared jerks over their
-    limits, times dt (optimal/reshape.py). `limits` (2, A) of acceleration and jerk."""
+    limits, times dt (optimal/reshape.py), both [s/mm2].
+
+    limits : (2, A) of acceleration [mm/s2] and jerk [mm/s3]
+    """
     axes, n = splines.control.shape[1], len(splines.control)
     H, Q = np.zeros((axes, n, ORDER)), np.zeros((axes, n, ORDER))
     for q in range(len(splines.fits)):

@@ -28,13 +28,17 @@ SPANS_MIN = 8  # of a run: with five control points fixed at either end three ar
 
 
 def lay(corridor: Corridor, longest: FloatArray) -> Splines:
-    """The first splines; `longest` (Q,) span of each run [mm]."""
+    """The first splines in the corridors of all runs (module text).
+
+    longest : (Q,) longest span of each run [mm]
+    """
     return Splines(*_lay(corridor, longest))
 
 
 @njit(cache=True, error_model="numpy")
 def greville_control(corridor, breaks):
-    """Control points (n, A) of one run on its chain, at the Greville abscissae."""
+    """Control points (n, A) [mm] of one run on its chain, at the Greville abscissae: each at the mean of the five knots inside its
+    basis function, where the spline of a straight chain is the chain itself. breaks : (S+1,) [mm]"""
     place, point, knots = corridor.place, corridor.point, clamped(breaks)
     control = np.empty((len(breaks) - 1 + DEGREE, point.shape[1]))
     v = 0

@@ -107,6 +107,7 @@ def _next_window(attempt, done, site, fixed_first, end, span, ratio_site):
 
 @njit(cache=True, error_model="numpy")
 def _window(run, lo, hi):
+    """The window of the control points lo .. hi - 1."""
     span, spans = run.sites.span, len(run.knots.breaks) - 1
     return ControlWindow(
         lo, hi, first_not_before(span, max(lo - DEGREE, 0)), first_not_before(span, min(hi, spans))

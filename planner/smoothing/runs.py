@@ -36,7 +36,8 @@ class SplineRuns(NamedTuple):
 
 
 def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatArray:
-    """(R,) the longest that a span may be on each leg [mm]; `tol` (R,)."""
+    """(R,) the longest that a span may be on each leg [mm]: short enough for the profile to build up its acceleration within a few
+    spans, and no shorter than the tolerance asks for. tol : (R,) tolerance of each leg [mm]"""
     feed, a, j = _motion(path, machine)
     return np.maximum(
         np.maximum(LONGEST_DELAY * feed * a / j, LONGEST_WAY * feed**2 / a), LONGEST_TOLERANCE * tol
@@ -44,7 +45,10 @@ def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatAr
 
 
 def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray) -> SplineRuns:
-    """The runs of a path; `longest` (R,) span on each leg [mm]."""
+    """The runs of a path over R legs (module text).
+
+    longest : (R,) longest span on each leg [mm], from `longest_span`
+    """
     legs, cut = path.legs, path.joint == Joint.STOP
     feed, a, j = _motion(path, machine)
     reach = BRAKING_WAYS * (feed**2 / (2.0 * a) + feed * a / (2.0 * j)) + END_SPANS * longest

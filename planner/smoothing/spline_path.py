@@ -46,7 +46,11 @@ class SplineShape:
 
 
 def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
-    """Splines inside the tolerance for all runs of a path with rounded corners. Raises InputError if the machine lacks an axis."""
+    """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed with a certificate
+    (relax.py), and without a cusp. A run that gets none has `fits` False.
+
+    Raises InputError if the machine lacks an axis of the path.
+    """
     tolerance = path.toolpath.tolerance
     axes = path.toolpath.axes
     reach = np.full(
@@ -76,7 +80,7 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
 
 
 def cusps(laid: Splines) -> Array:
-    """(Q,) True for runs with a cusp."""
+    """(Q,) True for runs with a cusp (`cusp_spans`)."""
     return np.logical_or.reduceat(cusp_spans(laid), laid.span_first[:-1]) if len(laid.fits) else laid.fits
 
 
@@ -88,6 +92,7 @@ def cusp_spans(laid: Splines) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def _cusp_spans(splines):
+    """(S,) `cusp_spans`."""
     span_first, axes = splines.span_first, splines.control.shape[1]
     found = np.zeros(span_first[-1], np.bool_)
     rows, tangent, before = np.empty((4, ORDER)), np.empty(axes), np.empty(axes)
@@ -158,7 +163,7 @@ def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:
 
 
 def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
-    """The path with the runs that fit."""
+    """The path with the splines of the runs that fit in place of their corners, each span as a polynomial (geometry/spline.py)."""
     runs, laid = shape.runs, shape.laid
     axes = len(path.toolpath.axes)
     kept = np.flatnonzero(laid.fits)

@@ -1,0 +1,95 @@
+"""The first run on a machine: a second process compiles what the first one will need later.
+
+Compiling is nearly all of a first run, and numba compiles one kernel at a time. So as soon as `planner plan` finds a kernel that is
+not compiled yet, it starts another Python, which plans a program of three lines: first what comes last in a job, samples and verdict,
+then the feedrate, on corners that need no splines. Meanwhile the command itself compiles the reading, the geometry and the splines.
+Both keep their kernels in the same place, on disk, and each loads what it finds there. Neither waits for the other, so that nothing is
+lost where the second process fails or is not started: with one core, or where kernels cannot be kept.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from planner.base.names import OPTIMAL, SECOND_ORDER, SINGLE_CORNERS
+
+if TYPE_CHECKING:
+    from planner.job.plan import Plan
+
+PROGRAM = "G21 G90 G64\nG1 X1 F600\nY1\nX2\nM2\n"
+# Plans (method, geometry) that another process makes beside a plan of a method, the first ones first.
+BESIDE: dict[str, tuple[tuple[str, str | None], ...]] = {
+    method: (("stop", None), (method, SINGLE_CORNERS)) for method in (OPTIMAL, SECOND_ORDER)
+}
+OTHERS: tuple[tuple[str, str | None], ...] = (("stop", None),)
+
+
+class Helper:
+    """The second process beside a plan; as a context, which ends it."""
+
+    def __init__(self, machine: str, method: str):
+        self._asked = [machine, method]
+        self._process: subprocess.Popen[bytes] | None = None
+        self.started = False
+
+    def start(self) -> None:
+        """Start it, once, if there is a core for it."""
+        if self.started or cores() < 2 or not sys.executable:
+            return
+        self.started = True
+        path = os.pathsep.join(os.path.abspath(place) for place in sys.path)
+        quiet = subprocess.DEVNULL
+        with suppress(OSError):
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "planner.commands.first_run", *self._asked],
+                env={**os.environ, "PYTHONPATH": path},
+                stdin=subprocess.PIPE,  # its end tells the second process that this one has gone
+                stdout=quiet,
+                stderr=quiet,
+            )
+
+    def __enter__(self) -> Helper:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None:
+            self._process.terminate()
+            self._process.communicate()
+
+
+def cores() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def compile_beside(machine: str, method: str) -> list[Plan]:
+    """Make the plans of `BESIDE`."""
+    from planner.machine import load_machine
+    from planner.methods.registry import plan
+    from planner.nc.reader import parse_program
+
+    limits = load_machine(machine)
+    program = parse_program(PROGRAM, limits)
+    return [
+        plan(program, limits, method=name, geometry=geometry) for name, geometry in BESIDE.get(method, OTHERS)
+    ]
+
+
+def _end_with_the_first() -> None:
+    """End this process when the one that has started it ends, however that happens."""
+    os.read(0, 1)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches both processes
+    compile_beside(*sys.argv[1:])

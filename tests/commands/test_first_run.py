@@ -1,0 +1,69 @@
+"""The second process beside a first run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from planner.base import kernels
+from planner.base.names import METHODS
+from planner.commands import first_run
+from planner.commands.first_run import BESIDE, Helper, compile_beside
+from planner.commands.terminal import ProgressBar
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["optimal", "second-order", "kinematic"])
+def test_the_plans_beside_are_made(method: str) -> None:
+    """A plan that ends early would leave kernels to the first process."""
+    plans = compile_beside("mill", method)
+    assert [plan.verdict is not None and plan.verdict.passed for plan in plans] == [True] * len(plans)
+    assert len(plans) == len(BESIDE.get(method, first_run.OTHERS))
+
+
+def test_every_plan_beside_is_of_a_method_that_there_is() -> None:
+    assert set(BESIDE) | {name for plans in BESIDE.values() for name, _ in plans} <= set(METHODS)
+
+
+def test_one_core_has_no_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(first_run, "cores", lambda: 1)
+    with Helper("mill", "stop") as helper:
+        helper.start()
+    assert not helper.started
+
+
+def test_the_process_starts_once_with_the_first_kernel_and_ends_with_the_command(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(first_run, "cores", lambda: 2)
+    started: list[subprocess.Popen[bytes]] = []
+    real = subprocess.Popen
+
+    def recorded(command: list[str], **how: object) -> subprocess.Popen[bytes]:
+        assert command[0] == sys.executable
+        started.append(real([sys.executable, "-c", "import time; time.sleep(60)"], **how))  # type: ignore[call-overload]
+        return started[0]
+
+    monkeypatch.setattr(subprocess, "Popen", recorded)
+    with Helper("mill", "stop") as helper, ProgressBar(quiet=True, at_first_kernel=helper.start):
+        assert kernels._told is not None
+        kernels._told(False)
+        assert started == []  # what is compiled by another process could not be kept
+        kernels._told(True)
+        kernels._told(True)
+        (process,) = started
+        assert process.poll() is None
+    assert process.returncode not in (None, 0)
+
+
+def test_a_second_process_that_fails_says_nothing(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(first_run, "cores", lambda: 2)
+    with Helper("no such machine", "stop") as helper:
+        helper.start()
+        assert helper._process is not None
+        assert helper._process.wait(60) == 1
+    assert capfd.readouterr() == ("", "")

@@ -21,7 +21,7 @@ INSTEAD = {
     "slice": "segment, leg, element or run; Python's own `slice` is a name of its own",
     "cell": "velocity pulse, link, step or interval",
 }
-CELLS_IN = ("geometry/point_matching", "report/", "verify/")
+CELLS_IN = ("report/", "verify/")
 # In texts: a pattern, and what the glossary says instead.
 TEXTS = {r"\bset[ -]points?\b": "setpoint", r"\bstretch(es)?\b": "run, leg, element or range"}
 

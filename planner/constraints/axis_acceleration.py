@@ -26,7 +26,8 @@ JUMP = "curvature_jump"  # the name of the cap, with the axis behind it
 def feed_sq_at_jump(
     d2_left: FloatArray, d2_right: FloatArray, limits: FloatArray
 ) -> tuple[FloatArray, Array]:
-    """(P,) |jump of r''_k| x <= a_k for every axis [mm2/s2]; also the index (P,) of the axis that limits."""
+    """(P,) |d2_right - d2_left| x <= limits for r'' (P, A) on both sides and every axis [mm2/s2]; also the index (P,) of the axis that
+    limits."""
     ratio = np.abs(d2_right - d2_left) / limits
     axis = ratio.argmax(axis=1)
     return over(1.0, ratio[np.arange(len(ratio)), axis]), axis

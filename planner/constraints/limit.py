@@ -101,11 +101,11 @@ class RowLimit(AxisLimit, ABC):
 
 
 def over(value: FloatArray | float, by: FloatArray) -> FloatArray:
-    """value/by, inf where by is 0."""
+    """(P,) value/by for by (P,), and value (P,) or a number; inf where by is 0."""
     return np.divide(value, by, out=np.full(by.shape, np.inf), where=by > 0)
 
 
 def by_axis(name: str, axes: tuple[str, ...], feed_sq: FloatArray, axis: FloatArray) -> Iterator[Cap]:
-    """Caps (P,) that come from one axis each, as caps of every axis; `axis` (P,) is its index."""
+    """Caps feed_sq (P,) [mm2/s2] that come from one axis each, as caps of every axis; `axis` (P,) is its index."""
     for k, letter in enumerate(axes):
         yield Cap(f"{name}.{letter}", np.where(axis == k, feed_sq, np.inf))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(kappa: FloatArray, angle: float, time_constants: Sequence[FloatArray | float]) -> FloatArray:
-    """(P,) feed kappa sum T/2 <= angle [rad], as a bound of feed^2; inf on straights [mm2/s2]."""
+    """(P,) feed kappa sum T/2 <= angle [rad], as a bound of feed^2, for T = time_constants [s]; inf on straights [mm2/s2]."""
     return over(angle, kappa * sum(time_constants) / 2.0) ** 2
 
 

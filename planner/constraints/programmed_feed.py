@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(feed: FloatArray) -> FloatArray:
-    """(P,) x <= F^2 [mm2/s2] for programmed feeds (P,) [mm/s], inf on rapids."""
+    """(P,) x <= F^2 [mm2/s2] for programmed feeds F = feed (P,) [mm/s], inf on rapids."""
     return feed**2
 
 

@@ -1,14 +1,14 @@
 """Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
 
-The path is a chain of straight pieces (arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is for every
-point n a piece i(n) that never goes back, within the piece's budget, such that every vertex between i(n-1) and i(n) is within
+The path is a chain of straight links (arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is for every
+point n a link i(n) that never goes back, within the link's budget, such that every vertex between i(n-1) and i(n) is within
 `MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
 
-    sum of |point - piece|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
+    sum of |point - link|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
                               +  budget^2 for every point that is faster than its block's feed allows
 
-is found by dynamic programming over the pieces that can be reached from the point before, a window of about two budgets, so that
-time and memory are linear in points and pieces. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
+is found by dynamic programming over the links that can be reached from the point before, a window of about two budgets, so that
+time and memory are linear in points and links. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
 the vertices last is taken: a motion that stands on a vertex is still at the block before.
 
 A motion that keeps the tolerance has such an assignment. Where nothing can be reached the budgets are widened, up to `WIDEST` times.
@@ -37,18 +37,18 @@ FIRST_WIDER, WIDEST = (
 ENTERED, THROUGH = (
     1,
     2,
-)  # bits of a cell: best entered on the chord before its point; best entered when left on the same chord
+)  # bits of a mark: best entered on the chord before its point; best entered when left on the same chord
 
 
-class Chain(NamedTuple):
-    """K straight pieces and the K+1 vertices around them.
+class PathChain(NamedTuple):
+    """K straight links and the K+1 vertices around them.
 
     vertex    : (K+1, A) [mm]
     at_vertex : (K+1,) budget there [mm]
-    budget    : (K,) of each piece, the larger one of its block's two joints [mm]
-    skipped   : (K,) price of leaving a piece without a point [mm2], 0 for the parts of an arc
+    budget    : (K,) of each link, the larger one of its block's two joints [mm]
+    skipped   : (K,) price of leaving a link without a point [mm2], 0 for the parts of an arc
     feed      : (K,) programmed [mm/s]
-    segment   : (K,) of the toolpath; first (M+1,) piece of each segment
+    segment   : (K,) of the toolpath; first (M+1,) link of each segment
     """
 
     vertex: FloatArray
@@ -60,8 +60,8 @@ class Chain(NamedTuple):
     first: Array
 
 
-def chain_of(toolpath: Toolpath) -> Chain:
-    """The pieces of a toolpath."""
+def chain_of(toolpath: Toolpath) -> PathChain:
+    """The links of a toolpath."""
     count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
     first = np.concatenate([[0], np.cumsum(count)])
     segment = np.repeat(np.arange(len(toolpath)), count)
@@ -76,7 +76,7 @@ def chain_of(toolpath: Toolpath) -> Chain:
     at_vertex = np.append(budget, toolpath.tolerance[-1])
     at_vertex[first] = toolpath.tolerance
     skipped = np.where(count[segment] == 1, budget**2, 0.0)
-    return Chain(vertex, at_vertex, budget, skipped, toolpath.feed[segment], segment, first)
+    return PathChain(vertex, at_vertex, budget, skipped, toolpath.feed[segment], segment, first)
 
 
 def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Array | None:
@@ -89,31 +89,31 @@ def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Arra
 
 
 class SegmentsInOrder:
-    """`segments_at` for points that come chunk by chunk. Which piece a point is at is settled as soon as all assignments that are still
+    """`segments_at` for points that come chunk by chunk. Which link a point is at is settled as soon as all assignments that are still
     possible agree on it; until then its chunk is kept."""
 
     def __init__(self, toolpath: Toolpath):
         self._chain = chain_of(toolpath)
-        pieces = len(self._chain.budget)
-        self._cost, self._low, self._high = np.empty(pieces), 0, 0
+        links = len(self._chain.budget)
+        self._cost, self._low, self._high = np.empty(links), 0, 0
         self._before: FloatArray | None = None
-        self._open: list[_Cells] = []  # chunks that are not settled
+        self._open: list[_Marks] = []  # chunks that are not settled
         self._begin: list[Array] = []  # where a segment begins, and which
         self._segment: list[Array] = []
         self._count, self._lost = 0, False
 
     def take(self, point: FloatArray, feed: FloatArray) -> None:
-        """The next points (n, A) and their feeds (n,)."""
+        """The next points: point (n, A) [mm], and feed (n,) there [mm/s]."""
         if self._lost or not len(point):
             return
         point = np.ascontiguousarray(point, dtype=np.float64)
         fresh = self._before is None
         before = point[0] if self._before is None else self._before
-        found, cells, self._low, self._high = _forward(
+        found, marks, self._low, self._high = _forward(
             self._chain, before, point, feed, fresh, self._low, self._high, self._cost
         )
         self._lost, self._before = not found, point[-1].copy()
-        self._open.append(_Cells(*cells))
+        self._open.append(_Marks(*marks))
         if found and len(self._open) > 1:
             at = np.flatnonzero(np.isfinite(self._cost[self._low : self._high + 1])) + self._low
             self._settle_before(at)
@@ -130,34 +130,34 @@ class SegmentsInOrder:
         return begin[new], segment[new]
 
     def _settle_before(self, at: Array) -> None:
-        """Settle what is common to all assignments that end at one of the pieces `at`."""
+        """Settle what is common to all assignments that end at one of the links `at`."""
         for k in range(len(self._open) - 1, 0, -1):
-            cells = self._open[k]
-            at = np.unique([_trace(*cells, i, np.empty(len(cells.first), np.int64)) for i in at])
+            marks = self._open[k]
+            at = np.unique([_trace(*marks, i, np.empty(len(marks.first), np.int64)) for i in at])
             if len(at) == 1:
                 self._settle(self._open[:k], int(at[0]))
                 self._open = self._open[k:]
                 return
 
-    def _settle(self, chunks: list[_Cells], last: int) -> None:
-        pieces = []
-        for cells in reversed(chunks):
-            piece = np.empty(len(cells.first), np.int64)
-            last = _trace(*cells, last, piece)
-            pieces.append(piece)
-        segment = self._chain.segment[np.concatenate(pieces[::-1])]
+    def _settle(self, chunks: list[_Marks], last: int) -> None:
+        links = []
+        for marks in reversed(chunks):
+            link = np.empty(len(marks.first), np.int64)
+            last = _trace(*marks, last, link)
+            links.append(link)
+        segment = self._chain.segment[np.concatenate(links[::-1])]
         new = np.flatnonzero(np.append(True, segment[1:] != segment[:-1]))
         self._begin.append(self._count + new)
         self._segment.append(segment[new])
         self._count += len(segment)
 
 
-class _Cells(NamedTuple):
-    """For n points the first piece (n,) that each can be at, where its cells begin (n,), and the cells: how each is best entered."""
+class _Marks(NamedTuple):
+    """For n points the first link (n,) that each can be at, where its marks begin (n,), and the marks: how each is best entered."""
 
     first: Array
     begin: Array
-    cells: Array
+    marks: Array
 
 
 @njit(cache=True, error_model="numpy")
@@ -179,48 +179,48 @@ def _from_chord(begin, end, point):
 def in_order(chain, point, feed):
     """Match points (n, A) with feeds (n,) with a chain.
 
-    Returns whether that succeeds; (n,) the piece of each point; (K+1,) where each vertex is passed, the point before plus the share of
+    Returns whether that succeeds; (n,) the link of each point; (K+1,) where each vertex is passed, the point before plus the share of
     the chord behind it.
     """
-    count, pieces = len(point), len(chain.budget)
-    cost, piece, crossed = np.empty(pieces), np.empty(count, np.int64), np.empty(pieces + 1)
-    found, cells, _, high = _forward(chain, point[0], point, feed, True, 0, 0, cost)
-    if not found or high != pieces - 1:
-        return False, piece, crossed
-    _trace(cells[0], cells[1], cells[2], high, piece)
-    crossed[0], crossed[pieces] = 0.0, count - 1.0
+    count, links = len(point), len(chain.budget)
+    cost, link, crossed = np.empty(links), np.empty(count, np.int64), np.empty(links + 1)
+    found, marks, _, high = _forward(chain, point[0], point, feed, True, 0, 0, cost)
+    if not found or high != links - 1:
+        return False, link, crossed
+    _trace(marks[0], marks[1], marks[2], high, link)
+    crossed[0], crossed[links] = 0.0, count - 1.0
     at = 0
     for n in range(count):
-        for i in range(at + 1, piece[n] + 1):
+        for i in range(at + 1, link[n] + 1):
             _, share = _from_chord(point[max(n - 1, 0)], point[n], chain.vertex[i])
             crossed[i] = max(n - 1, 0) + share * min(n, 1)
-        at = piece[n]
-    for i in range(pieces):
+        at = link[n]
+    for i in range(links):
         crossed[i + 1] = max(crossed[i + 1], crossed[i])
-    return True, piece, crossed
+    return True, link, crossed
 
 
 @njit(cache=True, error_model="numpy")
 def _forward(chain, before, point, feed, fresh, low, high, cost):
-    """Go on with points (n, A) behind the point `before`, which can be at the pieces `low` to `high`; `fresh` if there is none before.
+    """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh` if there is none before.
 
-    cost : (K,) of the best assignment that ends at each of these pieces; those of the last point are written into it
+    cost : (K,) of the best assignment that ends at each of these links; those of the last point are written into it
 
-    Returns whether there is any assignment, the fields of `_Cells`, and the pieces that the last point can be at.
+    Returns whether there is any assignment, the fields of `_Marks`, and the links that the last point can be at.
     """
     vertex, at_vertex, budget = chain.vertex, chain.at_vertex, chain.budget
     skipped, cap = chain.skipped, chain.feed
-    count, pieces = len(point), len(budget)
-    new = np.empty(pieces)
+    count, links = len(point), len(budget)
+    new = np.empty(links)
     first, begin = np.empty(count, np.int64), np.empty(count, np.int64)
-    cells, used = np.empty(4 * count + 64, np.uint8), 0
+    marks, used = np.empty(4 * count + 64, np.uint8), 0
     for n in range(count):
         wide = 1.0
         begins = fresh and n == 0
         while True:
-            lowest, highest, cell = pieces, -1, used
+            lowest, highest, mark = links, -1, used
             stay, enter = np.inf, 0.0 if begins else np.inf
-            for i in range(low, pieces):
+            for i in range(low, links):
                 if i > low:
                     off_sq, _ = _from_chord(before, point[n], vertex[i])
                     within = off_sq <= (wide * MISSED * at_vertex[i] + SAME_PLACE) ** 2
@@ -228,14 +228,14 @@ def _forward(chain, before, point, feed, fresh, low, high, cost):
                 stay = cost[i] if not begins and i <= high else np.inf
                 if i > high and enter == np.inf:
                     break
-                if cell == len(cells):
-                    more = np.empty(2 * cell, np.uint8)
-                    for k in range(cell):
-                        more[k] = cells[k]
-                    cells = more
-                through = THROUGH if i + 1 < pieces and enter + skipped[i] < stay else 0
-                cells[cell] = through | (ENTERED if enter < np.inf and enter <= stay else 0)
-                cell += 1
+                if mark == len(marks):
+                    more = np.empty(2 * mark, np.uint8)
+                    for k in range(mark):
+                        more[k] = marks[k]
+                    marks = more
+                through = THROUGH if i + 1 < links and enter + skipped[i] < stay else 0
+                marks[mark] = through | (ENTERED if enter < np.inf and enter <= stay else 0)
+                mark += 1
                 off_sq, _ = _from_chord(vertex[i], vertex[i + 1], point[n])
                 new[i] = np.inf
                 if off_sq <= (wide * budget[i] + SAME_PLACE) ** 2:
@@ -248,24 +248,24 @@ def _forward(chain, before, point, feed, fresh, low, high, cost):
                 break
             wide = 2.0 * wide if wide > 1.0 else FIRST_WIDER
             if wide > WIDEST:
-                return False, (first, begin, cells), low, high
-        first[n], begin[n], used = low, used, cell
+                return False, (first, begin, marks), low, high
+        first[n], begin[n], used = low, used, mark
         low, high = lowest, highest
         for i in range(low, high + 1):
             cost[i] = new[i]
         before = point[n]
-    return True, (first, begin, cells), low, high
+    return True, (first, begin, marks), low, high
 
 
 @njit(cache=True, error_model="numpy")
-def _trace(first, begin, cells, last, piece):
-    """The best assignment of the points of `_Cells` that ends at the piece `last`, into piece (n,); returns the piece of the point
+def _trace(first, begin, marks, last, link):
+    """The best assignment of the points of `_Marks` that ends at the link `last`, into link (n,); returns the link of the point
     before them."""
     i = last
     for n in range(len(first) - 1, -1, -1):
-        piece[n] = i
+        link[n] = i
         bit = ENTERED
-        while i > first[n] and cells[begin[n] + i - first[n]] & bit:
+        while i > first[n] and marks[begin[n] + i - first[n]] & bit:
             i -= 1
             bit = THROUGH
     return i

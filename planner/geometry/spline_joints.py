@@ -12,7 +12,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.geometry.legs import Legs
-from planner.geometry.point_matching import CHORD_FRACTION, Chain, chain_of, in_order
+from planner.geometry.point_matching import CHORD_FRACTION, PathChain, chain_of, in_order
 from planner.geometry.spline import Spline, span_point
 from planner.geometry.toolpath import Toolpath
 
@@ -76,7 +76,7 @@ def _pass_runs(spans, run_first, segments, chain, place):
                 span_point(spans, i, tau, out)
                 point[n], at[n] = out[0], spans[i].begin + tau * spans[i].width
                 n += 1
-        links = Chain(
+        links = PathChain(
             vertex[a : b + 1],
             at_vertex[a : b + 1],
             budget[a:b],

@@ -1,8 +1,8 @@
 """The first run on a machine: a second process compiles what the first one will need later.
 
 Compiling is nearly all of a first run, and numba compiles one kernel at a time. So as soon as `planner plan` finds a kernel that is
-not compiled yet, it starts another Python, which plans a program of three lines: first what comes last in a job, samples and verdict,
-then the feedrate, on corners that need no splines. Meanwhile the command itself compiles the reading, the geometry and the splines.
+not compiled yet, it starts another Python, which plans a program of three lines, on corners that need no splines: so it comes to path,
+feedrate, samples and verdict while the command itself compiles the reading, the geometry and the splines.
 Both keep their kernels in the same place, on disk, and each loads what it finds there. Neither waits for the other, so that nothing is
 lost where the second process fails or is not started: with one core, or where kernels cannot be kept.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 PROGRAM = "G21 G90 G64\nG1 X1 F600\nY1\nX2\nM2\n"
 # Plans (method, geometry) that another process makes beside a plan of a method, the first ones first.
 BESIDE: dict[str, tuple[tuple[str, str | None], ...]] = {
-    method: (("stop", None), (method, SINGLE_CORNERS)) for method in (OPTIMAL, SECOND_ORDER)
+    method: ((method, SINGLE_CORNERS),) for method in (OPTIMAL, SECOND_ORDER)
 }
 OTHERS: tuple[tuple[str, str | None], ...] = (("stop", None),)
 

@@ -79,8 +79,9 @@ def reshape(
     return chosen(planned, new, relaxed.certified & ~cusps(laid)), -relaxed.multiplier / relaxed.used
 
 
-def tube_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
-    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a tube wider by `more` [mm], in a round from the present shape."""
+def corridor_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a corridor wider by `more` [mm], in a round from the present
+    shape."""
     shape = _shape(planned)
     H, Q = price_bands(planned)
     corridor = shape.corridor

@@ -11,7 +11,7 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import Motion
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.optimal.reshape import tube_prices
+from planner.optimal.reshape import corridor_prices
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
 from planner.sensitivity.prices import MORE_TOLERANCE, SitePrices, price_list
@@ -55,8 +55,8 @@ def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
     if not best.solution.multipliers or machine.fir is not None:
         return None
     by_site = None
-    # what the tube of the splines costs
+    # what the corridor of the splines costs
     if best.shape is not None and len(best.path.spline) and not machine.own:
-        now, wider = (tube_prices(best, more) for more in (0.0, MORE_TOLERANCE))
+        now, wider = (corridor_prices(best, more) for more in (0.0, MORE_TOLERANCE))
         by_site = SitePrices(place=best.shape.laid.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

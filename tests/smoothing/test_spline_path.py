@@ -209,7 +209,7 @@ def loose_knots(monkeypatch):
     return monkeypatch
 
 
-def test_a_first_spline_inside_the_tube_is_one_however_much_room_it_should_have_left(loose_knots):
+def test_a_first_spline_inside_the_corridor_is_one_however_much_room_it_should_have_left(loose_knots):
     path = one_run()
     first = used_of_corridor(spline_shape(path, MACHINE))
     assert lay.ROOM < first.max() < lay.INSIDE
@@ -219,7 +219,7 @@ def test_a_first_spline_inside_the_tube_is_one_however_much_room_it_should_have_
     assert (shape.left >= 0.0).all()
 
 
-def test_a_place_outside_of_the_tube_costs_a_full_stop_there_and_nothing_else(loose_knots):
+def test_a_place_outside_of_the_corridor_costs_a_full_stop_there_and_nothing_else(loose_knots):
     path = one_run()
     first = spline_shape(path, MACHINE)
     used = used_of_corridor(first)

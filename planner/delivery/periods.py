@@ -27,9 +27,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
-from planner.motion.passing import STANDING, passing_times_of
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
+from planner.motion.vertex_times import STANDING, passing_times_of
 
 # Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
 # changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
@@ -39,17 +39,20 @@ PER_PERIOD = 8
 # Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of the motion of its own, and
 # who looks at the pieces, at whatever times, sees it.
 LEAST_REST = 1e-6
-# Chords may miss a vertex by this share of its tolerance [-]; the rest is for what lies between the phases and places above.
+# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases and places above.
 USED = 0.99
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
-# A corner is stopped at instead where less than this share of its tolerance would be left to it [-].
+# A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
 
 
 def settled(motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool) -> MotionInTime:
-    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance."""
+    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance.
+
+    jerk_limited : whether the motion leaves a full stop with limited jerk, not with full acceleration at once
+    """
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
@@ -91,11 +94,11 @@ def _waits(
     gap = np.append(arrival[1:] - departure[:-1], np.inf)
     rows = max(CHUNK // len(tau), 1)
     for first in range(0, len(arrival), rows):
-        part = slice(first, first + rows)
-        before = _off(motion, arrival[part, None] - tau, place[part], dt)
-        behind = _off(motion, departure[part, None] + tau, place[part], dt)
+        some = slice(first, first + rows)
+        before = _off(motion, arrival[some, None] - tau, place[some], dt)
+        behind = _off(motion, departure[some, None] + tau, place[some], dt)
         apart = [np.linalg.norm(off, axis=2) for off in (before, behind[:, ::-1])]
-        risky = np.minimum(*apart).max(axis=1) > allowed[part]
+        risky = np.minimum(*apart).max(axis=1) > allowed[some]
         for r in np.flatnonzero(risky):
             k = first + r
             since = (arrival[k] + waited) % dt  # from the last sample
@@ -131,8 +134,8 @@ def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
     """(...,) distance of 0 from the chords a to b (..., A)."""
     step = b - a
     size = (step**2).sum(axis=-1)
-    share = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
-    near: FloatArray = np.linalg.norm(a + np.clip(share, 0.0, 1.0)[..., None] * step, axis=-1)
+    fraction = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
+    near: FloatArray = np.linalg.norm(a + np.clip(fraction, 0.0, 1.0)[..., None] * step, axis=-1)
     return near
 
 
@@ -161,11 +164,11 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
     at = np.flatnonzero(moving)
     rows = max(CHUNK // shift.size, 1)
     for first in range(0, len(at), rows):
-        part = at[first : first + rows]
-        off = _positions(motion, when[part, None, None] + shift, dt) - vertex[part, None, None]
-        far[part] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
-        fine_off = _positions(motion, when[part, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
-        near[part] = np.linalg.norm(fine_off - vertex[part, None], axis=2).min(axis=1)
+        some = at[first : first + rows]
+        off = _positions(motion, when[some, None, None] + shift, dt) - vertex[some, None, None]
+        far[some] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
+        fine_off = _positions(motion, when[some, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
+        near[some] = np.linalg.norm(fine_off - vertex[some, None], axis=2).min(axis=1)
     return near, far
 
 

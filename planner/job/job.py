@@ -17,7 +17,7 @@ from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
 from planner.delivery.periods import settled
 from planner.feedrate.solution import Status
-from planner.geometry.passing import SegmentsInOrder
+from planner.geometry.point_matching import SegmentsInOrder
 from planner.geometry.toolpath import Toolpath
 from planner.job.notes import job_notes
 from planner.job.plan import Plan

@@ -125,7 +125,7 @@ def inside_pieces(motion: MotionInTime) -> tuple[Array, FloatArray]:
 
 
 def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Trajectory]:
-    """The motion at the times [s], put in order, in chunks that share their ends; dt [s] is the trajectories' period."""
+    """The motion at the times (T,) [s], put in order, in chunks that share their ends; dt [s] is the trajectories' period."""
     times = np.unique(times)
     for first in range(0, len(times), CHUNK):
         yield motion.at(times[first : first + CHUNK + 1], dt)

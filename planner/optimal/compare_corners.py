@@ -62,7 +62,8 @@ def with_corners(
     order: Order,
     resolution: float,
 ) -> tuple[OnPath, Array]:
-    """Corners instead of splines between the full stops where they are faster, and where that was too much to find out.
+    """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which that was too much to find
+    out.
 
     rounded : the path with the corners that the splines of `best` replace
     coarse  : the motion on the splines of `best` on the coarse grid of optimal/effort.py, on which most corners are ruled out
@@ -85,7 +86,7 @@ def with_corners(
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
-    job.tell("bound on corners", found=corners.time.sum(), stretches=len(ranked), left=len(left))
+    job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
     # on the final grid the second time on those that turned out to be faster
     for grid, splines, share in ((COARSE, coarse, CLOSE), (resolution, best, 1.0), (resolution, best, 1.0)):
         fits = shape.laid.fits & ~chosen[piece]
@@ -100,7 +101,7 @@ def with_corners(
             found=planned.solution.cycle_time,
             before=splines.solution.cycle_time,
             kept=planned.faster_than(splines),
-            stretches=int(chosen.sum()),
+            runs=int(chosen.sum()),
         )
         slower = chosen & (planned.stop_to_stop() >= share * splines.stop_to_stop())
         if grid == resolution and not slower.any():

@@ -24,8 +24,8 @@ What is tried more than once:
   corners between full stops     "auto", a bound on their time is lower    2                 solve         splines stay where faster
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
   final grid                     rounds of reshaping are on a coarse one   1                 finer solve   that of the plan
-  tighter limits in places       excess above 1e-5 between points          3                 solve         stretches slower by the rest
-  less feed in places            filters leave the tolerance               10                solve         waiting, slower stretches
+  tighter limits in places       excess above 1e-5 between points          3                 solve         runs slower by the rest
+  less feed in places            filters leave the tolerance               10                solve         waiting, slower runs
   the whole slower               excess below 0.5 % in the verdict         3                 verdict       the verdict stands
   another plan                   "auto", a bound on its time is lower      3                 a plan        the fastest that passes
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.constraints import normal_limit
+from planner.constraints.limits import LIMITS
 from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
-from planner.delivery.pacing import paced, runs_of
+from planner.delivery.pacing import runs_of, slower_runs
 from planner.geometry.toolpath import Toolpath
 from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
@@ -42,7 +42,7 @@ SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
-ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, normal_limit.NAME: 2, "jerk": 3}
+ORDER = {limit.name: limit.order for limit in LIMITS}
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
@@ -115,7 +115,7 @@ def _worst(feed, motions, limits, smooth, out):
 
 
 def fastest_inside(law: TimeLaw) -> FloatArray:
-    """When the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
     lasting = np.diff(np.append(law.t, law.end))
     braking = np.flatnonzero(law.jerk_s < 0.0)
     tau = -law.acc_s[braking] / law.jerk_s[braking]
@@ -204,4 +204,4 @@ def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion 
 
 def slower(motion: Motion, factor: FloatArray) -> Motion:
     """Every run (G,) slowed down by its factor."""
-    return paced(motion, runs_of(motion), factor, np.zeros(len(factor)))
+    return slower_runs(motion, runs_of(motion), factor)

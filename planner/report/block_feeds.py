@@ -74,7 +74,12 @@ def feeds_of(planned: PlannedBlocks, toolpath: Toolpath, machine: Machine, block
 
 
 def runs_of_feed(highest: FloatArray, duration: FloatArray, least: float) -> Array:
-    """(n,) the run of each block, from 0; `least` [s] as the module says."""
+    """(n,) the run of each block, from 0 (module text).
+
+    highest  : (n,) highest feed of each block [mm/s]
+    duration : (n,) how long each takes [s]
+    least    : shortest time of a run [s]
+    """
     run = np.empty(len(highest), np.int64)
     count, lasted = 0, 0.0
     low = high = highest[0] if len(highest) else 0.0

@@ -240,7 +240,7 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
 
 
 def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
-    """A(n) (C,) [mm/s2] for vectors (C, L) along n, of any length; where that is 0, the least over all directions."""
+    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n, of any length; where that is 0, the least over all directions."""
     limits = machine.limits("acceleration", axes)[_linear(axes)]
     size = np.linalg.norm(direction, axis=1)
     given = np.abs(direction) @ limits

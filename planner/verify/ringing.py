@@ -1,6 +1,6 @@
 """How much the machine's vibration modes ring: during the motion, and when it is over.
 
-Each axis carries an oscillator that is shaken by the set points p(t), at rest before. Its deflection y, its position less p, obeys
+Each axis carries an oscillator that is shaken by the setpoints p(t), at rest before. Its deflection y, its position less p, obeys
 
     y'' + 2 z w y' + w^2 y = -p''(t),        w = 2 pi frequency,  z = damping ratio, 0 <= z < 1.
 
@@ -41,8 +41,8 @@ class Ringing:
 
     frequency, damping : the mode's [Hz], [-]
     axes               : their letters
-    during             : (A,) largest deflection while the set points move [mm], rotary axes [rad]
-    after              : (A,) amplitude with which it still rings at the end of the set points [mm], rotary axes [rad]
+    during             : (A,) largest deflection while the setpoints move [mm], rotary axes [rad]
+    after              : (A,) amplitude with which it still rings at the end of the setpoints [mm], rotary axes [rad]
     """
 
     frequency: float

@@ -17,9 +17,9 @@ from planner.job import method as job_method
 from planner.methods.fir import FirMethod
 from planner.methods.registry import plan
 from planner.motion.axis_motion import AxisMotion
-from planner.motion.passing import passing_times, passing_times_of, standstills
 from planner.motion.timing import sample_motion
 from planner.motion.trajectory import joined
+from planner.motion.vertex_times import passing_times, passing_times_of, standstills
 from planner.nc.reader import parse_program
 
 LEG = 10.0  # [mm]

@@ -34,7 +34,7 @@ FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between t
 
 
 def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
-    """Feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
+    """(n + 1,) feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
     own = slice(begin, end + 1)
     acceleration, jerk_limit = problem.acceleration_limit[own], problem.jerk_limit[own]
     curve = np.maximum(np.abs(problem.d2_left[own]), np.abs(problem.d2_right[own])) / acceleration

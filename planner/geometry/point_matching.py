@@ -1,6 +1,6 @@
 """Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
 
-The path is a chain of straight pieces (arcs as chords within `CHORD_SHARE` of the tolerance) between vertices. Wanted is for every
+The path is a chain of straight pieces (arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is for every
 point n a piece i(n) that never goes back, within the piece's budget, such that every vertex between i(n-1) and i(n) is within
 `MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
 
@@ -25,7 +25,7 @@ from planner.base.kernels import njit
 from planner.geometry.chords import arc_point, arc_sagitta
 from planner.geometry.toolpath import Toolpath
 
-CHORD_SHARE = 1e-3  # sagitta of an arc's chords over its tolerance [-]
+CHORD_FRACTION = 1e-3  # sagitta of an arc's chords over its tolerance [-]
 SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry
 SAME_FEED = 1e-6  # [-] a feed above another by less is the same: rounding
 # Vertices may be missed by so many budgets [-]: a vertex passed at 1.01 must not hold up what follows.
@@ -62,7 +62,7 @@ class Chain(NamedTuple):
 
 def chain_of(toolpath: Toolpath) -> Chain:
     """The pieces of a toolpath."""
-    count, _ = arc_sagitta(toolpath, CHORD_SHARE)
+    count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
     first = np.concatenate([[0], np.cumsum(count)])
     segment = np.repeat(np.arange(len(toolpath)), count)
     vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])

@@ -1,10 +1,10 @@
-"""When a motion passes the vertices of the programmed path, in their order.
+"""When a motion passes the vertices of the programmed path, in their order, by the length that it has run.
 
 From one vertex to the next the motion runs the length L of the block between them, give or take what it may cut or round: every
-point of it is within eps of the path, and a corner within eps of its vertex saves no more than 2 eps of the way on either side. So
-vertex i+1 is looked for where the way run since vertex i is within `SLACK` eps of L, never before vertex i, at the nearest place of
-the chords there. Order and way decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told
-apart.
+point of it is within eps of the path, and a corner within eps of its vertex saves no more than 2 eps of the length on either side. So
+vertex i+1 is looked for where the length run since vertex i is within `SLACK` eps of L, never before vertex i, at the nearest point of
+the chords there. Order and length decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told
+apart. (Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from planner.base.search import nearest
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 
-# By how much the way run between two vertices may differ from the block's length [tolerances]: 2 on either side, and as much again
+# By how much the length run between two vertices may differ from the block's [tolerances]: 2 on either side, and as much again
 # for where the vertex before was found.
 SLACK = 8.0
-# A motion rests where it is slower than this share of its fastest [-]: rounding.
+# A motion rests where it is slower than this fraction of its fastest [-]: rounding.
 STANDING = 1e-9
 
 
 def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(N+1,) when the motion passes the joints of a path of N segments [s], non-decreasing.
+    """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
 
     motion : sampled so often that between samples it runs straight to within the tolerance
     """
@@ -56,10 +56,10 @@ def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatA
 
 
 def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """When the motion comes to rest at the full stops of a path, and when it leaves (G,) [s].
+    """When the motion comes to rest at the G full stops of a path (G,) [s], and when it leaves them (G,) [s].
 
     motion : sampled at the ends of its pieces too
-    times  : (N+1,) when it passes the joints, `passing_times`
+    times  : (M+1,) when it passes the joints, from `passing_times`
     """
     still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
     group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1

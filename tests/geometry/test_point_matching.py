@@ -11,7 +11,7 @@ from quick import slow_but
 
 import planner
 from planner.geometry.build import toolpath_from_program
-from planner.geometry.passing import CHORD_SHARE, SAME_PLACE, SegmentsInOrder, segments_at
+from planner.geometry.point_matching import CHORD_FRACTION, SAME_PLACE, SegmentsInOrder, segments_at
 from planner.geometry.toolpath import Toolpath
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
@@ -111,7 +111,7 @@ def test_laws_on_random_paths(seed: int) -> None:
     assert segment is not None
     assert (np.diff(segment) >= 0).all()
     off = [distance(toolpath, p, i) for p, i in zip(point + offset, segment, strict=True)]
-    assert max(off) <= EPS * (1.0 + CHORD_SHARE) + 2.0 * SAME_PLACE
+    assert max(off) <= EPS * (1.0 + CHORD_FRACTION) + 2.0 * SAME_PLACE
     missing = np.setdiff1d(np.arange(len(toolpath)), segment)
     assert (toolpath.length[missing] <= 0.02 + 2.0 * EPS).all()
     np.testing.assert_array_equal(in_parts(toolpath, point + offset, rng), segment)
@@ -181,7 +181,7 @@ def test_every_method_names_the_block_it_is_at(method: str) -> None:
     assert (trajectory.line == toolpath.line[segment]).all()
     assert (np.diff(segment) >= 0).all()
     off = [distance(toolpath, p, i) for p, i in zip(trajectory.position, segment, strict=True)]
-    assert max(off) <= EPS * (1.0 + CHORD_SHARE) + 2.0 * SAME_PLACE
+    assert max(off) <= EPS * (1.0 + CHORD_FRACTION) + 2.0 * SAME_PLACE
     step = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     for missing in np.setdiff1d(np.arange(len(toolpath)), segment):
         before = int(np.searchsorted(segment, missing)) - 1

@@ -103,7 +103,11 @@ class SegmentsInOrder:
         self._count, self._lost = 0, False
 
     def take(self, point: FloatArray, feed: FloatArray) -> None:
-        """The next points (n, A) and their feeds (n,)."""
+        """The next points of the motion.
+
+        point : (n, A) [mm]
+        feed  : (n,) [mm/s]
+        """
         if self._lost or not len(point):
             return
         point = np.ascontiguousarray(point, dtype=np.float64)

@@ -86,7 +86,7 @@ class TrajectoryOnDemand(Trajectory):
         return found if self._places is None else self._places.put_on(found, k)
 
     def first_not_before(self, times: FloatArray) -> Array:
-        """(n,) index of the first sample at or after each time [s]; T where there is none."""
+        """(n,) index of the first sample at or after each of the `times` (n,) [s]; T where there is none."""
         k = np.clip(np.ceil(np.asarray(times) / self.dt), 0, len(self) - 1).astype(np.int64)
         k = np.where(
             (k > 0) & (self._times(np.maximum(k - 1, 0)) >= times), k - 1, k

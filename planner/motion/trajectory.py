@@ -74,7 +74,7 @@ class Trajectory:
         return dataclasses.replace(self, **{name: getattr(self, name)[k] for name in COLUMNS})
 
     def first_not_before(self, times: FloatArray) -> Array:
-        """(n,) index of the first sample at or after each time [s]; T where there is none."""
+        """(n,) index of the first sample at or after each of the `times` (n,) [s]; T where there is none."""
         return np.asarray(np.searchsorted(self.t, times))
 
 

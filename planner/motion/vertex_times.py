@@ -35,7 +35,7 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
 
 def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
-    """The same of a motion in parts, each of which may begin with the last sample of the one before."""
+    """(N+1,) the same of a motion in parts, each of which may begin with the last sample of the one before."""
     vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
     times = np.empty(len(vertex))
     slack = SLACK * np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])

@@ -61,7 +61,7 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
 
 
 def feeds_of(planned: PlannedBlocks, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
-    """`block_feeds` from what is known of the blocks."""
+    """(blocks,) `block_feeds` from what is known of the M segments."""
     cut = np.flatnonzero(~toolpath.rapid)
     run = runs_of_feed(planned.highest[cut], planned.duration[cut], RUN_PERIODS * machine.dt)
     cap = np.zeros(len(cut))  # of each run

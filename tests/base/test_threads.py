@@ -58,5 +58,9 @@ def test_an_interrupt_of_the_caller_stops_the_rest():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        side_by_side([lambda: None if stopped.wait(timeout=60.0) else pytest.fail()], stopped.set, interrupt)
+        side_by_side(
+            [lambda: None if stopped.wait(timeout=60.0) else pytest.fail("not stopped")],
+            stopped.set,
+            interrupt,
+        )
     assert stopped.is_set()

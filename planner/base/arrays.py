@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 def freeze(
     record: object, name: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True
 ) -> Array:
-    """Convert field `name` of a frozen dataclass to a contiguous read-only array, in place, and return it.
+    """Convert field `name` of a frozen dataclass to a contiguous read-only array of a shape such as (3, None), in place; return it.
 
     An array that has the type already is not copied (trajectories fill gigabytes): the record then shares memory with the
     caller's array, which the caller must not change any more.

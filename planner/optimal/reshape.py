@@ -26,6 +26,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints.limits import FEED, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
@@ -150,8 +151,8 @@ def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> 
     price[:, 0, :, 2], price[:, 1, :, 2] = (0.5 * rows[:, :, k] * slower[k - 1] ** 6 for k in (1, 2))
     name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
     feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_limit[on]
-    price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
+    price[:, 0, :, 0] = np.where(name == FEED.name, feed, 0.0)[:, None]
     for k, axis in enumerate(problem.axes[:axes]):
-        at = name == f"velocity.{axis}"
+        at = name == VELOCITY.called(axis)
         price[at, 0, k, 0] = feed[at] / problem.d1[on[at], k] ** 2
     return price

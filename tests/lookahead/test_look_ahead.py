@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from planner.base.arrays import FloatArray
 from planner.corners import kinematic
-from planner.lookahead.look_ahead import LegLimits, Passage, capped, look_ahead, moves, needed, swept
+from planner.lookahead.look_ahead import capped, look_ahead, moves, needed, swept
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind, gain_max
 
 seeds = st.integers(0, 2**32 - 1)

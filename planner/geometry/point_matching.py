@@ -1,6 +1,6 @@
 """Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
 
-The path is a chain of straight pieces (arcs as chords within `CHORD_SHARE` of the tolerance) between vertices. Wanted is for every
+The path is a chain of straight pieces (arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is for every
 point n a piece i(n) that never goes back, within the piece's budget, such that every vertex between i(n-1) and i(n) is within
 `MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
 
@@ -25,7 +25,7 @@ from planner.base.kernels import njit
 from planner.geometry.chords import arc_point, arc_sagitta
 from planner.geometry.toolpath import Toolpath
 
-CHORD_SHARE = 1e-3  # sagitta of an arc's chords over its tolerance [-]
+CHORD_FRACTION = 1e-3  # sagitta of an arc's chords over its tolerance [-]
 SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry
 SAME_FEED = 1e-6  # [-] a feed above another by less is the same: rounding
 # Vertices may be missed by so many budgets [-]: a vertex passed at 1.01 must not hold up what follows.
@@ -62,7 +62,7 @@ class Chain(NamedTuple):
 
 def chain_of(toolpath: Toolpath) -> Chain:
     """The pieces of a toolpath."""
-    count, _ = arc_sagitta(toolpath, CHORD_SHARE)
+    count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
     first = np.concatenate([[0], np.cumsum(count)])
     segment = np.repeat(np.arange(len(toolpath)), count)
     vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])
@@ -82,9 +82,82 @@ def chain_of(toolpath: Toolpath) -> Chain:
 def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Array | None:
     """(T,) segment of the toolpath that each point (T, A) of a motion is at, moving at `feed` (T,) [mm/s]; None where that cannot be
     told: the motion leaves the path, or does not end where it ends."""
-    chain = chain_of(toolpath)
-    found, piece, _ = in_order(chain, np.ascontiguousarray(point, dtype=np.float64), feed)
-    return chain.segment[piece] if found else None
+    found = SegmentsInOrder(toolpath)
+    found.take(point, feed)
+    runs = found.runs()
+    return None if runs is None else np.repeat(runs[1], np.diff(np.append(runs[0], len(point))))
+
+
+class SegmentsInOrder:
+    """`segments_at` for points that come chunk by chunk. Which piece a point is at is settled as soon as all assignments that are still
+    possible agree on it; until then its chunk is kept."""
+
+    def __init__(self, toolpath: Toolpath):
+        self._chain = chain_of(toolpath)
+        pieces = len(self._chain.budget)
+        self._cost, self._low, self._high = np.empty(pieces), 0, 0
+        self._before: FloatArray | None = None
+        self._open: list[_Cells] = []  # chunks that are not settled
+        self._begin: list[Array] = []  # where a segment begins, and which
+        self._segment: list[Array] = []
+        self._count, self._lost = 0, False
+
+    def take(self, point: FloatArray, feed: FloatArray) -> None:
+        """The next points (n, A) and their feeds (n,)."""
+        if self._lost or not len(point):
+            return
+        point = np.ascontiguousarray(point, dtype=np.float64)
+        fresh = self._before is None
+        before = point[0] if self._before is None else self._before
+        found, cells, self._low, self._high = _forward(
+            self._chain, before, point, feed, fresh, self._low, self._high, self._cost
+        )
+        self._lost, self._before = not found, point[-1].copy()
+        self._open.append(_Cells(*cells))
+        if found and len(self._open) > 1:
+            at = np.flatnonzero(np.isfinite(self._cost[self._low : self._high + 1])) + self._low
+            self._settle_before(at)
+
+    def runs(self) -> tuple[Array, Array] | None:
+        """(R,) at which point each run of points at one segment begins, and (R,) that segment; None where it cannot be told."""
+        last = len(self._chain.budget) - 1
+        if self._lost or (not self._count and not self._open) or self._high != last:
+            return None
+        self._settle(self._open, last)
+        self._open = []
+        begin, segment = np.concatenate(self._begin), np.concatenate(self._segment)
+        new = np.append(True, segment[1:] != segment[:-1])
+        return begin[new], segment[new]
+
+    def _settle_before(self, at: Array) -> None:
+        """Settle what is common to all assignments that end at one of the pieces `at`."""
+        for k in range(len(self._open) - 1, 0, -1):
+            cells = self._open[k]
+            at = np.unique([_trace(*cells, i, np.empty(len(cells.first), np.int64)) for i in at])
+            if len(at) == 1:
+                self._settle(self._open[:k], int(at[0]))
+                self._open = self._open[k:]
+                return
+
+    def _settle(self, chunks: list[_Cells], last: int) -> None:
+        pieces = []
+        for cells in reversed(chunks):
+            piece = np.empty(len(cells.first), np.int64)
+            last = _trace(*cells, last, piece)
+            pieces.append(piece)
+        segment = self._chain.segment[np.concatenate(pieces[::-1])]
+        new = np.flatnonzero(np.append(True, segment[1:] != segment[:-1]))
+        self._begin.append(self._count + new)
+        self._segment.append(segment[new])
+        self._count += len(segment)
+
+
+class _Cells(NamedTuple):
+    """For n points the first piece (n,) that each can be at, where its cells begin (n,), and the cells: how each is best entered."""
+
+    first: Array
+    begin: Array
+    cells: Array
 
 
 @njit(cache=True, error_model="numpy")
@@ -109,31 +182,50 @@ def in_order(chain, point, feed):
     Returns whether that succeeds; (n,) the piece of each point; (K+1,) where each vertex is passed, the point before plus the share of
     the chord behind it.
     """
-    vertex, at_vertex, budget, skipped, cap = (
-        chain.vertex,
-        chain.at_vertex,
-        chain.budget,
-        chain.skipped,
-        chain.feed,
-    )
+    count, pieces = len(point), len(chain.budget)
+    cost, piece, crossed = np.empty(pieces), np.empty(count, np.int64), np.empty(pieces + 1)
+    found, cells, _, high = _forward(chain, point[0], point, feed, True, 0, 0, cost)
+    if not found or high != pieces - 1:
+        return False, piece, crossed
+    _trace(cells[0], cells[1], cells[2], high, piece)
+    crossed[0], crossed[pieces] = 0.0, count - 1.0
+    at = 0
+    for n in range(count):
+        for i in range(at + 1, piece[n] + 1):
+            _, share = _from_chord(point[max(n - 1, 0)], point[n], chain.vertex[i])
+            crossed[i] = max(n - 1, 0) + share * min(n, 1)
+        at = piece[n]
+    for i in range(pieces):
+        crossed[i + 1] = max(crossed[i + 1], crossed[i])
+    return True, piece, crossed
+
+
+@njit(cache=True, error_model="numpy")
+def _forward(chain, before, point, feed, fresh, low, high, cost):
+    """Go on with points (n, A) behind the point `before`, which can be at the pieces `low` to `high`; `fresh` if there is none before.
+
+    cost : (K,) of the best assignment that ends at each of these pieces; those of the last point are written into it
+
+    Returns whether there is any assignment, the fields of `_Cells`, and the pieces that the last point can be at.
+    """
+    vertex, at_vertex, budget = chain.vertex, chain.at_vertex, chain.budget
+    skipped, cap = chain.skipped, chain.feed
     count, pieces = len(point), len(budget)
-    cost, new = np.empty(pieces), np.empty(pieces)
+    new = np.empty(pieces)
     first, begin = np.empty(count, np.int64), np.empty(count, np.int64)
     cells, used = np.empty(4 * count + 64, np.uint8), 0
-    piece, crossed = np.empty(count, np.int64), np.empty(pieces + 1)
-    low, high = 0, 0  # the pieces that the point before can be at
     for n in range(count):
-        before = point[max(n - 1, 0)]
         wide = 1.0
+        begins = fresh and n == 0
         while True:
             lowest, highest, cell = pieces, -1, used
-            stay, enter = np.inf, 0.0 if n == 0 else np.inf
+            stay, enter = np.inf, 0.0 if begins else np.inf
             for i in range(low, pieces):
                 if i > low:
                     off_sq, _ = _from_chord(before, point[n], vertex[i])
                     within = off_sq <= (wide * MISSED * at_vertex[i] + SAME_PLACE) ** 2
                     enter = off_sq + min(stay, enter + skipped[i - 1]) if within else np.inf
-                stay = cost[i] if n > 0 and i <= high else np.inf
+                stay = cost[i] if not begins and i <= high else np.inf
                 if i > high and enter == np.inf:
                     break
                 if cell == len(cells):
@@ -156,22 +248,24 @@ def in_order(chain, point, feed):
                 break
             wide = 2.0 * wide if wide > 1.0 else FIRST_WIDER
             if wide > WIDEST:
-                return False, piece, crossed
+                return False, (first, begin, cells), low, high
         first[n], begin[n], used = low, used, cell
         low, high = lowest, highest
-        cost, new = new, cost
-    if high != pieces - 1:
-        return False, piece, crossed
-    i = high
-    crossed[0], crossed[pieces] = 0.0, count - 1.0
-    for n in range(count - 1, -1, -1):
+        for i in range(low, high + 1):
+            cost[i] = new[i]
+        before = point[n]
+    return True, (first, begin, cells), low, high
+
+
+@njit(cache=True, error_model="numpy")
+def _trace(first, begin, cells, last, piece):
+    """The best assignment of the points of `_Cells` that ends at the piece `last`, into piece (n,); returns the piece of the point
+    before them."""
+    i = last
+    for n in range(len(first) - 1, -1, -1):
         piece[n] = i
         bit = ENTERED
         while i > first[n] and cells[begin[n] + i - first[n]] & bit:
-            _, share = _from_chord(point[max(n - 1, 0)], point[n], vertex[i])
-            crossed[i] = max(n - 1, 0) + share * min(n, 1)
             i -= 1
             bit = THROUGH
-    for i in range(pieces):
-        crossed[i + 1] = max(crossed[i + 1], crossed[i])
-    return True, piece, crossed
+    return i

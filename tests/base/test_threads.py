@@ -59,7 +59,7 @@ def test_an_interrupt_of_the_caller_stops_the_rest():
 
     with pytest.raises(KeyboardInterrupt):
         side_by_side(
-            [lambda: None if stopped.wait(timeout=60.0) else pytest.fail("never stopped")],
+            [lambda: None if stopped.wait(timeout=60.0) else pytest.fail("not stopped")],
             stopped.set,
             interrupt,
         )

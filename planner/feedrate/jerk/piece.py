@@ -45,7 +45,7 @@ class Piece:
         self.forward = Chain(solver, columns, profile, first, last, tell)
         self.backward: Chain | None = None
         self.joined: list[int] = []  # iterations of the joining window, if there is one
-        self.met = False
+        self.met = False  # whether the two ways were joined
         n, middle = last - first, (first + last) // 2
         self._until = last
         if n > LONG * solver.window:
@@ -103,6 +103,7 @@ class Piece:
 
     @property
     def chains(self) -> list[Chain]:
+        """The way forward and, of a long piece, the way backward."""
         return [self.forward] if self.backward is None else [self.forward, self.backward]
 
     @property

@@ -34,7 +34,7 @@ FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between t
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def envelope(columns, begin, end):
-    """Feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
+    """(n + 1,) feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
     n = end - begin
     caps, rate, jerk = np.zeros(n + 1), np.empty(n + 1), np.empty(n + 1)
     for i in range(n + 1):

@@ -17,6 +17,7 @@ from planner.commands.options import (
     JsonOption,
     MachineOption,
     QuietOption,
+    ThreadsOption,
     ToleranceOption,
 )
 from planner.commands.terminal import (
@@ -52,6 +53,7 @@ def compare_command(
         typer.Option("-o", "--output", "--out", metavar="FILE", help="write the comparison (.json, .csv)"),
     ] = None,
     force: ForceOption = False,
+    threads: ThreadsOption = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:

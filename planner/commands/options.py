@@ -23,6 +23,14 @@ class Format(StrEnum):
     npz = "npz"
 
 
+def _use_threads(count: int | None) -> int | None:
+    """The number of threads, which is used from now on."""
+    from planner.base.threads import use_threads
+
+    use_threads(count)
+    return count
+
+
 def _choice(name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME") -> Any:
     """An option that takes a name that `check` knows; it may be an alias."""
 
@@ -94,5 +102,15 @@ ToleranceOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
+ThreadsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--threads",
+        min=1,
+        metavar="N",
+        help="solve on so many cores (default: all); the motion is the same on any number",
+        callback=_use_threads,
+    ),
+]
 QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="print no progress")]
 ForceOption = Annotated[bool, typer.Option("--force", help="also overwrite files that planner did not write")]

@@ -25,6 +25,7 @@ from planner.commands.options import (
     MethodOption,
     QuietOption,
     SolverOption,
+    ThreadsOption,
     ToleranceOption,
 )
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
@@ -82,6 +83,7 @@ def plan_command(
         typer.Option("--trace", metavar="FILE", help="write what planning tried into FILE (JSON)"),
     ] = None,
     as_json: JsonOption = False,
+    threads: ThreadsOption = None,
     quiet: QuietOption = False,
     force: ForceOption = False,
 ) -> None:

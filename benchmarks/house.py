@@ -25,6 +25,16 @@ from benchmarks.record import markdown, write_results
 ROOT = Path(__file__).resolve().parent.parent
 MOST_ARGUMENTS = 8
 LIMIT_WORDS = "normal_acceleration", "normal_max"
+# Names of limits as they are printed, those that are no words of other things; "X." stands for one with an axis behind it.
+LIMIT_NAMES = (
+    "normal_acceleration",
+    "chord_error",
+    "filter_error",
+    "phase_lag",
+    "curvature_jump.",
+    "velocity.",
+    "acceleration.",
+)
 
 
 def measured(root: Path) -> dict[str, Any]:
@@ -64,6 +74,10 @@ def measured(root: Path) -> dict[str, Any]:
         "files that name the normal acceleration limit": sum(
             any(word in text for word in LIMIT_WORDS) for text in texts.values()
         ),
+        "files of the planner that spell a limit's printed name, at most": max(
+            sum(_spells(tree, name) for path, tree in trees.items() if "verify" not in path.parts)
+            for name in LIMIT_NAMES
+        ),
         "constants": len(constants),
         "constants without a comment": sum(not reason for _, reason in constants),
         "test files, lines": _tests(root),
@@ -90,6 +104,18 @@ def details(root: Path) -> str:
         out += [f"{name} {constant}: no comment" for constant, reason in _constants(tree, text) if not reason]
     out += [f"{name} in {', '.join(files)}" for name, files in where.items() if len(files) > 1]
     return "\n".join(out)
+
+
+def _spells(tree: ast.Module, name: str) -> bool:
+    """Whether a string of a module, other than its texts, is the name, or begins with it where it ends in a dot."""
+    return any(
+        isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and "\n" not in node.value
+        and (node.value.startswith(name) if name.endswith(".") else node.value == name)
+        and " " not in node.value
+        for node in ast.walk(tree)
+    )
 
 
 def _arguments(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

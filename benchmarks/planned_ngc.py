@@ -115,7 +115,7 @@ def _measured(file: Path, machine: Machine, peers: Path, folder: Path) -> dict[s
     job, again = folder / "job.ngc", folder / "planned.ngc"
     job.write_bytes(text)
     plan = planner.plan(job, machine, rounds=0).require()
-    again.write_bytes(planned_program(plan))
+    again.write_bytes(planned_program(plan)[0])
     replanned = planner.plan(again, machine, rounds=0).require()
     assert plan.trajectory is not None
     assert replanned.trajectory is not None

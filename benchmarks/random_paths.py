@@ -21,7 +21,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.bounds import axis_velocity
+from planner.constraints import axis_velocity
 from planner.constraints.problem import FeedrateProblem
 
 AXES = "xyzabcd"
@@ -210,7 +210,7 @@ def _problem(
     """From rest to rest. Bounds on the feed at the two ends, which are at rest, are those of their neighbours: where a spline
     starts with derivative 0, there would be none."""
     points, axes = right[0].shape
-    bound, axis = axis_velocity(right[0][1:-1], limits.velocity)
+    bound, axis = axis_velocity.feed_sq_max(right[0][1:-1], limits.velocity)
     slower = bound < limits.feed**2
     bound = np.where(slower, bound, limits.feed**2)
     return FeedrateProblem(

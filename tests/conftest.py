@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,24 @@ ROOT = Path(__file__).resolve().parent.parent
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+SLOW = 25  # a slow test takes about as long as so many others
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if hasattr(
+        config.option, "loadscopereorder"
+    ):  # pytest-xdist would begin with the files that have the most tests
+        config.option.loadscopereorder = False
+
+
+@pytest.hookimpl(trylast=True)  # of those that -m has left
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with the most slow tests first, so that no worker is left alone with one at the end."""
+    weight = Counter[Path]()
+    for item in items:
+        weight[item.path] += SLOW if item.get_closest_marker("slow") else 1
+    items.sort(key=lambda item: -weight[item.path])  # stable: the tests of a file stay together and in order
 
 
 @pytest.fixture(scope="session")

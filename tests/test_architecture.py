@@ -5,9 +5,12 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
+
+import planner
 
 PACKAGE = Path(__file__).resolve().parent.parent / "planner"
 
@@ -19,6 +22,7 @@ LAYERS = (
     "planner.base.arrays",
     "planner.base.files",
     "planner.base.glossary",
+    "planner.base.loading",
     "planner.base.compiling",
     "planner.base.kernels",
     "planner.base.names",
@@ -28,7 +32,7 @@ LAYERS = (
     "planner.constraints.own",
     "planner.fir.filters",
     "planner.machine",
-    "planner.constraints.normal_limit",
+    "planner.constraints",
     "planner.nc",
     "planner.geometry",
     "planner.corners",
@@ -38,11 +42,15 @@ LAYERS = (
     "planner.path.grid",
     "planner.path.own_rows",
     "planner.path",
-    "planner.constraints",
+    "planner.constraints.on_grid",
+    "planner.constraints.own_axes",
+    "planner.constraints.assemble",
     "planner.feedrate",
     "planner.motion.trajectory",
-    "planner.motion.passing",
+    "planner.motion.on_demand",
+    "planner.motion.vertex_times",
     "planner.motion.time_law",
+    "planner.motion.sampling",
     "planner.motion.timing",
     "planner.motion",
     "planner.lookahead",
@@ -90,6 +98,7 @@ def modules() -> dict[str, Path]:
 MODULES = modules()
 
 
+@cache
 def imports(file: Path) -> set[str]:
     """Names of the package's modules that a file imports at run time; annotations do not count."""
     names = set()
@@ -122,11 +131,16 @@ def layer(module: str) -> int:
     return LAYERS.index(module)
 
 
-@pytest.mark.parametrize("module", sorted(set(MODULES) - {"planner"}))
-def test_imports_go_to_earlier_layers(module: str) -> None:
-    assert layer(module) > 0, f"{module} is in no layer: add it to LAYERS"
-    later = {name for name in imports(MODULES[module]) if layer(name) > layer(module)}
-    assert not later, f"{module} imports later stages: {later}"
+def test_imports_go_to_earlier_layers() -> None:
+    without = [module for module in MODULES if module != "planner" and layer(module) == 0]
+    assert not without, "in no layer: add them to LAYERS"
+    later = {
+        (module, name)
+        for module, file in MODULES.items()
+        for name in imports(file)
+        if module != "planner" and layer(name) > layer(module)
+    }
+    assert not later, "imports of later stages"
 
 
 def test_the_verifier_is_independent() -> None:
@@ -162,6 +176,35 @@ def test_help_and_import_load_nothing_heavy(code: str) -> None:
     loaded = set(done.stdout.rpartition("loaded:")[2].split())
     assert "planner" in loaded
     assert not loaded & HEAVY
+
+
+# What a plan does not use: oracles, pictures, trajectory files, what only compiling needs, and what other programs or options need.
+NOT_OF_A_PLAN = {
+    "casadi",
+    "matplotlib",
+    "toppra",
+    "pyarrow",
+    "pandas",
+    "scipy.linalg",
+    "scipy.interpolate",
+    "scipy.optimize",
+    "numba.np.arraymath",
+    "planner.report",
+    "planner.tube",
+    "planner.nc.hpgl.plotter",
+}
+
+
+def test_a_plan_loads_only_what_it_uses(tmp_path: Path) -> None:
+    """Each package costs all plans its import; SciPy's linear algebra 0.3 s, and numba's readiness to compile 0.2 s."""
+    job = tmp_path / "corner.ngc"
+    job.write_text("G21 G90 G64 P0.05 F3000\nG1 X10\nX20 Y5\nM2\n")
+    planner.plan(job, "mill")  # its kernels are on the disk now
+    code = f"import planner\nplanner.plan({str(job)!r}, 'mill')\nimport sys\nprint('loaded:', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.rpartition("loaded:")[2].split())
+    assert {"planner.optimal.loop", "numba"} <= loaded
+    assert loaded & NOT_OF_A_PLAN == set()
 
 
 def test_readme_names_files_that_exist() -> None:

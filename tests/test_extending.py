@@ -30,6 +30,11 @@ def test_limits_hold_the_motion_and_are_kept(seen):
     arm = [c.ratio for name, c in seen["armed"].verdict.limits.items() if name.endswith(".arm")]
     assert len(arm) == 3
     assert 0.99 < max(arm) <= 1.0 + 1e-6
+    prices = seen["armed"].prices
+    assert {name for name in prices.limits if name.endswith(".arm")} == {
+        f"{quantity}.arm" for quantity in ("velocity", "acceleration", "jerk")
+    }
+    assert {name.partition(".")[2] for name, _ in prices.ranked()} & {"arm", "spindle power"}
 
 
 def test_the_corner_shape_is_used_and_passes(seen):

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
 from nbformat import NotebookNode
 
 FOLDER = Path(__file__).resolve().parent.parent / "notebooks"
@@ -33,10 +31,14 @@ def code(notebook: NotebookNode) -> list[NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-async def execute_all() -> dict[str, NotebookNode | CellExecutionError]:
+async def execute_all() -> dict[str, NotebookNode | Exception]:
+    """Each notebook with its outputs, or the error that ended it."""
+    from nbclient import NotebookClient  # 0.2 s, and only slow tests need it
+    from nbclient.exceptions import CellExecutionError
+
     turn = asyncio.Semaphore(AT_ONCE)
 
-    async def execute(name: str) -> NotebookNode | CellExecutionError:
+    async def execute(name: str) -> NotebookNode | Exception:
         notebook = read(name)
         notebook.cells.insert(0, nbformat.v4.new_code_cell(STRICT))
         client = NotebookClient(
@@ -52,7 +54,7 @@ async def execute_all() -> dict[str, NotebookNode | CellExecutionError]:
 
 
 @pytest.fixture(scope="module")
-def executed() -> dict[str, NotebookNode | CellExecutionError]:
+def executed() -> dict[str, NotebookNode | Exception]:
     return asyncio.run(execute_all())
 
 
@@ -62,12 +64,10 @@ def test_there_is_one_per_paper_one_for_the_solvers_and_one_for_all() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_it_runs_without_error_or_warning(
-    executed: dict[str, NotebookNode | CellExecutionError], name: str
-) -> None:
+def test_it_runs_without_error_or_warning(executed: dict[str, NotebookNode | Exception], name: str) -> None:
     made = executed[name]
-    if isinstance(made, CellExecutionError):
-        pytest.fail(f"{made.ename}: {made.evalue}\n{made.traceback}")
+    if isinstance(made, Exception):
+        raise made
     outputs = [output for cell in code(made) for output in cell.outputs]
     assert not [
         output.text for output in outputs if output.output_type == "stream" and output.name == "stderr"

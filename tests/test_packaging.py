@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import tomllib
 from pathlib import Path
@@ -27,6 +28,16 @@ def test_an_installation_asks_for_what_there_are_wheels_of(machine: tuple[str, s
     wanted = [Requirement(one) for one in PROJECT["dependencies"]]
     missing = {one.name for one in wanted if one.marker and not one.marker.evaluate(here)}
     assert missing == WITHOUT_WHEELS[machine]
+
+
+@pytest.mark.parametrize("package", ["toppra", "ruckig"])
+def test_what_tests_are_skipped_without_is_installed_where_there_are_wheels(package: str) -> None:
+    wanted = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"]]
+    (one,) = (one for one in map(Requirement, wanted) if one.name == package)
+    assert one.marker
+    if not one.marker.evaluate():
+        pytest.skip(f"no wheel of {package} for this machine")
+    assert importlib.util.find_spec(package)
 
 
 def test_what_may_be_missing_can_be_asked_for() -> None:

@@ -99,7 +99,7 @@ def evaluate_corner(
     params: FloatArray,
     w: FloatArray,
     side: FloatArray | None = None,
-    stretch: tuple[float, float] = (1.0, 1.0),
+    scale: tuple[float, float] = (1.0, 1.0),
 ) -> Corner:
     """Evaluate a corner of given shape parameters (4,) at the joint between legs joint-1 and joint.
 
@@ -108,7 +108,7 @@ def evaluate_corner(
     legs = legs_of(toolpath).table
     corners = np.zeros(len(legs) + 1, CORNER_DTYPE)
     corners["shape"], corners["params"][joint] = int(shape.shape), params
-    corners["stretch"][joint] = stretch
+    corners["scale"][joint] = scale
     if isinstance(shape, PolynomialCorner):
         corners["own"][joint] = shape.coefficients
     axes = len(toolpath.axes)

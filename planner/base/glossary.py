@@ -25,9 +25,15 @@ BESIDE = {
     "joint": "where two segments meet: a full stop, a smooth passage or a corner",
     "corner": "a joint at which the direction changes and the motion does not stop; also the curve that rounds it",
     "vertex": "the programmed point of a corner",
+    "chain": "legs, or links, one after the other, with the joints or vertices between them",
+    "link": "a straight line of a chain that points are matched with: a segment, or one chord of it (`geometry/point_matching.py`)",
+    "guide": "what FIR filters are led along: the legs of the program, or the fine chords of a smooth path (`fir/guide.py`)",
     "chord": "the straight line between two points of a curve: what the machine runs between two samples, or "
     "a line that stands for part of an arc",
     "piece": "a part of a motion, in time: each axis has constant jerk in it; of a feedrate problem, the grid points of one run",
+    "velocity pulse": "a leg of a guide, or some of it, that is commanded at one speed (`fir/command.py`); "
+    "the pulses of a drive are the steps of its motor (`motion/pulses.py`)",
+    "ramp": "where a motion only speeds up, or only brakes",
     "window": "neighbouring intervals, or spans, that are solved together",
     "row": "one line of a table, or one inequality of a problem",
 }

@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
+
+from planner.base.loading import load_kernel
 
 # What reading an index raises that another version of the package has written: it names the classes of the kernels' arguments, and
 # those may have gone since. numba reads the whole index before it looks whether it is out of date.
@@ -38,26 +41,36 @@ def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]
     def compiled(function: Callable[..., Any]) -> Any:
         dispatcher = root(function, settings)
         if cache and hasattr(dispatcher, "enable_caching"):  # a plain function with NUMBA_DISABLE_JIT
-            try:
-                dispatcher.enable_caching()
-            except (RuntimeError, OSError) as fault:  # "no locator available"
-                _warn(fault)
-            dispatcher._cache = _Cache(dispatcher._cache)
+            dispatcher._cache = _Cache(function)
         return dispatcher
 
     return compiled
 
 
 class _Cache:
-    """The cache of one kernel: numba's, without its OSErrors."""
+    """The cache of one kernel: numba's, without its OSErrors, and made when the kernel is first called: a plan calls 30 of 190, and
+    numba tries for each whether its directory can be written."""
 
-    def __init__(self, numba_s: Any):
-        self._numba_s = numba_s
-        self._kept = type(numba_s).__name__ != "NullCache"
+    def __init__(self, function: Callable[..., Any]):
+        self._function = function
+
+    @cached_property
+    def _numba_s(self) -> Any:
+        from numba.core.caching import FunctionCache, NullCache
+
+        try:
+            return FunctionCache(self._function)
+        except (RuntimeError, OSError) as fault:  # "no locator available"
+            _warn(fault)
+            return NullCache()
+
+    @cached_property
+    def _kept(self) -> bool:
+        return type(self._numba_s).__name__ != "NullCache"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         try:
-            found = self._numba_s.load_overload(signature, context)
+            found = load_kernel(self._numba_s, signature, context)
         except (OSError, EOFError) as fault:
             self._failed(fault)
             found = None

@@ -11,10 +11,17 @@ What planners know of this limit is here; the judge has its own of it (verify/li
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints.limit import Cap, Limit, over
 from planner.machine import Machine
+
+if TYPE_CHECKING:
+    from planner.constraints.on_grid import Side
 
 NAME = "normal_acceleration"
 
@@ -24,14 +31,19 @@ def largest(machine: Machine) -> float:
     return machine.normal_acceleration or np.inf
 
 
-def feed_sq_max(kappa: FloatArray, machine: Machine) -> FloatArray | None:
-    """(P,) kappa x <= A for x = feed^2 at curvatures (P,) [mm2/s2]; None if the machine names no limit."""
-    return None if machine.normal_acceleration is None else feed_sq_within(kappa, machine.normal_acceleration)
-
-
 def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:
     """(P,) limit / kappa, inf on straights [mm2/s2]."""
-    return np.divide(limit, kappa, out=np.full(kappa.shape, np.inf), where=kappa > 0)
+    return over(limit, kappa)
+
+
+class NormalAcceleration(Limit):
+    """kappa x <= A, on machines that name A."""
+
+    name, unit, order = NAME, "mm/s2", 2
+
+    def on_side(self, side: Side, machine: Machine) -> Iterator[Cap]:
+        if machine.normal_acceleration is not None:
+            yield Cap(self.name, feed_sq_within(side.kappa, machine.normal_acceleration))
 
 
 def of_axes(limits: FloatArray, u1: FloatArray, u2: FloatArray) -> FloatArray:
@@ -70,5 +82,10 @@ def anywhere(machine: Machine, axes: tuple[str, ...]) -> float:
 
 
 def within_budget(tol: FloatArray, tol_ap: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
-    """X [mm/s2]: the largest kappa feed^2 that leaves eps_ap + c X within the budget, and at most A."""
+    """(n,) X [mm/s2]: the largest kappa feed^2 that leaves eps_ap + c X within the budget, and at most A.
+
+    tol, tol_ap  : (n,) budget eps and what the rounding uses of it, eps_ap [mm]
+    acceleration : (n,) A [mm/s2]
+    rate         : c, from `error_rate` [s2]
+    """
     return np.minimum(acceleration, (tol - tol_ap) / rate)

@@ -101,9 +101,11 @@ class PathLimit:
         return np.inf
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """Largest velocity, acceleration and jerk along the path [mm/s, mm/s2, mm/s3]."""
         return self.velocity(at), self.acceleration(at), self.jerk(at)
 
     def value(self, at: Place) -> None:
+        """None: the length of the path."""
         return None
 
 
@@ -123,10 +125,32 @@ class JointLimit(ABC):
         (base/series.py), so that it may use operators and numpy's functions, but no conditions."""
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """Largest velocity, acceleration and jerk of q, the same everywhere [`unit`/s, /s2, /s3]."""
         return self.velocity, self.acceleration, self.jerk
 
     def value(self, at: Place) -> Any:
+        """q at the places (n,) [`unit`]."""
         return self.joint(at)
+
+
+class ScaledLimit:
+    """A limit with `factor` times the bounds of one of its quantities ("velocity", "acceleration", "jerk"), else the same."""
+
+    def __init__(self, limit: OwnLimit, quantity: str, factor: float):
+        self.name, self.unit, self.turn = limit.name, limit.unit, limit.turn
+        self._limit, self._which, self._factor = limit, QUANTITIES.index(quantity), factor
+
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """Those of the limit, one of them times the factor."""
+        velocity, acceleration, jerk = (
+            bound * self._factor if k == self._which else bound
+            for k, bound in enumerate(self._limit.bounds(at))
+        )
+        return velocity, acceleration, jerk
+
+    def value(self, at: Place) -> Any:
+        """That of the limit."""
+        return self._limit.value(at)
 
 
 def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
@@ -181,7 +205,10 @@ def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[F
 def along_path(
     velocity: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(3, n) speed, acceleration and jerk along the path of a motion (n, A), and its direction (n, A); none at rest."""
+    """(3, n) speed, acceleration and jerk along the path of a motion, and its direction (n, A); none at rest.
+
+    velocity, acceleration, jerk : (n, A) of the axes [mm/s], [mm/s2], [mm/s3]
+    """
     speed = np.linalg.norm(velocity, axis=1)
     moving = speed > AT_REST
     direction = np.divide(velocity, speed[:, None], out=np.zeros_like(velocity), where=moving[:, None])

@@ -50,6 +50,8 @@ class FeedrateProblem:
     own                   : how many of the axes, the last ones, are limits of one's own (constraints/own.py): functions of the
                             position with rows like an axis
     own_here              : (2, P, own) by what factors their acceleration and jerk limits are larger at each point [-]
+    own_least             : (3, own) their least bounds of velocity, acceleration and jerk on the path, in units of their own; inf
+                            where they bound nothing
 
     Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in them.
     """
@@ -74,6 +76,7 @@ class FeedrateProblem:
     limit_scale: FloatArray = field(default_factory=lambda: np.ones(()))
     own: int = 0
     own_here: FloatArray | None = None
+    own_least: FloatArray | None = None
 
     def __post_init__(self) -> None:
         points, axes = np.shape(self.d1)
@@ -91,6 +94,7 @@ class FeedrateProblem:
         freeze(self, "feed_sq_bound", np.int64, (points,))
         if self.own:
             freeze(self, "own_here", np.float64, (2, points, self.own))
+            freeze(self, "own_least", np.float64, (3, self.own), finite=False)
         for name in ("feed_sq_start", "feed_sq_end"):
             freeze(self, name, np.float64, (pieces,))
         self._check()

@@ -21,21 +21,17 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints import chord_error, filter_error
 from planner.machine import Machine
 
 
 def error_rate(machine: Machine) -> float:
     """c = dt^2/8 + sum T^2/24 [s2]: chord and filter error per unit of normal acceleration."""
-    return machine.dt**2 / 8.0 + filter_rate(machine)
-
-
-def filter_rate(machine: Machine) -> float:
-    """sum T^2/24 [s2]: filter error per unit of acceleration."""
-    return sum(T * T for T in machine.fir.time_constants) / 24.0 if machine.fir else 0.0
+    return chord_error.rate(machine) + filter_error.rate(machine)
 
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
-    """The part of the tolerance that the rounding may use, eq. (20).
+    """How much of the tolerance the rounding may use, eq. (20).
 
     tol          : (n,) tolerance eps [mm]
     acceleration : (n,) largest normal acceleration A [mm/s2]

@@ -31,7 +31,11 @@ PRODUCT_MAX = 3.0  # ... and up to here for sigma1 sigma2
 
 @dataclass(frozen=True, kw_only=True)
 class BezierCorner:
-    """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given."""
+    """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given.
+
+    Raises InputError for shape numbers outside the ranges in which the error bound of corners/blend.py holds, and, of sigma2, the G3
+    condition has a solution.
+    """
 
     sigma2: float = 0.9
     sigma1: float | None = None
@@ -60,29 +64,34 @@ class BezierCorner:
         return (sigma1**2 * self.sigma2) ** (-1 / 3), (sigma1 * self.sigma2**2) ** (-1 / 3)
 
     def at(self, change: FloatArray) -> BezierCorner:
-        """The weights are the same at every corner."""
+        """The same shape at all n corners, whatever the `change` (n, A) of direction there."""
         return self
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """Tangent length d [mm] for the middle value m [mm]."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm], at any feed (n,)."""
         return middle / self.MIDDLE
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Middle value m [mm] for the tangent length d [mm]."""
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
         return reach * self.MIDDLE
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Parameter rows (n, 4) for tangent lengths d (n,) [mm]."""
+        """(n, 4) parameters for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
         w1, w2 = self.weights
         rows = np.zeros((len(reach), 4))
         rows[:, 0], rows[:, 1], rows[:, 2] = reach, w1, w2
         return rows
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w where two pieces meet."""
+        """The parameter w where the two curves of the pair meet, whatever the `params` (4,)."""
         return (0.5,)
 
 
 def kappa_max(d: FloatArray, theta: FloatArray, sigma2: float) -> FloatArray:
-    """Largest curvature of the pair between straight legs [1/mm] (eq. (17) times sigma2)."""
+    """(n,) largest curvature of the pair between straight legs [1/mm] (eq. (17) times sigma2).
+
+    d      : (n,) tangent length [mm]
+    theta  : (n,) turning angle [rad]
+    sigma2 : shape number [-]
+    """
     return sigma2 * 8.0 * np.sin(theta / 2) / (3.0 * d * np.cos(theta / 2) ** 2)

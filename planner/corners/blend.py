@@ -52,26 +52,35 @@ class Shape(IntEnum):
 SHAPE_BEZIER, SHAPE_OWN = int(Shape.BEZIER), int(Shape.OWN)  # numba reads plain integers
 OWN_TERMS = 10  # coefficients of a shape of one's own
 
-# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.stretch`). Scaling X
+# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.scale`). Scaling X
 # and Y is an affine map, which keeps every geometric continuity.
 CORNER_DTYPE = np.dtype(
     [
         ("shape", np.int64),
         ("params", np.float64, (4,)),
-        ("stretch", np.float64, (2,)),
+        ("scale", np.float64, (2,)),
         ("own", np.float64, (OWN_TERMS,)),
     ]
 )
 
 
 def middle_from_tolerance(tol: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
-    """Largest m with E(m) <= tol [mm]; `curvature` is kappa1 + kappa2 [1/mm]. Infinite where nothing bends."""
+    """(n,) largest m with E(m) <= tol [mm]; infinite where nothing bends.
+
+    tol       : (n,) contour error [mm]
+    sin_half  : (n,) sine of half the turning angle [-]
+    curvature : (n,) kappa1 + kappa2 of the legs [1/mm]
+    """
     with np.errstate(divide="ignore"):
         return tol / (sin_half + np.sqrt(sin_half**2 + curvature * tol))
 
 
 def error_from_middle(middle: FloatArray, sin_half: FloatArray, curvature: FloatArray) -> FloatArray:
-    """E(m) [mm]: bound of the two-sided, in-order deviation of a corner; exact between straight legs."""
+    """(n,) E(m) [mm]: bound of the two-sided, in-order deviation of a corner; exact between straight legs.
+
+    middle              : (n,) m [mm]
+    sin_half, curvature : (n,) as of `middle_from_tolerance`
+    """
     return 2.0 * sin_half * middle + curvature * middle**2
 
 
@@ -163,7 +172,7 @@ def _own_shape(d, c, w):
 def shape_at(corner, w, w_ref):
     """Retreat X and advance Y of a corner record at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
 
-    w_ref : a parameter inside the interval that is meant; it chooses the branch where two pieces meet
+    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner meet
     """
     p = corner.params
     if corner.shape == SHAPE_BEZIER:
@@ -172,12 +181,16 @@ def shape_at(corner, w, w_ref):
         X, Y = _own_shape(p[0], corner.own, w)
     else:
         X, Y = _fir_shape(p[0], p[1], p[2], p[3], w, w_ref)
-    return _scaled(X, corner.stretch[0], 1.0), _scaled(Y, corner.stretch[1], 1.0)
+    return _scaled(X, corner.scale[0], 1.0), _scaled(Y, corner.scale[1], 1.0)
 
 
 @njit(cache=True, error_model="numpy")
 def corner_point(legs, corners, k, w, w_ref, work1, work2, out):
-    """Point and three w-derivatives of corner k (between legs k-1 and k), into out (4, A)."""
+    """Point [mm] and three w-derivatives of corner k (between legs k-1 and k) at w, into out (4, A).
+
+    w_ref        : as of `shape_at`
+    work1, work2 : (4, A) scratch
+    """
     X, Y = shape_at(corners[k], w, w_ref)
     leg_point(legs, k - 1, legs[k - 1].length - X[0], work1)
     leg_point(legs, k, Y[0], work2)

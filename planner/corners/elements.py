@@ -1,6 +1,6 @@
-"""Elements: the smooth path as a sequence of curves, the free part of a leg, a corner or a span, each over its own parameter w.
+"""Elements: the smooth path as a sequence of curves, what is free of a leg, a corner or a span, each over its own parameter w.
 
-Of a path with R legs an element is numbered r in [0, R) for the free part of leg r (w is the leg's x [mm]), ~k < 0 for the corner at
+Of a path with R legs an element is numbered r in [0, R) for what is free of leg r (w is the leg's x [mm]), ~k < 0 for the corner at
 joint k (w in [0, 1]), and R + i for span i of the spline (w in [0, 1]).
 This file is the one place where an element's geometry is turned from w to arc length:
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.corners.blend import CORNER_DTYPE, corner_point, shape_at
 from planner.corners.own import PolynomialCorner
@@ -39,11 +39,22 @@ class ElementTable(NamedTuple):
     spans: Array  # (S,) records, geometry/spline.py
 
 
+class ElementIntervals(NamedTuple):
+    """P intervals on the elements of a smooth path, for kernels that evaluate it there; the first three are its `ElementTable`."""
+
+    legs: Array
+    corners: Array
+    spans: Array
+    element: Array  # (P,) number of the element
+    w0: FloatArray  # (P,) its parameter at the interval's left end
+    w1: FloatArray  # (P,) and at the right one
+
+
 def element_table(path: SmoothPath) -> ElementTable:
-    """The kernels' view of `path`."""
+    """The records of a path that the kernels evaluate."""
     corners = np.zeros(len(path.params), CORNER_DTYPE)
     corners["shape"], corners["params"] = int(path.corner.shape), path.params
-    corners["stretch"] = path.stretch
+    corners["scale"] = path.scale
     if isinstance(path.corner, PolynomialCorner):
         corners["own"] = path.corner.coefficients
     return ElementTable(path.legs.table, corners, path.spline.spans)
@@ -51,13 +62,17 @@ def element_table(path: SmoothPath) -> ElementTable:
 
 @njit(cache=True, error_model="numpy")
 def is_straight(legs, element):
-    """True on the free part of a straight leg."""
+    """True for the element that is free of a straight leg; legs (R,): records of geometry/legs.py."""
     return 0 <= element < len(legs) and not legs[element].round
 
 
 @njit(cache=True, error_model="numpy")
 def element_point(legs, corners, spans, element, w, w_ref, work, out):
-    """Point and three w-derivatives of an element at w, into out (4, A); work is (2, 4, A) scratch."""
+    """Point [mm] and three w-derivatives of an element at w, into out (4, A).
+
+    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner meet
+    work  : (2, 4, A) scratch
+    """
     if element >= len(legs):
         span_point(spans, element - len(legs), w, out)
     elif element >= 0:
@@ -68,7 +83,7 @@ def element_point(legs, corners, spans, element, w, w_ref, work, out):
 
 @njit(cache=True, error_model="numpy")
 def to_arc_length(out):
-    """Turn w-derivatives in out (4, A) into arc-length derivatives, in place; returns |dB/dw|."""
+    """Turn the w-derivatives in out (4, A) into arc-length derivatives, in place (module text); returns |dB/dw| [mm]."""
     axes = out.shape[1]
     speed_sq = 0.0
     along2 = 0.0  # T . B''
@@ -114,7 +129,7 @@ def _element_speed(legs, corners, spans, element, w, w_ref, out):
 
 @njit(cache=True, error_model="numpy")
 def element_length(legs, corners, spans, element, w0, w1, w_ref, out):
-    """Arc length of an element between w0 and w1 [mm]; out (4, A) is scratch."""
+    """Arc length of an element between w0 and w1 [mm], by eight Gauss points; `w_ref` as of `element_point`, out (4, A) is scratch."""
     if is_straight(legs, element):
         return w1 - w0
     total = 0.0

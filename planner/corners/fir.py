@@ -28,7 +28,10 @@ from planner.machine import Machine
 
 @dataclass(frozen=True, kw_only=True)
 class FirCorner:
-    """Paper 000's corner for filters T1 >= T2 [s]; V is the joint's programmed feed, at most `feed_max` [mm/s]."""
+    """Paper 000's corner for filters T1 >= T2 [s]; V is the joint's programmed feed, at most `feed_max` [mm/s].
+
+    Raises InputError unless all are positive and finite and T2 <= T1.
+    """
 
     T1: float
     T2: float
@@ -56,21 +59,24 @@ class FirCorner:
         return cls(T1=times[1], T2=times[0], feed_max=feed)
 
     def at(self, change: FloatArray) -> FirCorner:
-        """The filters are the same at every corner."""
+        """The same filters at all n corners, whatever the `change` (n, A) of direction there."""
         return self
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Middle value m = V R(Tk/2) [mm] for the tangent length d = V R(Tk) [mm]."""
+        """(n,) middle values m = V R(Tk/2) [mm] for tangent lengths d = V R(Tk) = `reach` (n,) [mm] at feeds `feed` (n,) [mm/s]."""
         V = np.minimum(feed, self.feed_max)
         return V * self.ramp(self.overlap_from_ramp(reach / V) / 2)
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """Tangent length d [mm] for the middle value m [mm]; at most V Td/2, where the overlap is complete."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at programmed feeds `feed` (n,) [mm/s].
+
+        At most V Td/2, where the overlap is complete.
+        """
         V = np.minimum(feed, self.feed_max)
         return V * self.ramp(np.minimum(2.0 * self.overlap_from_ramp(middle / V), self.T1 + self.T2))
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Parameter rows (n, 4) for tangent lengths d (n,) [mm] and programmed feeds (n,) [mm/s]."""
+        """(n, 4) parameters V [mm/s], T1, T2, Tk [s] for tangent lengths d = `reach` (n,) [mm] at feeds `feed` (n,) [mm/s]."""
         V = np.minimum(feed, self.feed_max)
         rows = np.empty((len(reach), 4))
         rows[:, 0], rows[:, 1], rows[:, 2] = V, self.T1, self.T2
@@ -78,11 +84,11 @@ class FirCorner:
         return rows
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w where two pieces meet."""
+        """`fir_breaks` of a corner with these `params` (4,)."""
         return fir_breaks(params)
 
     def ramp(self, t: FloatArray) -> FloatArray:
-        """Ramp response R(t) [s], t in [0, Td]."""
+        """Ramp response R [s] at times t (n,) in [0, Td] [s]."""
         T1, T2 = self.T1, self.T2
         early = t**3 / (6 * T1 * T2)
         middle = (3 * t**2 - 3 * T2 * t + T2**2) / (6 * T1)
@@ -90,7 +96,7 @@ class FirCorner:
         return np.where(t <= T2, early, np.where(t <= T1, middle, late))
 
     def overlap_from_ramp(self, value: FloatArray) -> FloatArray:
-        """t with R(t) = value [s], t in [0, Td]; Td where the value is larger than R(Td) = Td/2."""
+        """(n,) times t in [0, Td] with R(t) = `value` (n,) [s]; Td where the value is larger than R(Td) = Td/2."""
         T1, T2 = self.T1, self.T2
         early = np.cbrt(6 * T1 * T2 * value)
         middle = T2 / 2 + np.sqrt(np.maximum(2 * T1 * value - T2**2 / 12, 0.0))
@@ -115,7 +121,10 @@ class FirCorner:
 
 
 def fir_breaks(params: FloatArray) -> tuple[float, ...]:
-    """Parameters w where two pieces of a corner (V, T1, T2, Tk) meet: T2, T1, Tk - T2, Tk - T1, and the middle."""
+    """Parameters w where two polynomials of a corner meet: T2, T1, Tk - T2, Tk - T1 over Tk, and the middle.
+
+    params : (4,) V [mm/s], T1, T2, Tk [s]
+    """
     _, T1, T2, Tk = params
     return tuple(sorted({0.5} | {float(t / Tk) for t in (T2, T1, Tk - T2, Tk - T1) if 0 < t < Tk}))
 
@@ -123,7 +132,13 @@ def fir_breaks(params: FloatArray) -> tuple[float, ...]:
 def overlap_time(
     eps: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """Overlap time Tk [s] of paper 000 eq. (15) for a corner error eps [mm]: branch chosen on eps, clamped to Td."""
+    """(n,) overlap time Tk [s] of paper 000 eq. (15) for a corner error: branch chosen on eps, clamped to Td.
+
+    eps      : (n,) [mm]
+    V        : (n,) speed of the pulses [mm/s]
+    sin_half : (n,) sine of half the turning angle [-]
+    T1, T2   : (n,) filters [s]
+    """
     with np.errstate(divide="ignore"):
         over = np.asarray(eps) / (V * np.asarray(sin_half))  # infinite without a turn
     cubic = np.cbrt(24 * T1 * T2 * over)

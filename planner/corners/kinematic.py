@@ -47,7 +47,11 @@ CHANGE_MIN = 1e-12
 
 
 def ratio_min(limits: FloatArray, change: FloatArray) -> FloatArray:
-    """min_k limits_k / |change_k| (n,) over the axes of `change` (n, A), finite where nothing changes."""
+    """(n,) min_k limits_k / |change_k| over the axes, finite where nothing changes.
+
+    limits : (A,) of the axes [mm/s2] or [mm/s3]
+    change : (n, A) of direction [-]
+    """
     return (limits / np.maximum(np.abs(change), CHANGE_MIN)).min(axis=-1)
 
 
@@ -55,35 +59,44 @@ def ratio_min(limits: FloatArray, change: FloatArray) -> FloatArray:
 
 
 def phase_times(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """T1 = Tj + Ta and T2 = Tj [s] of the fastest corner at the speeds V > 0 [mm/s].
+    """T1 = Tj + Ta and T2 = Tj (n,) [s] of the fastest corners at the speeds V (n,) > 0 [mm/s].
 
-    alpha, eta : largest accelerations [mm/s2] and jerks [mm/s3] per unit of direction change
+    alpha, eta : (n,) largest accelerations [mm/s2] and jerks [mm/s3] per unit of direction change
     """
     T1 = np.maximum(V / alpha, np.sqrt(V / eta))
     return T1, np.minimum(V / (eta * T1), T1)  # the same where only jerk limits, but for rounding
 
 
 def approach(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """Approach length l [mm], from the corner's start to the vertex."""
+    """(n,) approach length l [mm], from the corner's start to the vertex.
+
+    V, alpha, eta : (n,) as of `phase_times`
+    """
     T1, T2 = phase_times(V, alpha, eta)
     return V * (T1 + T2) / 2
 
 
 def middle(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """Middle value m [mm]; the corner misses the vertex by eps = 2 sin(theta/2) m (eq. (3), (6))."""
+    """(n,) middle value m [mm]: the corner misses the vertex by eps = 2 sin(theta/2) m (eq. (3), (6)).
+
+    V, alpha, eta : (n,) as of `phase_times`
+    """
     T1, T2 = phase_times(V, alpha, eta)
     return V * (3 * T1**2 + T2**2) / (24 * T1)
 
 
 def speed_from_middle(m: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """Largest speed Vc [mm/s] with the middle value m = eps / (2 sin(theta/2)) [mm] (eq. (7), (8), the branch chosen on m)."""
+    """(n,) largest speed Vc [mm/s] with the middle value m = eps / (2 sin(theta/2)) (n,) [mm] (eq. (7), (8), the branch chosen on m).
+
+    alpha, eta : (n,) as of `phase_times`
+    """
     reached = m >= alpha**3 / (6 * eta**2)
     accelerating = np.sqrt(np.maximum(8 * alpha * m - alpha**4 / (3 * eta**2), 0.0))
     return np.where(reached, accelerating, np.cbrt(36 * eta * m**2))
 
 
 def speed_from_approach(length: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """Largest speed Vc [mm/s] with the approach length l [mm]."""
+    """(n,) largest speed Vc [mm/s] with the approach length l (n,) [mm]; alpha, eta (n,) as of `phase_times`."""
     threshold = alpha**2 / eta
     # [sqrt(x^2 + y) - x]/2 without cancellation
     accelerating = 4 * alpha * length / (threshold + np.sqrt(threshold**2 + 8 * alpha * length))
@@ -96,27 +109,31 @@ def speed_from_approach(length: FloatArray, alpha: FloatArray, eta: FloatArray) 
 def entry_limits(
     u1: FloatArray, u2: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Largest entry deceleration a [mm/s2] and largest jerk J per unit of |u1 + u2| [mm/s3] of corners u1, u2 (n, A)."""
+    """Largest entry deceleration a (n,) [mm/s2], and largest jerk J per unit of |u1 + u2| (n,) [mm/s3].
+
+    u1, u2             : (n, A) unit directions before and behind each corner
+    acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
+    """
     return ratio_min(acceleration, np.maximum(np.abs(u1), np.abs(u2))), ratio_min(jerk, u1 + u2)
 
 
 def entry_acceleration(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """Entry deceleration Ac [mm/s2] of the shortest corner at the speeds V [mm/s]."""
+    """(n,) entry deceleration Ac [mm/s2] of the shortest corner at the speeds V (n,) [mm/s]; a, J (n,) from `entry_limits`."""
     return np.minimum(a, np.sqrt(2 * J * V))
 
 
 def entry_length(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """Tangent length d = Vc Tc / 3 [mm] at the speeds V > 0; the corner takes Tc = 2 Vc / Ac."""
+    """(n,) tangent length d = Vc Tc / 3 [mm] at the speeds V (n,) > 0 [mm/s]; the corner takes Tc = 2 Vc / Ac. a, J as before."""
     return 2 * V**2 / (3 * entry_acceleration(V, a, J))
 
 
 def entry_speed_from_middle(m: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """Largest speed Vc [mm/s] with the middle value m = d/8 = eps / (2 sin(theta/2)) [mm]."""
+    """(n,) largest speed Vc [mm/s] with the middle value m = d/8 = eps / (2 sin(theta/2)) (n,) [mm]; a, J (n,) from `entry_limits`."""
     return entry_speed_from_length(8 * m, a, J)
 
 
 def entry_speed_from_length(d: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """Largest speed Vc [mm/s] with the tangent length d [mm]."""
+    """(n,) largest speed Vc [mm/s] with the tangent length d (n,) [mm]; a, J (n,) from `entry_limits`."""
     return np.minimum(np.sqrt(1.5 * a * d), np.cbrt(4.5 * J * d**2))
 
 
@@ -125,21 +142,25 @@ def entry_speed_from_length(d: FloatArray, a: FloatArray, J: FloatArray) -> Floa
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class KinematicFamily:
-    """The corners with zero entry acceleration at n given joints; fields (n,) as in `phase_times`."""
+    """The corners with zero entry acceleration at n given joints.
+
+    alpha, eta : (n,) as of `phase_times`
+    """
 
     alpha: FloatArray
     eta: FloatArray
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Middle value m [mm] for the approach length l [mm]."""
+        """(n,) middle values m [mm] for approach lengths l = `reach` (n,) [mm], at any feed (n,)."""
         return middle(speed_from_approach(reach, self.alpha, self.eta), self.alpha, self.eta)
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """Approach length l [mm] for the middle value m [mm]."""
+        """(n,) approach lengths l [mm] for middle values m (n,) [mm], at any feed (n,)."""
         return approach(speed_from_middle(middle, self.alpha, self.eta), self.alpha, self.eta)
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Parameter rows (n, 4) of the FIR shape with complete overlap: V [mm/s], T1, T2, T1 + T2 [s]."""
+        """(n, 4) parameters of the FIR shape with complete overlap, V [mm/s], T1, T2, T1 + T2 [s], for approach lengths `reach` (n,)
+        [mm], at any feed (n,)."""
         V = speed_from_approach(reach, self.alpha, self.eta)
         T1, T2 = phase_times(V, self.alpha, self.eta)
         return np.stack([V, T1, T2, T1 + T2], axis=1)
@@ -160,13 +181,13 @@ class KinematicCorner:
 
     @classmethod
     def from_machine(cls, machine: Machine, axes: tuple[str, ...]) -> KinematicCorner:
-        """With the machine's limits of `axes`."""
+        """The shape for the machine's limits of acceleration and jerk of `axes`. Raises InputError for an axis that it lacks."""
         return cls(acceleration=machine.limits("acceleration", axes), jerk=machine.limits("jerk", axes))
 
     def at(self, change: FloatArray) -> KinematicFamily:
-        """The family at joints where the axes' directions change by `change` (n, A)."""
+        """The corners at n joints where the directions of the axes change by `change` (n, A) [-]."""
         return KinematicFamily(alpha=ratio_min(self.acceleration, change), eta=ratio_min(self.jerk, change))
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w where two pieces meet."""
+        """`fir_breaks` of a corner with these `params` (4,)."""
         return fir_breaks(params)

@@ -36,11 +36,11 @@ class PolynomialCorner(ABC):
 
     @abstractmethod
     def retreat(self, w: FloatArray) -> FloatArray:
-        """f at the parameters w (n,) in [0, 1]."""
+        """(n,) f at the parameters w (n,) in [0, 1] [-]."""
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """(OWN_TERMS,) of z^3, z^4 ... Raises InputError unless f is as the module's text says."""
+        """(K,) coefficients of z^3, z^4 ... [-], K = `OWN_TERMS`. Raises InputError unless f is as the module's text says."""
         z = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, PLACES))
         f = np.broadcast_to(np.asarray(self.retreat(1.0 - z), dtype=np.float64), z.shape)
         if not np.isfinite(f).all() or abs(f[-1] - 1.0) > POLYNOMIAL or abs(f[0]) > POLYNOMIAL:
@@ -62,6 +62,7 @@ class PolynomialCorner(ABC):
         return coefficients
 
     def _refuse(self, why: str) -> None:
+        """Raise InputError."""
         raise InputError(f"corner '{self.name or type(self).__name__}': retreat(w): {why}")
 
     @cached_property
@@ -70,23 +71,23 @@ class PolynomialCorner(ABC):
         return float(self.coefficients @ 0.5 ** np.arange(LOWEST, LOWEST + OWN_TERMS))
 
     def at(self, change: FloatArray) -> PolynomialCorner:
-        """The shape is the same at every corner."""
+        """The same shape at all n corners, whatever the `change` (n, A) of direction there."""
         return self
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """Tangent length d [mm] for the middle value m [mm]."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm], at any feed (n,)."""
         return middle / self._at_middle
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Middle value m [mm] for the tangent length d [mm]."""
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
         return reach * self._at_middle
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Parameter rows (n, 4) for tangent lengths d (n,) [mm]."""
+        """(n, 4) parameters for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
         rows = np.zeros((len(reach), 4))
         rows[:, 0] = reach
         return rows
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w where two pieces meet: the middle, where the matched side changes."""
+        """The middle, where the matched side changes, whatever the `params` (4,)."""
         return (0.5,)

@@ -30,8 +30,8 @@ def share_legs(wanted: FloatArray, ease: FloatArray, length: FloatArray) -> Floa
         return wanted.copy()
     need = np.where(wanted > 0, 1.0 / ease, 0.0)  # what a corner needs per unit of v^2
     both = need[:-1] + need[1:]
-    part_left = np.divide(need[:-1], both, out=np.zeros_like(both), where=both > 0)
-    part_right = np.divide(need[1:], both, out=np.zeros_like(both), where=both > 0)
+    left = np.divide(need[:-1], both, out=np.zeros_like(both), where=both > 0)
+    right = np.divide(need[1:], both, out=np.zeros_like(both), where=both > 0)
     d = np.zeros_like(wanted)
     for _ in range(ROUNDS):
         free = np.maximum(length - d[:-1] - d[1:], 0.0)
@@ -41,12 +41,12 @@ def share_legs(wanted: FloatArray, ease: FloatArray, length: FloatArray) -> Floa
         can[:-1] = np.minimum(can[:-1], free)
         can[1:] = np.minimum(can[1:], free)
         grow = can.copy()
-        grow[:-1] = np.minimum(grow[:-1], _claim(free, part_left, can[1:]))
-        grow[1:] = np.minimum(grow[1:], _claim(free, part_right, can[:-1]))
+        grow[:-1] = np.minimum(grow[:-1], _claim(free, left, can[1:]))
+        grow[1:] = np.minimum(grow[1:], _claim(free, right, can[:-1]))
         d += grow
     return d
 
 
-def _claim(free: FloatArray, part: FloatArray, other_can: FloatArray) -> FloatArray:
-    """What one end may take of the free length: its part, or all that the other end cannot use."""
-    return np.maximum(free * part, free - other_can)
+def _claim(free: FloatArray, fraction: FloatArray, other_can: FloatArray) -> FloatArray:
+    """What one end may take of the free length (R,): its fraction, or all that the other end cannot use [mm]."""
+    return np.maximum(free * fraction, free - other_can)

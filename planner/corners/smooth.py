@@ -1,7 +1,7 @@
 """The smooth path: the legs of a toolpath with each corner rounded within its tolerance.
 
 Corners are data, not objects. For each of the R+1 joints between legs the record holds how far the corner reaches back (d), the
-parameters of its shape, the part of the tolerance it uses, and the normal acceleration that is left for the motion.
+parameters of its shape, what it uses of the tolerance, and the normal acceleration that is left for the motion.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_fro
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.spline import Spline, no_spline
-from planner.geometry.spline_passing import passed_places
+from planner.geometry.spline_joints import passed_places
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
@@ -28,15 +28,15 @@ class CornerFamily(Protocol):
     """Corners at n given joints: how tangent length d and middle value m depend on each other (corners/blend.py)."""
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """Tangent lengths d (n,) [mm] for middle values m (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
         ...
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Middle values m (n,) [mm] for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
         ...
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """Parameters of the shape (n, 4) for tangent lengths d (n,) [mm] at programmed feeds (n,) [mm/s]."""
+        """(n, 4) parameters of the shape for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
         ...
 
 
@@ -51,14 +51,14 @@ class CornerShape(Protocol):
         ...
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """Parameters w in (0, 1) of a corner with these `params` (4,) at which two of its pieces meet."""
+        """Parameters w in (0, 1) of a corner with these `params` (4,) at which two of its curves meet."""
         ...
 
 
-# A leg whose free part is shorter than this share of it is closed by stretching one of its corners [-]; grid intervals of the
+# A leg whose free part is shorter than this fraction of it is closed by scaling up one of its corners [-]; grid intervals of the
 # size of rounding would otherwise be left between corners that share a leg.
 CLOSE = 1e-4
-# Curvatures are the same below this share of the larger one [-]: printed arc centres are good to 1e-4 of a small radius.
+# Curvatures are the same below this fraction of the larger one [-]: printed arc centres are good to 1e-4 of a small radius.
 SAME_CURVATURE = 1e-6
 
 
@@ -69,7 +69,7 @@ class SmoothPath:
     joint       : (R+1,) `Joint`: STOP, SMOOTH (tangent, passed as it is) or CORNER (blended)
     d           : (R+1,) tangent length of the corner [mm]; 0 where there is none
     params      : (R+1, 4) parameters of the corner's shape
-    stretch     : (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more (`CLOSE`)
+    scale     : (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more (`CLOSE`)
     tol         : (R+1,) contour error budget eps [mm]
     tol_ap      : (R+1,) what the rounding uses of it, E(m) [mm]
     normal_max  : (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
@@ -82,7 +82,7 @@ class SmoothPath:
     joint: Array
     d: FloatArray
     params: FloatArray
-    stretch: FloatArray
+    scale: FloatArray
     tol: FloatArray
     tol_ap: FloatArray
     normal_max: FloatArray
@@ -92,14 +92,14 @@ class SmoothPath:
         joints = len(self.legs) + 1
         freeze(self, "joint", np.uint8, (joints,))
         freeze(self, "params", np.float64, (joints, 4))
-        freeze(self, "stretch", np.float64, (joints, 2))
+        freeze(self, "scale", np.float64, (joints, 2))
         for name in ("d", "tol", "tol_ap", "normal_max"):
             freeze(self, name, np.float64, (joints,))
 
     @property
     def d_in(self) -> FloatArray:
         """(R+1,) what corner or spline take of the leg before each joint [mm]."""
-        taken, spline, length = self.d * self.stretch[:, 0], self.spline, self.legs.length
+        taken, spline, length = self.d * self.scale[:, 0], self.spline, self.legs.length
         inside = self._inside_runs()
         taken[inside] = length[inside - 1]
         taken[spline.joint_first] = length[spline.joint_first - 1] - spline.x_first
@@ -108,7 +108,7 @@ class SmoothPath:
     @property
     def d_out(self) -> FloatArray:
         """(R+1,) what corner or spline take of the leg after each joint [mm]."""
-        taken = self.d * self.stretch[:, 1]
+        taken = self.d * self.scale[:, 1]
         taken[self.spline.joint_last] = self.spline.x_last
         return taken
 
@@ -148,7 +148,7 @@ def round_corners(
 
     blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it; such a corner has
                      theta = 0, bends off both legs within the tolerance, and has no jump left
-    free           : share of every leg that its corners leave free [-], for motions that change their speed between corners only
+    free           : fraction of every leg that its corners leave free [-], for motions that change their speed between corners only
 
     Raises InputError if the machine lacks an axis of the toolpath.
     """
@@ -182,12 +182,12 @@ def round_corners(
     wanted = np.minimum(wanted, np.divide(room, bend, out=np.full(len(at), np.inf), where=bend > 0))
     ease = np.cos(theta / 2) ** 2 / np.maximum(sin_half + bent, 1e-12)
     d = share_legs(wanted / (1.0 + 2.0 * CLOSE), np.maximum(ease, 1e-12), usable)
-    stretch = _close_legs(d, legs.length)
+    scale = _close_legs(d, legs.length)
 
     params = np.zeros((len(at), 4))
     params[blend] = corners.params(d[blend], feed[blend])
     tol_ap = np.zeros(len(at))
-    middle = corners.middle(d[blend], feed[blend]) * stretch[blend].max(axis=1)
+    middle = corners.middle(d[blend], feed[blend]) * scale[blend].max(axis=1)
     tol_ap[blend] = error_from_middle(middle, sin_half[blend], curvature[blend])
     return SmoothPath(
         toolpath=toolpath,
@@ -196,7 +196,7 @@ def round_corners(
         joint=joint,
         d=d,
         params=params,
-        stretch=stretch,
+        scale=scale,
         tol=tol,
         tol_ap=tol_ap,
         normal_max=normal_limit.within_budget(tol, tol_ap, reachable, rate),
@@ -205,15 +205,15 @@ def round_corners(
 
 
 def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
-    """(R+1, 2) stretches that close legs with next to nothing between their corners; the larger corner takes it."""
-    stretch = np.ones((len(d), 2))
+    """(R+1, 2) factors on tangent lengths that close legs with next to nothing between their corners; the larger corner takes it."""
+    scale = np.ones((len(d), 2))
     free = length - d[:-1] - d[1:]
     leg = np.flatnonzero(free < CLOSE * length)
     before = d[leg] >= d[leg + 1]
     left, right = leg[before], leg[~before]
-    stretch[left, 1] = 1.0 + free[left] / d[left]
-    stretch[right + 1, 0] = 1.0 + free[right] / d[right + 1]
-    return stretch
+    scale[left, 1] = 1.0 + free[left] / d[left]
+    scale[right + 1, 0] = 1.0 + free[right] / d[right + 1]
+    return scale
 
 
 def _curvature_jumps(toolpath: Toolpath, at: Array) -> Array:

@@ -1,9 +1,8 @@
 """Motions that stay within the tolerance behind the machine's own filters (`[fir]`).
 
 A filter of kernel h on [0, Td] makes of the motion p the mean of its last Td. About p(t - Td/2) that is off by at most
-max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (docs/papers.md D), and a time Td after a motion comes to
-rest the
-filtered one has come to rest at the same point. So there are two ways to leave less of an error, and both always end:
+max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (docs/papers.md D), and a time Td after a motion comes to rest
+the filtered one has come to rest at the same point. So there are two ways to leave less of an error, and both always end:
 
   slower   a run between full stops slowed down by f has 1/f^2 of the error; what a path that rounds its corners within less than the
            tolerance leaves, it leaves again
@@ -23,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.delivery.pacing import MotionRuns, Timed, TimedT, paced, runs_of
+from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
 from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -35,14 +34,14 @@ from planner.verify.pieces import program_pieces, widened
 SPARE = 2e-3
 # The motion is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
 WIDER = 16.0
-# The kernel is taken in so many cells where rests are sought [-]; a rest is found to 2^-HALVINGS of Td.
-CELLS, HALVINGS = 128, 10
+# The kernel is taken in so many steps where rests are sought [-]; a rest is found to 2^-HALVINGS of Td.
+STEPS, HALVINGS = 128, 10
 STOPS_AT_ONCE = 500  # 5 MB an array
 # At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
 # together by up to 240, which leaves 1/57,600 of any filter's error.
 ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5
 FLOOR_STEP = 1.0 / 32.0  # of Td: by so much a rest grows that was too short, twice as much each time again
-# What the path leaves of the tolerance for filters counts as this share at least [-], or the first step would be too large.
+# What the path leaves of the tolerance for filters counts as this fraction at least [-], or the first step would be too large.
 ROOM_LEAST = 0.1
 
 
@@ -52,7 +51,7 @@ class Places:
 
     time      : (n,) time behind the filters [s]
     ratio     : (n,) error over tolerance [-]
-    path      : (n,) the part of the ratio that the path has without filters [-]
+    path      : (n,) what the ratio is without filters, by the path alone [-]
     vertex    : (n,) index of the vertex that is missed, -1 for places off the contour
     near      : (N+1,) error over tolerance at every vertex [-]
     near_time : (N+1,) when the filtered motion is nearest to the vertex [s]
@@ -73,7 +72,7 @@ class Places:
 
 
 class Behind:
-    """Measures motions along one path behind the filters of one machine."""
+    """Measures motions along one path of N pieces behind the filters of one machine."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine):
         self.toolpath, self.machine = toolpath, machine
@@ -83,13 +82,15 @@ class Behind:
         if machine.fir is None:
             return  # `errors` of the motion itself can be asked for
         self.filters = Filters(machine.fir.time_constants)
-        weights = self.filters.step(self.filters.delay * np.arange(CELLS + 1) / CELLS)
+        weights = self.filters.step(self.filters.delay * np.arange(STEPS + 1) / STEPS)
         self._weights = np.diff(weights)
 
     def errors(
         self, motion: MotionInTime, filters: tuple[float, ...]
     ) -> tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]:
         """Errors of the filtered motion.
+
+        filters : lengths of the moving averages [s]; none for the motion itself
 
         Returns times [s], ratios [-] and pieces where the ratio of the contour is large, (n,) each, and the ratio and time of every
         vertex, (N+1,) each.
@@ -119,7 +120,7 @@ class Behind:
     def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Places:
         """Where a motion leaves the tolerance behind the filters.
 
-        path : `path_shares` of any motion along the same path
+        path : `path_shares` (N,), (N+1,) of any motion along the same path
         """
         t, ratio, piece, near, near_time = self.errors(motion, self.filters.times)
         missed = np.flatnonzero(near > 1.0 - SPARE)
@@ -133,12 +134,12 @@ class Behind:
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
-        """(n,) True for times at which the filters hold parts of two runs: there a longer rest is enough."""
+        """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a longer rest is enough."""
         early, late = self.runs_within(runs_of(motion), time)
         return early < late
 
     def runs_within(self, runs: MotionRuns, time: FloatArray) -> tuple[Array, Array]:
-        """First and last of the runs of which the filters hold some part at the times (n,) [s]."""
+        """First and last (n,) of the runs of which the filters hold something at `time` (n,) [s]."""
         early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
         late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
         return np.minimum(early, late), late
@@ -152,37 +153,35 @@ class Behind:
         return found
 
     def _rests(self, motion: Timed, end: FloatArray, begin: FloatArray) -> FloatArray:
-        delay, cells = self.filters.delay, CELLS
-        cell = delay / cells
-        inside = cell * (np.arange(cells) + 0.5)
+        """The shortest rests (g,) [s] between runs that end and begin at the times (g,) [s]."""
+        step = self.filters.delay / STEPS
+        inside = step * (np.arange(STEPS) + 0.5)
         times = np.stack([end[:, None] - inside, begin[:, None] + inside], axis=1)
         place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
         seen = motion.at(place, self.machine.dt)
         stop = motion.at(np.unique(end), self.machine.dt)
         off = seen.position[of].reshape(*times.shape, -1) - stop.position[:, None, None]
         into, out = off[:, 0], off[:, 1]
-        before, after = np.zeros((2, len(end), cells + 1, off.shape[-1]))
-        for j in range(
-            cells + 1
-        ):  # so many cells after the stop the filters still hold the rest of the way in
-            before[:, j] = np.einsum("c,gca->ga", self._weights[j:], into[:, : cells - j])
+        before, after = np.zeros((2, len(end), STEPS + 1, off.shape[-1]))
+        for j in range(STEPS + 1):  # so many steps after the stop the filters still hold what runs into it
+            before[:, j] = np.einsum("c,gca->ga", self._weights[j:], into[:, : STEPS - j])
             after[:, j] = np.einsum("c,gca->ga", self._weights[:j], out[:, :j][:, ::-1])
         budget = self._budget(stop.block, stop.position) * (1.0 - SPARE)
-        low, high = np.zeros(len(end)), np.full(len(end), float(cells))
+        low, high = np.zeros(len(end)), np.full(len(end), float(STEPS))
         fine = self._miss(before, after, low) <= budget
         for _ in range(HALVINGS):
             middle = (low + high) / 2
             enough = self._miss(before, after, middle) <= budget
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        return np.where(fine, 0.0, high * cell)
+        return np.where(fine, 0.0, high * step)
 
     def _miss(self, before: FloatArray, after: FloatArray, rest: FloatArray) -> FloatArray:
-        """How far the filtered motion passes by the stops (g,) [mm] if it rests there for so many cells."""
+        """How far the filtered motion passes by the stops (g,) [mm] if it rests there for so many steps of the kernel (g,)."""
         j = np.arange(before.shape[1]) - rest[:, None]
         whole = np.clip(np.floor(j).astype(np.int64), 0, before.shape[1] - 2)
-        share = np.clip(j - whole, 0.0, 1.0)[:, :, None]
+        fraction = np.clip(j - whole, 0.0, 1.0)[:, :, None]
         rows = np.arange(len(rest))[:, None]
-        shifted = (1.0 - share) * after[rows, whole] + share * after[rows, whole + 1]
+        shifted = (1.0 - fraction) * after[rows, whole] + fraction * after[rows, whole + 1]
         return np.linalg.norm(before + shifted, axis=2).min(axis=1)
 
     def _budget(self, block: Array, position: FloatArray) -> FloatArray:
@@ -196,10 +195,10 @@ class Behind:
 
 
 def rested(behind: Behind, motion: TimedT) -> TimedT:
-    """The motion with the shortest rests at its full stops, no run slowed down."""
+    """The motion with the shortest rests at its full stops behind which the filtered motion keeps the tolerance, no run slowed down."""
     runs = runs_of(motion)
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
-    return paced(motion, runs, np.ones(len(runs)), np.maximum(behind.rests(motion, runs) - gap, 0.0))
+    return standing_longer(motion, runs, np.maximum(behind.rests(motion, runs) - gap, 0.0))
 
 
 def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
@@ -218,9 +217,9 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
     made = motion
     for n in range(ROUNDS):
-        slower = paced(motion, runs, factor, np.zeros(len(runs)))
+        slower = slower_runs(motion, runs, factor)
         rest = np.maximum(behind.rests(slower, runs_of(slower)), least)
-        made = paced(motion, runs, factor, np.maximum(rest - gap, 0.0))
+        made = standing_longer(slower, runs, np.maximum(rest - gap, 0.0))
         places = behind.places(made, path)
         if not len(places.time):
             break

@@ -1,7 +1,7 @@
-"""Runs of a motion between full stops: slowed down as a whole, or followed by a longer rest.
+"""Runs of a motion between full stops: slowed down as a whole, or followed by a longer standstill.
 
 Slowing down by f divides speeds by f, accelerations by f^2 and jerks by f^3: every limit still holds, and the path is the same. A
-longer rest changes nothing else. A motion can wait only where its velocity is zero, and its acceleration too if jerk is limited.
+longer standstill changes nothing else. A motion can stand only where its velocity is zero, and its acceleration too if jerk is limited.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.motion.axis_motion import AxisMotion
-from planner.motion.time_law import TimeLaw
 from planner.motion.timing import Motion
 
-# Velocities and accelerations below this share of the motion's largest are none [-]: rounding of long sums of pulses is 1e-12 of them.
+# Velocities and accelerations below this fraction of the motion's largest are none [-]: rounding of long sums of pulses is 1e-12 of
+# them.
 STANDING = 1e-7
 
 Timed = Motion | AxisMotion
@@ -26,7 +26,7 @@ TimedT = TypeVar("TimedT", Motion, AxisMotion)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MotionRuns:
-    """G runs of a motion.
+    """G runs of a motion between its standstills.
 
     first : (G,) index of the first piece of the run
     last  : (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the number of pieces
@@ -44,7 +44,7 @@ class MotionRuns:
 
 
 def runs_of(motion: Timed) -> MotionRuns:
-    """The runs of a motion; none if the motion rests all the time."""
+    """The runs of a motion; none if it stands still all the time."""
     edges = np.append(motion.t, motion.end)
     if isinstance(motion, Motion):
         run = motion.law.run
@@ -73,46 +73,40 @@ def _rests(motion: AxisMotion) -> Array:
     return still
 
 
-def paced(motion: TimedT, runs: MotionRuns, factor: FloatArray, pause: FloatArray) -> TimedT:
-    """The motion with every run slowed down and followed by more rest.
+def slower_runs(motion: TimedT, runs: MotionRuns, factor: FloatArray) -> TimedT:
+    """The motion with every run slowed down; its pieces stay the same, and so do its standstills.
 
     factor : (G,) by which each run takes longer [-], >= 1
-    pause  : (G,) rest added behind each run [s]; not used behind the last
     """
-    pause = np.append(pause[:-1], 0.0)
     by = np.ones(len(motion.t))
     for g in np.flatnonzero(factor != 1.0):
         by[runs.first[g] : runs.last[g]] = factor[g]
     lasting = np.diff(np.append(motion.t, motion.end)) * by
     if isinstance(motion, Motion):
         law = motion.law
-        lasting[runs.last] += pause
         t = law.t[0] + np.append(0.0, np.cumsum(lasting))
-        return dataclasses.replace(
-            motion,
-            law=TimeLaw(
-                t=t[:-1],
-                s=law.s,
-                feed=law.feed / by,
-                acc_s=law.acc_s / by**2,
-                jerk_s=law.jerk_s / by**3,
-                run=law.run,
-                end=float(t[-1]),
-            ),
+        slower = dataclasses.replace(
+            law,
+            t=t[:-1],
+            feed=law.feed / by,
+            acc_s=law.acc_s / by**2,
+            jerk_s=law.jerk_s / by**3,
+            end=float(t[-1]),
         )
-    wait = np.flatnonzero(pause)
-    at = runs.last[wait]
-    t = np.append(0.0, np.cumsum(np.insert(lasting, at, pause[wait])))
-    columns = {
-        name: np.insert(getattr(motion, name) / by[:, None] ** power, at, 0.0, axis=0)
-        for power, name in enumerate(("position", "velocity", "acceleration", "jerk"))
+        return dataclasses.replace(motion, law=slower)
+    t = np.append(0.0, np.cumsum(lasting))
+    rates = {
+        name: getattr(motion, name) / by[:, None] ** power
+        for power, name in enumerate(("velocity", "acceleration", "jerk"), start=1)
     }
-    columns["position"] = np.insert(motion.position, at, motion.position[at], axis=0)
-    return dataclasses.replace(
-        motion,
-        t=t[:-1],
-        end=float(t[-1]),
-        block=np.insert(motion.block, at, motion.block[at - 1]),
-        line=np.insert(motion.line, at, motion.line[at - 1]),
-        **columns,
-    )
+    return dataclasses.replace(motion, t=t[:-1], end=float(t[-1]), **rates)
+
+
+def standing_longer(motion: TimedT, runs: MotionRuns, by: FloatArray) -> TimedT:
+    """The motion with longer standstills behind its runs: `waiting` at their ends.
+
+    by : (G,) standstill added behind each run [s], >= 0; not used behind the last
+    """
+    edges = np.append(motion.t, motion.end)
+    behind = np.flatnonzero(by[:-1])
+    return motion.waiting(edges[runs.last[behind]], by[behind]) if len(behind) else motion

@@ -20,15 +20,16 @@ and speeds up along another.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
-from planner.motion.passing import STANDING, passing_times
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
-from planner.motion.trajectory import joined
+from planner.motion.trajectory import Trajectory, joined
+from planner.motion.vertex_times import STANDING, passing_times_of
 
 # Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
 # changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
@@ -38,17 +39,20 @@ PER_PERIOD = 8
 # Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of the motion of its own, and
 # who looks at the pieces, at whatever times, sees it.
 LEAST_REST = 1e-6
-# Chords may miss a vertex by this share of its tolerance [-]; the rest is for what lies between the phases and places above.
+# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases and places above.
 USED = 0.99
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
-# A corner is stopped at instead where less than this share of its tolerance would be left to it [-].
+# A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
 
 
 def settled(motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool) -> MotionInTime:
-    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance."""
+    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance.
+
+    jerk_limited : whether the motion leaves a full stop with limited jerk, not with full acceleration at once
+    """
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
@@ -90,11 +94,11 @@ def _waits(
     gap = np.append(arrival[1:] - departure[:-1], np.inf)
     rows = max(CHUNK // len(tau), 1)
     for first in range(0, len(arrival), rows):
-        part = slice(first, first + rows)
-        before = _off(motion, arrival[part, None] - tau, place[part], dt)
-        behind = _off(motion, departure[part, None] + tau, place[part], dt)
+        some = slice(first, first + rows)
+        before = _off(motion, arrival[some, None] - tau, place[some], dt)
+        behind = _off(motion, departure[some, None] + tau, place[some], dt)
         apart = [np.linalg.norm(off, axis=2) for off in (before, behind[:, ::-1])]
-        risky = np.minimum(*apart).max(axis=1) > allowed[part]
+        risky = np.minimum(*apart).max(axis=1) > allowed[some]
         for r in np.flatnonzero(risky):
             k = first + r
             since = (arrival[k] + waited) % dt  # from the last sample
@@ -130,8 +134,8 @@ def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
     """(...,) distance of 0 from the chords a to b (..., A)."""
     step = b - a
     size = (step**2).sum(axis=-1)
-    share = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
-    near: FloatArray = np.linalg.norm(a + np.clip(share, 0.0, 1.0)[..., None] * step, axis=-1)
+    fraction = np.divide(-(a * step).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0)
+    near: FloatArray = np.linalg.norm(a + np.clip(fraction, 0.0, 1.0)[..., None] * step, axis=-1)
     return near
 
 
@@ -143,22 +147,42 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
     Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the chords miss it in the worst
     phase of the samples; 0 where the motion rests.
     """
-    fine = np.arange(0.0, motion.end, dt / PER_PERIOD)
-    seen = joined(list(in_chunks(motion, dt, np.concatenate([fine, motion.t, [motion.end]]))))
-    when = passing_times(seen, toolpath)
+    fastest = 0.0
+
+    def seen() -> Iterator[Trajectory]:
+        nonlocal fastest
+        for part in _looks(motion, dt / PER_PERIOD, dt):
+            fastest = max(fastest, float(part.feed.max()))
+            yield part
+
+    when = passing_times_of(seen(), toolpath)
     vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
-    moving = np.interp(when, seen.t, seen.feed) > STANDING * seen.feed.max()
+    place, of = np.unique(np.minimum(when, motion.end), return_inverse=True)
+    moving = motion.at(place, dt).feed[of] > STANDING * fastest
     near, far = np.zeros(len(vertex)), np.zeros(len(vertex))
     shift = (np.arange(-1, 3)[None, :] - np.arange(PHASES)[:, None] / PHASES) * dt
     at = np.flatnonzero(moving)
     rows = max(CHUNK // shift.size, 1)
     for first in range(0, len(at), rows):
-        part = at[first : first + rows]
-        off = _positions(motion, when[part, None, None] + shift, dt) - vertex[part, None, None]
-        far[part] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
-        fine_off = _positions(motion, when[part, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
-        near[part] = np.linalg.norm(fine_off - vertex[part, None], axis=2).min(axis=1)
+        some = at[first : first + rows]
+        off = _positions(motion, when[some, None, None] + shift, dt) - vertex[some, None, None]
+        far[some] = _from_chord(off[:, :, :-1], off[:, :, 1:]).min(axis=2).max(axis=1)
+        fine_off = _positions(motion, when[some, None] + np.linspace(-0.5, 0.5, PLACES + 1) * dt, dt)
+        near[some] = np.linalg.norm(fine_off - vertex[some, None], axis=2).min(axis=1)
     return near, far
+
+
+def _looks(motion: MotionInTime, step: float, dt: float) -> Iterator[Trajectory]:
+    """The motion every `step` [s], at the ends of its pieces and at its own, in chunks."""
+    count, pieces = int(np.ceil(motion.end / step)), motion.t
+    for first in range(0, count, CHUNK):
+        beyond = min(first + CHUNK, count)
+        begin, end = first * step, beyond * step if beyond < count else motion.end
+        low, high = np.searchsorted(pieces, [begin, end], side="right")
+        times = np.concatenate(
+            [np.arange(first, beyond) * step, pieces[low:high], [motion.end] * (beyond == count)]
+        )
+        yield motion.at(np.unique(np.clip(times, 0.0, motion.end)), dt)
 
 
 def with_less_tolerance(

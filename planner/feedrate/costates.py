@@ -10,8 +10,8 @@ is stationary in u_i and x_i:
     2 h_i pi_i + lam_i r'/c = 0,       T'_i + pi_i - pi_{i-1} + (lam r''/c of the intervals on both sides) + mu_i/X_i = 0.
 
 Time-optimal profiles speed up or brake with one row at its limit, or keep to X. Where no row holds, pi is 0. Where the motion speeds
-up, pi <= 0, and what more speed is worth adds up towards the start of the stretch; where it brakes, pi >= 0 adds up towards its end.
-A stretch that ends at X or at a peak begins with what its last interval's own time says. Between the two, at a valley, the second
+up, pi <= 0, and what more speed is worth adds up towards the start of the ramp; where it brakes, pi >= 0 adds up towards its end.
+A ramp that ends at X or at a peak begins with what its last interval's own time says. Between the two, at a valley, the second
 equation gives mu, or, where X does not hold, the multiplier of the row that holds x alone (r' = 0, r'' x = c): on the grid that is the
 row with the largest |r'' x|/c there. All in one sweep to the left and one to the right.
 
@@ -126,7 +126,7 @@ def _costates(limits, profile):
             axis[i], side[i], a[i], b[i], size[i] = _holding(i, limits, profile)
             if axis[i] >= 0 and 2.0 * h * abs(b[i]) <= TURNING * abs(a[i]):
                 way[i] = np.sign(a[i] * size[i])
-        for i in range(last - 1, first - 1, -1):  # speeding up: from the end of the stretch
+        for i in range(last - 1, first - 1, -1):  # speeding up: from the end of the ramp
             if way[i] > 0.0:
                 pi[i] = _speeding(i, profile, held, pi)
         for i in range(first, last):  # braking: from its beginning
@@ -144,9 +144,9 @@ def _costates(limits, profile):
                 continue
             best, k_best = ALONE, -1
             for k in range(axes):
-                part = abs(d2_right[i, k]) * x[i] / limit[i, k]
-                if part > best:
-                    best, k_best = part, k
+                ratio = abs(d2_right[i, k]) * x[i] / limit[i, k]
+                if ratio > best:
+                    best, k_best = ratio, k
             if k_best >= 0:
                 rows[i, k_best, 0] -= over * limit[i, k_best] / d2_right[i, k_best]
     return rows, feed, pi

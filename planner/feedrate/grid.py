@@ -1,14 +1,14 @@
-"""Grid points on straight stretches: where a second-order profile switches, and what a jerk-limited one needs.
+"""Grid points on straight elements: where a second-order profile switches, and what a jerk-limited one needs.
 
-Between rest and feed, or between two corners, a straight stretch is one interval; its end speeds are already exact, because the
+Between rest and feed, or between two corners, a straight element is one interval; its end speeds are already exact, because the
 limits do not change along it. Inside it the optimum accelerates at the largest rate b, holds the speed limit, decelerates at b:
 
     peak below the limit:  one switch,  sigma = (x1 - x0 + 2 b L) / (4 b)
     limit x_c reached:     two,         sigma = (x_c - x0)/(2 b)  and  L - (x_c - x1)/(2 b)
 
-With these points added the profile on the grid *is* the optimum, however long the stretch.
+With these points added the profile on the grid *is* the optimum, however long the element.
 
-A jerk-limited profile rounds the switches off: on a stretch of length L, with limits a and j along it, in about
+A jerk-limited profile rounds the switches off: on an element of length L, with limits a and j along it, in about
 
     tau = min(a/j, (L / (16 j))^(1/3)),
 
@@ -16,7 +16,7 @@ which is the time to build up a, or half a phase of the move from rest to rest t
 profile with the acceleration j tau, as slow at corners as the jerk asks for at constant speed, tells when and where things happen;
 between its events the points are spread in time, every
 `STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
-So a stretch from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
+So an element from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints import axis_jerk
 from planner.constraints.assemble import feedrate_problem, interval_feed_sq_max
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
@@ -33,7 +34,8 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 from planner.path.samples import PathSamples, insert_points, straight
 
-# Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit.
+# Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit. A point nearer to
+# an end of its interval is that end: rounding put points of tiny intervals there, 4e-16 mm apart beside a jump of a limit of one's own.
 SWITCH_MIN = 1e-9
 
 # Spacing of points for jerk-limited profiles (module text) [tau]; lines, pentagon and zigzag at jerks 2e4 to 2e6 are within 0.15 %
@@ -59,7 +61,8 @@ def add_switching_points(
     fall = np.where(capped, length - (cap - x1) / (2.0 * rate), np.inf)
     s0, s1 = samples.s[interval, None], samples.s[interval + 1, None]
     places = s0 + np.stack([rise, fall], axis=1)
-    real = (places > s0) & (places < s1)  # as far as arc length can tell them apart
+    least = SWITCH_MIN * length[:, None]
+    real = (places > s0 + least) & (places < s1 - least)
     real[:, 1] &= places[:, 1] - places[:, 0] > SWITCH_MIN * length
     row, _ = np.nonzero(real)
     return insert_points(samples, interval[row], places[real])
@@ -93,10 +96,9 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
     row, t = _spread(solution.duration[interval] / tau_here, finer)
     at, t = interval[row], t * tau_here[row]
     s = model.s[at] + t * (np.sqrt(solution.feed_sq[at]) + 0.5 * solution.acc_s[at] * t)
-    inside = (s > model.s[at]) & (
-        s < model.s[at + 1]
-    )  # rounding may put points of tiny intervals on their ends
-    inside[1:] &= (np.diff(s) > 0) | (np.diff(at) > 0)
+    least = SWITCH_MIN * (model.s[at + 1] - model.s[at])
+    inside = (s > model.s[at] + least) & (s < model.s[at + 1] - least)
+    inside[1:] &= (np.diff(s) > least[1:]) | (np.diff(at) > 0)
     margin = model.margin.copy()
     margin[interval] = 0.0  # straight: nothing to interpolate
     return insert_points(replace(model, margin=margin), at[inside], s[inside])
@@ -104,9 +106,8 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
     """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the feed."""
-    turning = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right)) / problem.jerk_limit
-    with np.errstate(divide="ignore"):
-        allowed = turning.max(axis=1) ** (-2.0 / 3.0)
+    d3 = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right))
+    allowed = axis_jerk.feed_sq_at_constant_speed(d3, problem.jerk_limit)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
@@ -11,6 +11,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import NotSolvedError
+from planner.constraints.limit import RowLimit, RowPoint
+from planner.constraints.limits import ACCELERATION, JERK, ROWS, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 
 
@@ -49,11 +51,19 @@ class Prices:
     def from_relative(
         cls, problem: FeedrateProblem, acceleration: FloatArray, jerk: FloatArray, feed_sq_max: FloatArray
     ) -> Prices:
-        """From dT/d(ln limit) [s]: of the rows of each axis (A,), and of every point's feed_sq_max (P,), which counts for the axis
-        limit it comes from."""
-        names = np.array(problem.bound_names)[problem.feed_sq_bound]
-        velocity = np.array([2.0 * feed_sq_max[names == f"velocity.{axis}"].sum() for axis in problem.axes])
-        jump = np.array([feed_sq_max[names == f"curvature_jump.{axis}"].sum() for axis in problem.axes])
+        """From dT/d(ln limit) [s].
+
+        acceleration, jerk : (A,) of the rows of each axis
+        feed_sq_max        : (P,) of every point's bound, which counts for the axis limit it comes from
+        """
+        number = {name: k for k, name in enumerate(problem.bound_names)}
+
+        def of_caps(called: Callable[[str], str]) -> FloatArray:
+            found = [problem.feed_sq_bound == number.get(called(axis), -1) for axis in problem.axes]
+            return np.array([feed_sq_max[points].sum() for points in found])
+
+        velocity = 2.0 * of_caps(VELOCITY.called)
+        jump = of_caps(ACCELERATION.called_at_jump)
         return cls(
             velocity=velocity / problem.velocity,
             acceleration=(acceleration + jump) / problem.acceleration,
@@ -149,7 +159,11 @@ class FeedrateSolution:
         solver: str,
         solve_time: float,
     ) -> FeedrateSolution:
-        """A second-order optimum: constant acceleration on every interval."""
+        """A second-order optimum: constant acceleration on every interval.
+
+        feed_sq : (P,) [mm2/s2]
+        acc_s   : (P,) acceleration along the path on the interval to the right [mm/s2]
+        """
         return cls(
             status=Status.OPTIMAL,
             sentence=sentence,
@@ -195,8 +209,12 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1});
-    0 at the end of a piece. Solutions carry their own `duration`, exact at any order."""
+    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}).
+
+    0 at the end of a piece. Solutions carry their own `duration`, exact at any order.
+
+    feed_sq : (P,) [mm2/s2]
+    """
     feed = np.sqrt(feed_sq)
     times = np.zeros(len(problem))
     inner = np.flatnonzero(problem.interval)
@@ -234,24 +252,21 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
         (inner + 1, u[inner] + gained, problem.d2_left, problem.d3_left),
     )
     first, axes = len(problem.bound_names), len(problem.axes)
+    rows: list[tuple[RowLimit, FloatArray, FloatArray | float]] = [
+        (ACCELERATION, problem.acceleration_limit, 1.0 - problem.margin[inner])
+    ]
+    if solution.jerk_limited:
+        rows.append((JERK, problem.jerk_limit, 1.0))
     for k in range(axes):
-        of_acceleration, of_jerk = np.zeros(len(problem)), np.zeros(len(problem))
-        for point, acc, d2, d3 in ends:
-            d1, curve, feed = problem.d1[point, k], d2[point, k], np.sqrt(x[point])
-            ratio = np.abs(d1 * acc + curve * x[point]) / (
-                problem.acceleration_limit[point, k] * (1.0 - problem.margin[inner])
-            )
-            of_acceleration[inner] = np.maximum(of_acceleration[inner], ratio)
-            turning = feed * (3.0 * curve * acc + d3[point, k] * x[point])
-            turned = np.abs(d1 * jerk + turning) / problem.jerk_limit[point, k]
-            of_jerk[inner] = np.maximum(of_jerk[inner], turned)
-        yield first + k, of_acceleration
-        if solution.jerk_limited:
-            yield first + axes + k, of_jerk
+        for limit, allowed, room in rows:
+            worst = np.zeros(len(problem))
+            for point, acc, d2, d3 in ends:
+                at = RowPoint(problem.d1[point, k], d2[point, k], d3[point, k], x[point], acc, jerk)
+                ratio = np.abs(limit.row(at)) / (allowed[point, k] * room)
+                worst[inner] = np.maximum(worst[inner], ratio)
+            yield first + ROWS.index(limit) * axes + k, worst
 
 
 def active_names(problem: FeedrateProblem) -> tuple[str, ...]:
     """Names for the indices of `constraint_ratios`."""
-    return problem.bound_names + tuple(
-        f"{limit}.{axis}" for limit in ("acceleration", "jerk") for axis in problem.axes
-    )
+    return problem.bound_names + tuple(limit.called(axis) for limit in ROWS for axis in problem.axes)

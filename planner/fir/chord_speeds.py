@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.fir.columns import per_leg, per_stretch
-from planner.fir.command import Cells, Command, command_of
-from planner.fir.guide import STRAIGHT, ChordGuide, feeds_held
+from planner.fir.chord_guide import STRAIGHT, ChordGuide, feeds_held
+from planner.fir.columns import per_leg, per_run
+from planner.fir.command import Command, VelocityPulses, command_of
 from planner.fir.measure import slowest
 from planner.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
 from planner.fir.spline_speeds import filter_lengths, first_speeds
@@ -43,58 +43,65 @@ SPEEDS, LOWEST = 18, 0.17
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChordSpeeds(SpeedPlan):
-    """Speeds on the chords of a guide.
+    """Speeds on the R chords of a guide in S runs.
 
-    v      : (R,) [mm/s]
+    v      : (R,) constant speed of each chord [mm/s]
     margin : (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
     """
 
-    course: ChordGuide
+    guide: ChordGuide
     v: FloatArray = per_leg()
-    margin: FloatArray = per_stretch(2)
+    margin: FloatArray = per_run(2)
 
     def time(self) -> FloatArray:
-        """(S,) how long each stretch takes [s], dwells not counted."""
-        return self.course.total(self.course.length / self.v) + self.T1 + self.T2
+        """(S,) durations of the runs [s], dwells not counted."""
+        return self.guide.total(self.guide.length / self.v) + self.T1 + self.T2
 
     def command(self) -> Command:
-        """All chords at their speeds, one after another."""
-        guide = self.course
-        cells = Cells(leg=np.arange(len(guide)), length=guide.length, speed=self.v)
-        return command_of(guide, cells, np.zeros(len(guide) + 1), self.T1, self.T2)
+        """All chords at their speeds, one after another, no gaps between them."""
+        guide = self.guide
+        pulses = VelocityPulses(leg=np.arange(len(guide)), length=guide.length, speed=self.v)
+        return command_of(guide, pulses, np.zeros(len(guide) + 1), self.T1, self.T2)
 
     def slower(self, made: Made, machine: Machine, n: int) -> ChordSpeeds:
-        """The speeds and filters of the next round."""
-        guide, given = self.course, self.course.own is not None
+        """Slower speeds and longer filters for what the motion exceeds (module text).
+
+        made : the motion of this plan
+        n    : rounds before this one; from `PATIENCE` on everything gets slower
+        """
+        guide, given = self.guide, self.guide.own is not None
         over = np.stack([made.largest(made.seen.acceleration), made.largest(made.seen.jerk)], axis=1)
-        everything = (over > 1.0).any(axis=1) if given else np.full(guide.stretches, n >= PATIENCE)
+        everything = (over > 1.0).any(axis=1) if given else np.full(guide.runs, n >= PATIENCE)
         as_a_whole = np.where(everything, BEYOND / np.sqrt(made.largest(made.seen.worst)), 1.0)
-        v = self.v * np.minimum(self._by_error(made), as_a_whole[guide.stretch])
+        v = self.v * np.minimum(self._by_error(made), as_a_whole[guide.run])
         if given:
-            return ChordSpeeds(course=guide, v=v, T1=self.T1, T2=self.T2, margin=self.margin)
+            return ChordSpeeds(guide=guide, v=v, T1=self.T1, T2=self.T2, margin=self.margin)
         margin = np.clip(self.margin * over / BEYOND, 1.0, MARGINS_MAX)
         if n >= PATIENCE:
             margin = np.broadcast_to(MARGINS_MAX, margin.shape)
         T1, T2 = filter_lengths(guide, v, machine, margin)
         return ChordSpeeds(
-            course=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin
+            guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin
         )
 
     def _by_error(self, made: Made) -> FloatArray:
         """(R,) by how much to slow down each chord for the error, or the normal acceleration [-]."""
-        guide, command, seen = self.course, made.command, made.seen
-        delay = (self.T1 + self.T2)[guide.stretch]
+        guide, command, seen = self.guide, made.command, made.seen
+        delay = (self.T1 + self.T2)[guide.run]
         around = AROUND * delay
         duration = guide.length / self.v
-        rests = guide.stretch  # in the command a rest follows each stretch
-        begin = command.begin[guide.stretch] + command.t[np.arange(len(guide)) + rests] + delay / 2
+        standstills = guide.run  # in the command one follows each run
+        begin = command.begin[guide.run] + command.t[np.arange(len(guide)) + standstills] + delay / 2
         factor = slowing(np.maximum(seen.error, seen.normal))
         by = slowest(seen.t, factor, begin - around, begin + duration + around)
         return np.where(guide.kappa > STRAIGHT, by, 1.0)
 
 
 def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], FloatArray]:
-    """Plans with lower and lower largest speeds, not yet slowed down, and the times (n, S) [s] that they promise."""
+    """`SPEEDS` plans with lower and lower largest speeds, not yet slowed down, and the times (n, S) [s] that they promise the S runs.
+
+    guide : its dwells are not looked at
+    """
     high = guide.largest(guide.feed)
     corners = np.add.reduceat(np.diff(guide.corner, prepend=-1) > 0, guide.first[:-1])
     leg = guide.total(guide.length) / (1 + corners)
@@ -104,14 +111,17 @@ def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], Fl
 
 
 def fastest_speeds(guide: ChordGuide, machine: Machine) -> ChordSpeeds:
-    """The fastest of a few plans that keep tolerance and limits, for each stretch by itself. `guide` has no dwells."""
+    """The fastest of a few plans that keep tolerance and limits, each run by itself.
+
+    guide : without dwells, from `Guide.pick`
+    """
     return settled_fastest(*promised(guide, machine), machine)
 
 
 def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSpeeds:
     """First speeds up to `top` (S,) and the filters for them."""
     acceleration = machine.limits("acceleration", guide.axes)
-    most, margin = np.minimum(guide.feed, top[guide.stretch]), np.ones((guide.stretches, 2))
+    most, margin = np.minimum(guide.feed, top[guide.run]), np.ones((guide.runs, 2))
     if guide.own is not None:
         T1, T2 = guide.given_filters()
         v = first_speeds(guide, most, acceleration, T1, T2)
@@ -119,4 +129,4 @@ def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSp
         T1, T2 = filter_lengths(guide, most, machine, margin)
         v = first_speeds(guide, most, acceleration, T1, T2)
         T1, T2 = filter_lengths(guide, v, machine, margin)
-    return ChordSpeeds(course=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin)
+    return ChordSpeeds(guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin)

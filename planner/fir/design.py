@@ -1,4 +1,4 @@
-"""The filters of each stretch, for a speed and a margin."""
+"""The filters of each run, for a largest speed and a margin; and the first schedule with them."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.corners.fir import overlap_time
-from planner.fir.course import StraightCourse
 from planner.fir.filters import damped_period, lengths_from_limits, suppressing
+from planner.fir.leg_guide import LegGuide
 from planner.fir.rules import schedule
 from planner.fir.schedule import Schedule
 from planner.machine import Machine
 
 # In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion by dt^2/8 of it. T1 is at
-# least so long that this is the given share of the tolerance [-]: what is left is for the filters.
-CHORD_PART = 0.5
+# least so long that this is the given fraction of the tolerance [-]: what is left is for the filters.
+CHORD_FRACTION = 0.5
 # Two filters suppress two modes, those of the lowest frequencies.
 MODES = 2
 
 
 def filters_for(
-    course: StraightCourse, machine: Machine, speed: FloatArray, margin: FloatArray
+    guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 and T2 (S,) [s]: the course's own, or the shortest for legs run at their feed and at most at `speed`.
+    """T1 and T2 (S,) [s]: the guide's own, or the shortest for legs run at their feed and at most at `speed`.
 
     T1 = V/A, T2 = margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or both equal where V does
     not reach A), lengthened to whole periods of the machine's vibration modes (eq. 10).
@@ -30,13 +30,13 @@ def filters_for(
     speed  : (S,) [mm/s]
     margin : (S,) [-]
     """
-    if course.own is not None:
-        return course.given_filters()
-    V = np.minimum(course.feed, speed[course.stretch])
-    T1 = course.largest(V / course.a_max)
-    product = margin * course.largest(V / course.j_max)
-    sharpest = course.largest(V * course.sin_half[1:] / course.tol[1:])
-    T1 = np.maximum(T1, sharpest * machine.dt**2 / (4 * CHORD_PART))
+    if guide.own is not None:
+        return guide.given_filters()
+    V = np.minimum(guide.feed, speed[guide.run])
+    T1 = guide.largest(V / guide.a_max)
+    product = margin * guide.largest(V / guide.j_max)
+    sharpest = guide.largest(V * guide.sin_half[1:] / guide.tol[1:])
+    T1 = np.maximum(T1, sharpest * machine.dt**2 / (4 * CHORD_FRACTION))
     T1 = np.maximum(T1, np.sqrt(product))
     T2 = product / T1
     modes = sorted(machine.modes, key=lambda mode: mode.frequency)[:MODES]
@@ -47,28 +47,32 @@ def filters_for(
     )
 
 
-def plan_for(course: StraightCourse, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
-    """The first schedule of a course run at `speed` (S,) [mm/s] at most, with the filters for it and the `margin` (S,)."""
-    T1, T2 = filters_for(course, machine, speed, margin)
-    return schedule(course, machine, np.minimum(course.feed, speed[course.stretch]), T1, T2)
+def plan_for(guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
+    """The first schedule with the filters for a speed, not yet slowed down.
+
+    speed  : (S,) largest speed on each run [mm/s]
+    margin : (S,) on T2 = A/J [-]
+    """
+    T1, T2 = filters_for(guide, machine, speed, margin)
+    return schedule(guide, machine, np.minimum(guide.feed, speed[guide.run]), T1, T2)
 
 
-def plain_plan(course: StraightCourse, machine: Machine) -> Schedule:
-    """The paper's rules and nothing else: T1 = V/A, T2 = A/J, full speed, and eq. 15 at every corner."""
-    a, j = (machine.limits(q, course.axes).min() for q in ("acceleration", "jerk"))
-    V = course.largest(course.feed)
-    T1, T2 = lengths_from_limits(V, a, j) if course.own is None else course.given_filters()
-    before, after, at = course.feed[:-1], course.feed[1:], course.stretch[1:]
-    overlap = np.zeros(len(course) + 1)
+def plain_plan(guide: LegGuide, machine: Machine) -> Schedule:
+    """Paper 000's rules and nothing else: T1 = V/A, T2 = A/J, full speed, and eq. 15 at every corner."""
+    a, j = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
+    V = guide.largest(guide.feed)
+    T1, T2 = lengths_from_limits(V, a, j) if guide.own is None else guide.given_filters()
+    before, after, at = guide.feed[:-1], guide.feed[1:], guide.run[1:]
+    overlap = np.zeros(len(guide) + 1)
     overlap[1:-1] = overlap_time(
-        course.tol[1:-1], np.sqrt(before * after), course.sin_half[1:-1], T1[at], T2[at]
+        guide.tol[1:-1], np.sqrt(before * after), guide.sin_half[1:-1], T1[at], T2[at]
     )
     return Schedule(
-        course=course,
+        guide=guide,
         T1=T1,
         T2=T2,
-        speed=course.feed,
-        passing=np.full(len(course) + 1, np.inf),
-        overlap=np.where(course.inner, overlap, 0.0),
-        holding=np.zeros(len(course), bool),
+        speed=guide.feed,
+        passing=np.full(len(guide) + 1, np.inf),
+        overlap=np.where(guide.inner, overlap, 0.0),
+        holding=np.zeros(len(guide), bool),
     )

@@ -32,13 +32,18 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 
-# Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this share of a period [-].
+# Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this fraction of a period [-].
 PERIOD_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Filters:
-    """Moving averages of the given lengths [s] in series."""
+    """Moving averages in series.
+
+    times : their lengths [s]
+
+    Raises InputError unless there is one at least, and all are positive and finite.
+    """
 
     times: tuple[float, ...]
 
@@ -59,24 +64,28 @@ class Filters:
         return sum(T * T for T in self.times) / 12.0
 
     def kernel(self, t: FloatArray) -> FloatArray:
-        """h(t) [1/s]."""
+        """h(t) (n,) [1/s] at times t (n,) [s]."""
         return self._response(t, 0)
 
     def step(self, t: FloatArray) -> FloatArray:
-        """S(t), the answer to a unit step [-]."""
+        """S(t) (n,), the answer to a unit step [-], at times t (n,) [s]."""
         return self._response(t, 1)
 
     def ramp(self, t: FloatArray) -> FloatArray:
-        """R(t), the integral of S [s]."""
+        """R(t) (n,), the integral of S [s], at times t (n,) [s]."""
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """Velocity at t [mm/s] of a pulse of `speed` [mm/s] and any `duration` Tv [s] that starts at 0."""
+        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, and its general form for Tv < Td).
+
+        speed    : V [mm/s]
+        duration : Tv [s], any
+        """
         t = np.asarray(t, float)
         return speed * (self.step(t) - self.step(t - duration))
 
     def taps(self, dt: float) -> FloatArray:
-        """The discrete kernel at the period dt [s], of unit sum; each length in whole periods, one at least.
+        """(K,) the discrete kernel at the period dt [s], of unit sum; each length in whole periods N_i, one at least.
 
         Its variance is dt^2 (sum N_i^2 - n) / 12.
         """
@@ -87,20 +96,22 @@ class Filters:
         return taps
 
     def magnitude(self, w: FloatArray) -> FloatArray:
-        """|M| at the frequencies w [rad/s]: prod |sinc| (eq. 8, 9)."""
+        """|M| (W,) [-] at frequencies w (W,) [rad/s]: prod |sinc| (eq. 8, 9)."""
         return np.prod([np.abs(np.sinc(np.asarray(w) * T / (2.0 * np.pi))) for T in self.times], axis=0)
 
     def residue(self, frequency: float, damping: float) -> float:
-        """Share of its vibration that a mode of `frequency` [Hz] and `damping` ratio keeps: |M| at its pole [-]."""
+        """Fraction of its vibration that a mode of `frequency` [Hz] and `damping` ratio keeps: |M| at its pole [-]."""
         w = 2.0 * np.pi * frequency
         pole = w * (-damping + 1j * np.sqrt(1.0 - damping**2))
         return float(np.prod([np.abs((1.0 - np.exp(-pole * T)) / (pole * T)) for T in self.times]))
 
     def move_spectrum(self, w: FloatArray, speed: float, duration: float) -> FloatArray:
-        """|A| [mm/s] of the acceleration of a full move, a pulse of `speed` [mm/s] and `duration` [s], at w [rad/s]."""
+        """(W,) |A| [mm/s] of the acceleration of a full move at frequencies w (W,) [rad/s] (eq. 6): a pulse of `speed` [mm/s] and
+        `duration` [s]."""
         return speed * np.abs(1.0 - np.exp(-1j * np.asarray(w) * duration)) * self.magnitude(w)
 
     def _response(self, t: FloatArray, integrals: int) -> FloatArray:
+        """The kernel, integrated 0, 1 or 2 times, at times t (n,) [s] (module text)."""
         t = np.asarray(t, float)
         early = np.clip(np.minimum(t, self.delay - t), 0.0, None)
         power = len(self.times) + integrals - 1
@@ -122,9 +133,9 @@ class Filters:
 def lengths_from_limits(
     V: FloatArray, A: FloatArray, J: FloatArray, margin: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 = V/A and T2 = margin A/J [s] (paper 001 par. 19), or both sqrt(margin V/J) where V is too small to reach A.
+    """T1 = V/A and T2 = margin A/J (S,) [s] (paper 001 par. 19), or both sqrt(margin V/J) where V is too small to reach A.
 
-    V, A, J : speed, acceleration and jerk along a line [mm/s, mm/s2, mm/s3]
+    V, A, J : (S,) speed, acceleration and jerk along a line [mm/s, mm/s2, mm/s3]
     margin  : 1 is enough for a pulse that is no shorter than Td; an isolated corner needs `corner_margin`, chains of pulses 2 to 4
     """
     T1, T2 = np.asarray(V / A), np.asarray(margin * A / J)
@@ -133,17 +144,26 @@ def lengths_from_limits(
 
 
 def corner_margin(u1: FloatArray, u2: FloatArray, overlap: FloatArray, T1: float, T2: float) -> FloatArray:
-    """Factor on T2 = A/J that keeps the axis jerks of an isolated corner within J: largest of 1, max_k |u1k + u2k| for an overlap
-    Tk < 2 T2, and max_k |u2k - u1k| for Tk > T1 (docs/papers.md, peaks inside the corner). u1, u2 (n, A), overlap (n,) [s]."""
+    """(n,) factor on T2 = A/J that keeps the axis jerks of an isolated corner within J.
+
+    The largest of 1, max_k |u1k + u2k| for an overlap Tk < 2 T2, and max_k |u2k - u1k| for Tk > T1 (docs/papers.md, peaks inside the
+    corner).
+
+    u1, u2  : (n, A) unit directions before and behind the corner
+    overlap : (n,) Tk [s]
+    T1, T2  : lengths of the filters [s]
+    """
     plus, minus = np.abs(u1 + u2).max(axis=-1), np.abs(u2 - u1).max(axis=-1)
     partial = (overlap > 0) & (overlap < 2.0 * T2)
     return np.maximum(1.0, np.maximum(np.where(partial, plus, 0.0), np.where(overlap > T1, minus, 0.0)))
 
 
 def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 lengthened to whole multiples of the periods [s] of one or two modes (eq. 10), at the least sum of both.
+    """T1 >= T2 (S,) [s] lengthened to whole multiples of the periods [s] of one or two modes (eq. 10), at the least sum of both.
 
     With one mode one filter is made a multiple of its period, the other stays as it is.
+
+    Raises ValueError for none or more than two periods.
     """
     if len(periods) == 1:
         one = (_multiple(T1, periods[0]), T2), (T1, _multiple(T2, periods[0]))
@@ -166,13 +186,16 @@ def damped_period(frequency: float, damping: float) -> float:
 
 
 def _multiple(T: FloatArray, period: float) -> FloatArray:
+    """T (S,) [s] rounded up to whole periods, one at least."""
     return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
 
 
 def acceleration_spectrum(t: FloatArray, acceleration: FloatArray, w: FloatArray) -> FloatArray:
-    """|integral of a(t) exp(-i w t) dt| (len(w), A) [mm/s] of samples (T, A) at times t (T,), straight between the samples.
+    """|integral of a(t) exp(-i w t) dt| (W, A) [mm/s], with a straight between its samples.
 
-    w : frequencies [rad/s]
+    t            : (T,) [s], ascending
+    acceleration : (T, A) [mm/s2]
+    w            : (W,) frequencies [rad/s]
     """
     h, slope = np.diff(t)[:, None], np.diff(acceleration, axis=0) / np.diff(t)[:, None]
     out = np.empty((len(w), acceleration.shape[1]))
@@ -183,8 +206,8 @@ def acceleration_spectrum(t: FloatArray, acceleration: FloatArray, w: FloatArray
         safe = np.where(small, 1.0, z)
         phi1 = np.where(small, 1 - z / 2 + z**2 / 6 - z**3 / 24, (1 - np.exp(-safe)) / safe)
         phi2 = np.where(small, 0.5 - z / 3 + z**2 / 8 - z**3 / 30, (1 - (1 + safe) * np.exp(-safe)) / safe**2)
-        parts = np.exp(-1j * wn * t[:-1])[:, None] * h * (acceleration[:-1] * phi1 + slope * h * phi2)
-        out[n] = np.abs(parts.sum(axis=0))
+        terms = np.exp(-1j * wn * t[:-1])[:, None] * h * (acceleration[:-1] * phi1 + slope * h * phi2)
+        out[n] = np.abs(terms.sum(axis=0))
     return out
 
 
@@ -193,10 +216,13 @@ def residual_vibration(
 ) -> FloatArray:
     """Amplitude (A,) [mm] at which a mode still rings when the motion is over.
 
-    Each axis carries an oscillator x'' + 2 z w x' + w^2 x = -a(t), at rest before; a is straight between its samples (T, A) at
-    times t (T,). By Duhamel's integral the state at the end is that of the pole, and its envelope |pole integral| / w_d.
+    Each axis carries an oscillator x'' + 2 z w x' + w^2 x = -a(t), at rest before; a is straight between its samples. By Duhamel's
+    integral the state at the end is that of the pole, and its envelope |pole integral| / w_d.
 
-    frequency : of the undamped mode [Hz];  damping : ratio z, 0 <= z < 1
+    t            : (T,) [s], ascending
+    acceleration : (T, A) [mm/s2]
+    frequency    : of the undamped mode [Hz]
+    damping      : ratio z, 0 <= z < 1
     """
     w = 2.0 * np.pi * frequency
     damped = w * np.sqrt(1.0 - damping**2)
@@ -210,6 +236,6 @@ def residual_vibration(
     phi1 = np.where(small, 1 + z / 2 + z**2 / 6 + z**3 / 24, (grow - 1) / safe)
     phi2 = np.where(small, 0.5 + z / 6 + z**2 / 24 + z**3 / 120, (grow - 1 - safe) / safe**2)
     rise = np.diff(acceleration, axis=0)
-    parts = h * (acceleration[:-1] * phi1 + rise * phi2)
+    terms = h * (acceleration[:-1] * phi1 + rise * phi2)
     after: Array = np.exp(pole * (t[-1] - t[1:]))[:, None]
-    return np.abs((after * parts).sum(axis=0)) / damped
+    return np.abs((after * terms).sum(axis=0)) / damped

@@ -1,7 +1,7 @@
 """What a planned motion really does, measured exactly, and what has to become slower for it.
 
 The filtered position is the mean of the commanded one over the last Td with the kernel as weight, and so is the filtered length
-along the course, sigma(t). With the corners c of the course, at s_c, that turn by Du_c, the motion q differs from the point of the
+along the guide, sigma(t). With the corners c of the guide, at s_c, that turn by Du_c, the motion q differs from the point of the
 polyline at sigma by
 
     q(t) - p(sigma(t)) = sum_c Du_c B_c(t),    B_c = mean of (s - s_c)_+ where sigma < s_c, of (s_c - s)_+ where it is not,
@@ -25,7 +25,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
 from planner.constraints import normal_limit
-from planner.fir.polyline import Polyline
+from planner.fir.guide import Guide
 from planner.fir.superpose import Filtered
 from planner.machine import LINEAR_AXES, Machine
 
@@ -39,13 +39,13 @@ FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is roundi
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Measured:
-    """What was measured at start and middle of all pieces, and when the joints that are no full stops are passed.
+    """What was measured at n times: start and middle of all pieces, and when the joints that are no full stops are passed.
 
-    t            : ascending [s]
-    error        : deviation from the course with the chord error, over the tolerance there [-]
-    normal       : normal acceleration of the linear axes over its limit [-]
-    acceleration : largest over the axes, over the limit [-]
-    jerk         : largest over the axes just after t, over the limit [-]
+    t            : (n,) ascending [s]
+    error        : (n,) deviation from the guide with the chord error, over the tolerance there [-]
+    normal       : (n,) normal acceleration of the linear axes over its limit [-]
+    acceleration : (n,) largest over the axes, over the limit [-]
+    jerk         : (n,) largest over the axes just after t, over the limit [-]
     """
 
     t: FloatArray
@@ -60,12 +60,12 @@ class Measured:
 
     @property
     def worst(self) -> FloatArray:
-        """The largest of the ratios [-]."""
+        """(n,) the largest of the ratios [-]."""
         return np.max([self.error, self.normal, self.acceleration, self.jerk], axis=0)
 
 
 class _Line(NamedTuple):
-    """The fields of a `Polyline`, for the kernels."""
+    """The fields of a `Guide`, for the kernels."""
 
     s: FloatArray
     point: FloatArray
@@ -92,17 +92,17 @@ class _Motion(NamedTuple):
     state: FloatArray
 
 
-def measure(course: Polyline, motion: Filtered, machine: Machine) -> Measured:
-    """Measure a motion."""
-    seen = np.empty((5, 2 * len(motion) + len(course)))
+def measure(guide: Guide, motion: Filtered, machine: Machine) -> Measured:
+    """Measure a filtered motion along a guide (module text)."""
+    seen = np.empty((5, 2 * len(motion) + len(guide)))
     limits = _Limits(
-        machine.limits("acceleration", course.axes),
-        machine.limits("jerk", course.axes),
+        machine.limits("acceleration", guide.axes),
+        machine.limits("jerk", guide.axes),
         normal_limit.largest(machine) * NORMAL_SPARE,
-        np.array([axis in LINEAR_AXES for axis in course.axes]),
+        np.array([axis in LINEAR_AXES for axis in guide.axes]),
         machine.dt**2 / 8,
     )
-    line = _Line(*(getattr(course, name) for name in _Line._fields))
+    line = _Line(*(getattr(guide, name) for name in _Line._fields))
     count = _measure(_Motion(motion.t, motion.ends, motion.state), line, limits, seen)
     t, error, normal, acceleration, jerk = seen[:, :count]
     return Measured(t=t, error=error, normal=normal, acceleration=acceleration, jerk=jerk)
@@ -124,7 +124,7 @@ def _measure(motion, line, limits, seen):
         while True:
             joint, tau = leg + 1 < len(line.direction) and line.s[leg + 1] <= arrival, np.inf
             if joint:
-                tau = _passing((p, v, a, j), line.s[leg + 1], 2.0 * half)
+                tau = _reaching((p, v, a, j), line.s[leg + 1], 2.0 * half)
             while begun < 2 and begun * half <= tau:
                 _record(motion, m, begun * half, line, leg, limits, seen[:, n])
                 if limits.normal < np.inf:
@@ -142,7 +142,7 @@ def _measure(motion, line, limits, seen):
 
 @njit(cache=True, error_model="numpy")
 def _normal_peak(motion, m, begin, lasting, linear):
-    """Largest normal acceleration on a part of piece m."""
+    """Largest normal acceleration [mm/s2] on piece m from `begin` for `lasting` [s]."""
     peak_sq = 0.0
     for k in range(NORMAL_STEPS + 1):
         tau, feed_sq, bend_sq, both = begin + lasting * k / NORMAL_STEPS, 0.0, 0.0, 0.0
@@ -159,7 +159,7 @@ def _normal_peak(motion, m, begin, lasting, linear):
 
 
 @njit(cache=True, error_model="numpy")
-def _passing(state, s, duration):
+def _reaching(state, s, duration):
     """tau in [0, duration] at which p + v tau + a tau^2/2 + j tau^3/6, which never falls, reaches s; state: p, v, a, j."""
     p, v, a, j = state
     low, high = 0.0, duration
@@ -199,7 +199,11 @@ def _record(motion, m, tau, line, leg, limits, out):
 
 
 def slowest(t: FloatArray, factor: FloatArray, begin: FloatArray, end: FloatArray) -> FloatArray:
-    """Smallest factor (n,) among the times t in each window [begin, end]; both ascend. 1 where there is none."""
+    """(n,) smallest factor among the times within begin <= t <= end; 1 where there is none.
+
+    t, factor  : (T,) ascending times [s], and a factor for each [-]
+    begin, end : (n,) [s], both ascending
+    """
     first, last = np.searchsorted(t, begin, side="left"), np.searchsorted(t, end, side="right")
     return _window_min(factor, first, last)
 

@@ -35,7 +35,13 @@ LIMIT_ROUNDING = 1e-9
 def corner_error(
     overlap: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """By how much the vertex is missed [mm] for an overlap 0 <= Tk <= Td (eq. 14)."""
+    """(n,) by how much the vertex is missed [mm] (eq. 14).
+
+    overlap  : (n,) Tk [s], 0 <= Tk <= Td
+    V        : (n,) speed of the pulses, the geometric mean of two [mm/s]
+    sin_half : (n,) sine of half the turning angle [-]
+    T1, T2   : (n,) filters [s]
+    """
     cubic = overlap**3 / (24 * T1 * T2)
     square = (4 * T2**2 - 6 * T2 * overlap + 3 * overlap**2) / (12 * T1)
     return np.where(overlap <= 2 * T2, cubic, square) * V * sin_half
@@ -44,10 +50,12 @@ def corner_error(
 def overlap_within(
     tol: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray, dt: float
 ) -> FloatArray:
-    """Overlap Tk [s] whose corner error, together with the chord error of samples at dt [s], stays within `tol` [mm].
+    """(n,) overlap Tk [s] whose corner error, together with the chord error of samples at dt [s], stays within `tol` (n,) [mm].
 
     At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of it. What is left for
     the corner is reckoned with the overlap that the whole tolerance would allow, the longer one, and is half of it at least.
+
+    V, sin_half, T1, T2 : (n,) as of `corner_error`
     """
     whole = overlap_time(tol, V, sin_half, T1, T2)
     bend = 2 * V * sin_half * np.minimum(whole / 2 / T2, 1.0) / T1
@@ -57,7 +65,11 @@ def overlap_within(
 def overlap_beside(
     overlap: FloatArray, neighbour: FloatArray, duration: FloatArray, delay: FloatArray
 ) -> FloatArray:
-    """The overlap shortened until Tk_i + Tk_{i+1} <= Tv + Td; both ends get the same unless one needs less."""
+    """(n,) the overlap shortened until Tk_i + Tk_{i+1} <= Tv + Td [s]; both ends get the same unless one needs less.
+
+    overlap, neighbour : (n,) Tk at this end of the leg and at the other [s]
+    duration, delay    : (n,) Tv of the leg and Td of the filters [s]
+    """
     room = duration + delay
     return np.minimum(overlap, np.maximum(room / 2, room - neighbour))
 
@@ -74,17 +86,18 @@ def overlap_within_limits(
     """The longest overlap (n,), at most `overlap`, at which an isolated corner keeps the axes' limits.
 
     w1, w2             : (n, A) velocities of the pulses [mm/s], each within the limits by itself
-    acceleration, jerk : (A,)
+    T1, T2             : (n,) filters [s]
+    acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
     """
     delay = T1 + T2
     a_room = acceleration * T1[:, None] * (1 + LIMIT_ROUNDING)
     j_room = jerk * (T1 * T2)[:, None] * (1 + LIMIT_ROUNDING)
-    share = np.ones(len(overlap))  # largest eta
+    eta = np.ones(len(overlap))  # the largest that is allowed
     for one, other in ((w1, w2), (w2, w1)):
         opposed = one * other < 0
         room = np.divide(a_room - np.abs(one), np.abs(other), out=np.ones_like(one), where=opposed)
-        share = np.minimum(share, np.clip(room.min(axis=1), 0.0, 1.0))
-    overlap = np.where(share < 1, np.minimum(overlap, T2 * (1 + share)), overlap)
+        eta = np.minimum(eta, np.clip(room.min(axis=1), 0.0, 1.0))
+    overlap = np.where(eta < 1, np.minimum(overlap, T2 * (1 + eta)), overlap)
     apart = (np.abs(w2 - w1) > j_room).any(axis=1)
     overlap = np.where(apart, np.minimum(overlap, T1), overlap)
     along = (np.abs(w1 + w2) > j_room).any(axis=1)

@@ -15,11 +15,11 @@ Where there are very many of them E and a come from the mean of the path with th
 
     D = p(s_i + V x) + p(s_i - V x) - 2 p(s_i),      E = w |D|,      a = D / x^2,      x^2 = mu4/mu2,  w = mu2^2 / (2 mu4).
 
-Where the command comes to rest before V x, its way ends there, and D is corrected by what that shifts along the path.
+Where the command comes to rest before V x, the path ends there, and D is corrected by what that shifts along the path.
 What constant speed leaves out is measured afterwards (measure.py).
 
-A speed that a joint or a slow block asks for holds on V Td/2 of the course to both sides: the mean time the command spends there
-puts the motion past the place before a faster command has any effect on it. Long legs are cut for that.
+A speed that a joint or a slow block asks for holds on V Td/2 of the guide to both sides: the mean time the command spends there
+puts the motion past the joint or block before a faster command has any effect on it. Long legs are cut for that.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import last_not_after
 from planner.constraints import normal_limit
-from planner.fir.course import StraightCourse
+from planner.fir.leg_guide import LegGuide
 from planner.fir.overlap import overlap_beside, overlap_within, overlap_within_limits
 from planner.fir.schedule import Schedule
 from planner.machine import Machine
@@ -46,70 +46,70 @@ FLOW_STEP_MIN = 0.3
 
 
 def schedule(
-    course: StraightCourse, machine: Machine, speed_max: FloatArray, T1: FloatArray, T2: FloatArray
+    guide: LegGuide, machine: Machine, speed_max: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> Schedule:
     """Speeds and overlaps for given filters: what isolated corners and even curves need.
 
     speed_max : (R,) largest speed on each leg [mm/s]
-    T1, T2    : (S,) [s]
+    T1, T2    : (S,) filters of each run [s]
     """
-    a, j = (machine.limits(q, course.lines.axes) for q in ("acceleration", "jerk"))
-    filters = np.stack([T1, T2])[:, course.stretch]  # of each leg
-    speed = np.minimum(speed_max, filters[0] * np.minimum(course.a_max, filters[1] * course.j_max))
-    overlap, passing = np.zeros(len(course) + 1), np.full(len(course) + 1, np.inf)
-    inner = np.flatnonzero(course.inner)
+    a, j = (machine.limits(q, guide.lines.axes) for q in ("acceleration", "jerk"))
+    filters = np.stack([T1, T2])[:, guide.run]  # of each leg
+    speed = np.minimum(speed_max, filters[0] * np.minimum(guide.a_max, filters[1] * guide.j_max))
+    overlap, passing = np.zeros(len(guide) + 1), np.full(len(guide) + 1, np.inf)
+    inner = np.flatnonzero(guide.inner)
     T1_at, T2_at = filters[:, inner]
     overlap[inner] = T1_at + T2_at
-    waits, waiting = _waiting(course, machine, speed, inner, T1_at, T2_at)
-    tied = np.zeros(len(course) + 1, bool)  # where the command stands still
-    tied[course.first], tied[inner[waits]] = True, True
-    speed = _apart(course, speed, tied, filters)
+    waits, waiting = _waiting(guide, machine, speed, inner, T1_at, T2_at)
+    tied = np.zeros(len(guide) + 1, bool)  # where the command stands still
+    tied[guide.first], tied[inner[waits]] = True, True
+    speed = _apart(guide, speed, tied, filters)
     passing[inner[~waits]] = _flowing(
-        course, machine, speed, inner[~waits], tied, T1_at[~waits], T2_at[~waits]
+        guide, machine, speed, inner[~waits], tied, T1_at[~waits], T2_at[~waits]
     )
 
     at, delay = inner[waits], filters.sum(axis=0)
     overlap[at] = waiting[waits]
     for side in (-1, 0):  # the leg before, the leg behind
         leg, other = at + side, at + 2 * side + 1
-        shorter = overlap_beside(overlap[at], overlap[other], course.length[leg] / speed[leg], delay[leg])
+        shorter = overlap_beside(overlap[at], overlap[other], guide.length[leg] / speed[leg], delay[leg])
         waiting[waits] = np.minimum(waiting[waits], np.where(tied[other], shorter, np.inf))
-    w = course.direction * speed[:, None]
+    w = guide.direction * speed[:, None]
     overlap[at] = overlap_within_limits(waiting[waits], w[at - 1], w[at], T1_at[waits], T2_at[waits], a, j)
     return Schedule(
-        course=course, T1=T1, T2=T2, speed=speed, passing=passing, overlap=overlap, holding=course.slower
+        guide=guide, T1=T1, T2=T2, speed=speed, passing=passing, overlap=overlap, holding=guide.slower
     )
 
 
 def _waiting(
-    course: StraightCourse, machine: Machine, speed: FloatArray, inner: Array, T1: FloatArray, T2: FloatArray
+    guide: LegGuide, machine: Machine, speed: FloatArray, inner: Array, T1: FloatArray, T2: FloatArray
 ) -> tuple[Array, FloatArray]:
     """At which of the joints `inner` (n,) waiting costs less time than flowing, and the overlap [s] it then has."""
     before, after = speed[inner - 1], speed[inner]
     lower, delay = np.minimum(before, after), T1 + T2
-    tol, sin_half = course.tol[inner], course.sin_half[inner]
+    tol, sin_half = guide.tol[inner], guide.sin_half[inner]
     overlap = overlap_within(tol, np.sqrt(before * after), sin_half, T1, T2, machine.dt)
     with np.errstate(divide="ignore"):
         alone = np.minimum(lower, 12 * T1 * tol / (sin_half * (3 * T1**2 + T2**2)))  # eq. 14 at Tk = Td
-    share = (course.length[inner - 1] + course.length[inner]) / 2
-    slowing = np.minimum(delay * (1 - alone / lower), share * (1 / alone - 1 / lower))
+    mean_length = (guide.length[inner - 1] + guide.length[inner]) / 2
+    slowing = np.minimum(delay * (1 - alone / lower), mean_length * (1 / alone - 1 / lower))
     return delay - overlap < slowing, overlap
 
 
-def _apart(course: StraightCourse, speed: FloatArray, tied: Array, filters: FloatArray) -> FloatArray:
+def _apart(guide: LegGuide, speed: FloatArray, tied: Array, filters: FloatArray) -> FloatArray:
     """Slow down legs between two standstills on which the jerks of speeding up and slowing down would meet.
 
     They do for |Tv - T1| < T2 (docs/papers.md, short segments), and then add up to twice V/(T1 T2).
     """
     T1, T2 = filters
-    twice = 2 * speed > course.j_max * T1 * T2
-    meet = twice & tied[:-1] & tied[1:] & (np.abs(course.length / speed - T1) < T2)
-    slower = np.maximum(course.length / (T1 + T2), speed / 2)
+    twice = 2 * speed > guide.j_max * T1 * T2
+    meet = twice & tied[:-1] & tied[1:] & (np.abs(guide.length / speed - T1) < T2)
+    slower = np.maximum(guide.length / (T1 + T2), speed / 2)
     return np.where(meet, np.minimum(speed, slower), speed)
 
 
 def _flowing(
-    course: StraightCourse,
+    guide: LegGuide,
     machine: Machine,
     speed: FloatArray,
     joint: Array,
@@ -118,11 +118,11 @@ def _flowing(
     T2: FloatArray,
 ) -> FloatArray:
     """Largest speeds (n,) at the flow joints `joint` [mm/s]: the rule of the module's text."""
-    line = _Line(course.s, course.point, course.direction)
+    line = _Line(guide.s, guide.point, guide.direction)
     allowed = _Allowed(
-        course.tol[joint]
+        guide.tol[joint]
         / (1 + 3 * machine.dt**2 / (T1**2 + T2**2)),  # the rest is the chord error of samples
-        machine.limits("acceleration", course.axes),
+        machine.limits("acceleration", guide.axes),
         normal_limit.largest(machine),
     )
     fastest = np.maximum(speed[joint - 1], speed[joint])
@@ -130,7 +130,7 @@ def _flowing(
 
 
 class _Line(NamedTuple):
-    """Joints (R+1,) along the course [mm], where they are (R+1, A) [mm], and the directions (R, A) of the legs between them."""
+    """Joints (R+1,) along the guide [mm], where they are (R+1, A) [mm], and the directions (R, A) of the legs between them."""
 
     s: FloatArray
     point: FloatArray

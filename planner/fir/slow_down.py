@@ -1,9 +1,9 @@
 """From first speeds to a motion that keeps tolerance and limits: filter, measure, slow down where something is exceeded, repeat.
 
-How a plan gets slower is the paper's affair (`SpeedPlan.slower`); it must come to an end. Stretches between full stops do not know of
+How a plan gets slower is the paper's affair (`SpeedPlan.slower`); it must come to an end. Runs between full stops do not know of
 each other: each is done as soon as its motion exceeds nothing.
 
-Several plans, each with the time that it promises, are settled in the order of what they promise, for each stretch by itself.
+Several plans, each with the time that it promises, are settled in the order of what they promise, for each run by itself.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Self, TypeVar
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.fir.columns import chosen_rows, freeze_columns, per_stretch, picked, put
+from planner.fir.columns import chosen_rows, freeze_columns, per_run, picked, put
 from planner.fir.command import Command
+from planner.fir.guide import Guide
 from planner.fir.measure import Measured, measure
-from planner.fir.polyline import Polyline
 from planner.fir.superpose import Filtered, superpose
 from planner.machine import Machine
 
@@ -37,16 +37,19 @@ WORTH = 2e-3
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SpeedPlan(ABC):
-    """How fast a course is commanded, and the filters T1 >= T2 (S,) of its stretches [s]."""
+    """How fast a guide is commanded, and the filters of its S runs.
 
-    course: Polyline
-    T1: FloatArray = per_stretch()
-    T2: FloatArray = per_stretch()
+    T1, T2 : (S,) T1 >= T2 [s]
+    """
+
+    guide: Guide
+    T1: FloatArray = per_run()
+    T2: FloatArray = per_run()
 
     def __post_init__(self) -> None:
-        legs = len(self.course)
-        sizes = {"stretch": self.course.stretches, "leg": legs, "joint": legs + 1}
-        freeze_columns(self, sizes, len(self.course.axes))
+        legs = len(self.guide)
+        sizes = {"run": self.guide.runs, "leg": legs, "joint": legs + 1}
+        freeze_columns(self, sizes, len(self.guide.axes))
 
     @abstractmethod
     def command(self) -> Command:
@@ -54,20 +57,24 @@ class SpeedPlan(ABC):
 
     @abstractmethod
     def time(self) -> FloatArray:
-        """(S,) how long each stretch takes [s], dwells not counted."""
+        """(S,) durations of the runs [s], dwells not counted."""
 
     @abstractmethod
     def slower(self, made: Made, machine: Machine, n: int) -> Self:
-        """The plan of the next round, the n-th was measured; only stretches that exceed something are taken from it."""
+        """A slower plan, of which only runs that exceed something are used.
+
+        made : the motion of this plan
+        n    : rounds before this one
+        """
 
     def pick(self, chosen: Array) -> Self:
-        """The plan of the stretches `chosen` (S,) of its course."""
-        columns = picked(self, chosen_rows(self.course.first, chosen))
-        return dataclasses.replace(self, course=self.course.pick(chosen), **columns)
+        """The plan of the runs `chosen` (S,) of its guide."""
+        columns = picked(self, chosen_rows(self.guide.first, chosen))
+        return dataclasses.replace(self, guide=self.guide.pick(chosen), **columns)
 
-    def put(self, chosen: Array, part: Self) -> Self:
-        """This plan with `part` for the stretches `chosen` (S,)."""
-        return dataclasses.replace(self, **put(self, chosen_rows(self.course.first, chosen), part))
+    def put(self, chosen: Array, plan: Self) -> Self:
+        """This plan with `plan`, of these runs alone, for the runs `chosen` (S,)."""
+        return dataclasses.replace(self, **put(self, chosen_rows(self.guide.first, chosen), plan))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,7 +86,7 @@ class Made:
     seen: Measured
 
     def largest(self, ratio: FloatArray) -> FloatArray:
-        """(S,) the largest of a measured ratio in each stretch [-]."""
+        """(S,) the largest of a measured `ratio` (n,) in each run [-]."""
         return np.maximum.reduceat(ratio, np.searchsorted(self.seen.t, self.motion.begin))
 
 
@@ -90,32 +97,32 @@ def make(plan: SpeedPlan, machine: Machine) -> Made:
     """The motion of a plan, measured."""
     command = plan.command()
     motion = superpose(command)
-    return Made(command=command, motion=motion, seen=measure(plan.course, motion, machine))
+    return Made(command=command, motion=motion, seen=measure(plan.guide, motion, machine))
 
 
 def slowing(ratio: FloatArray, most: float = BEYOND) -> FloatArray:
-    """By how much to slow down for what is exceeded [-]: 1 where nothing is, `most` at most elsewhere."""
+    """(n,) factor on the speed for a measured `ratio` (n,) [-]: 1 where nothing is exceeded, `most` at most elsewhere."""
     slower = np.clip(BEYOND / np.sqrt(np.maximum(ratio, 1.0)), SLOWEST, most)
     return np.where(ratio > 1.0 + RATIO_ROUNDING, slower, 1.0)
 
 
 def slow_down(plan: P, machine: Machine) -> P:
-    """Slow a plan down until it keeps tolerance and limits."""
-    left = np.ones(plan.course.stretches, bool)
+    """Slow a plan down until it keeps tolerance and limits, or `ROUNDS` times."""
+    left = np.ones(plan.guide.runs, bool)
     for n in range(ROUNDS):
-        part = plan.pick(left)
-        made = make(part, machine)
+        chosen = plan.pick(left)
+        made = make(chosen, machine)
         wrong: Array = made.largest(made.seen.worst) > 1.0 + RATIO_ROUNDING
         if not wrong.any():
             break
-        slower = part.slower(made, machine, n).pick(wrong)
+        slower = chosen.slower(made, machine, n).pick(wrong)
         left[left] = wrong
         plan = plan.put(left, slower)
     return plan
 
 
 def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine) -> P:
-    """The fastest of a few plans of one course once they are slowed down, each stretch with what is most promising for it.
+    """The fastest of a few plans of one guide once they are slowed down, each run with what is most promising for it.
 
     times : (K, S) what the K plans promise [s]; slowed down they take longer
     """
@@ -137,7 +144,7 @@ def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine) -> 
 
 
 def _mixed(plans: Sequence[P], which: Array) -> P:
-    """Each stretch with its own (S,) of the plans."""
+    """Each run with its own (S,) of the plans."""
     mixed = plans[0]
     for k in range(1, len(plans)):
         if (which == k).any():

@@ -25,9 +25,9 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.bounds import filter_error, phase_lag
+from planner.constraints import filter_error, phase_lag
 from planner.corners.fir import overlap_time
-from planner.fir.guide import ChordGuide
+from planner.fir.chord_guide import ChordGuide
 from planner.machine import Machine
 
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
@@ -38,26 +38,45 @@ MEAN_OVER = 0.02
 
 
 def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """How far inside a circle of radius rho [mm] the filtered point runs at the speed v [mm/s]: exact."""
+    """(n,) how far inside a circle the filtered point runs [mm]: exact (module text).
+
+    rho    : (n,) radius [mm]
+    v      : (n,) speed [mm/s]
+    T1, T2 : (n,) filters [s]
+    """
     lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
     return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
 
 
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """Speed at which the filters' error is `tol` [mm], to second order; inf where the path is straight."""
-    return np.sqrt(filter_error(kappa, tol, (T1, T2)))
+    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm], to second order (par. 24); inf where the path is straight.
+
+    kappa  : (n,) curvature [1/mm]
+    T1, T2 : (n,) filters [s]
+    """
+    return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """Speed at which the filtered point lags by the angle phi [rad]; inf where the path is straight."""
-    return np.sqrt(phase_lag(kappa, phi, (T1, T2)))
+    """(n,) speed [mm/s] at which the filtered point lags by the angle phi [rad] (par. 26); inf where the path is straight.
+
+    kappa  : (n,) curvature [1/mm]
+    T1, T2 : (n,) filters [s]
+    """
+    return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
 
 
 def filter_lengths(
     guide: ChordGuide, speed: FloatArray, machine: Machine, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (S,) [s] for speeds (R,) on the chords: T1 = V/A and T1 T2 = V/J with the axes' limits along them, each times its margin
-    (S, 2), or both the same where V is too small to reach A."""
+    """T1 >= T2 (S,) [s] for the speeds on the chords (par. 19).
+
+    T1 = V/A and T1 T2 = V/J with the axes' limits along the chords, each times its margin, or both the same where V is too small to
+    reach A.
+
+    speed  : (R,) [mm/s]
+    margin : (S, 2) of T1 and of T1 T2 [-]
+    """
     along = speed[:, None] * np.abs(guide.direction)
     by_a, by_j = (
         guide.largest((along / machine.limits(q, guide.axes)).max(axis=1)) for q in ("acceleration", "jerk")
@@ -68,8 +87,12 @@ def filter_lengths(
 
 
 def v_sc(guide: ChordGuide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
-    """The paper's speed on each chord (R,) behind filters T1, T2 (S,) of the stretches."""
-    T1, T2 = T1[guide.stretch], T2[guide.stretch]
+    """(R,) the paper's speed on each chord [mm/s] (par. 29).
+
+    T1, T2 : (S,) filters of the runs [s]
+    phi    : phase lag [rad]
+    """
+    T1, T2 = T1[guide.run], T2[guide.run]
     by_filters = v_eps(guide.kappa, guide.tol, T1, T2), v_ph(guide.kappa, phi, T1, T2)
     return np.min([guide.feed, guide.v_acc, guide.v_jerk, *by_filters], axis=0)
 
@@ -77,9 +100,15 @@ def v_sc(guide: ChordGuide, T1: FloatArray, T2: FloatArray, phi: float) -> Float
 def first_speeds(
     guide: ChordGuide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """Speeds (R,) up to `most` (R,) to begin with, too fast rather than too slow: what either the curvature beside a chord or the
-    mean of the path allows, and corners for as long as the gap takes."""
-    local = np.minimum(guide.v_acc, v_eps(guide.kappa, guide.tol, T1[guide.stretch], T2[guide.stretch]))
+    """(R,) speeds to begin with [mm/s], too fast rather than too slow (module text).
+
+    What either the curvature beside a chord or the mean of the path allows, and corners for as long as the gap takes.
+
+    most         : (R,) largest speeds [mm/s]
+    acceleration : (A,) limits of the axes [mm/s2]
+    T1, T2       : (S,) filters of the runs [s]
+    """
+    local = np.minimum(guide.v_acc, v_eps(guide.kappa, guide.tol, T1[guide.run], T2[guide.run]))
     v = np.minimum(most, local)
     bent = np.flatnonzero(local < most)
     v[bent] = np.maximum(v[bent], _v_mean(guide, bent, most[bent], acceleration, T1, T2))
@@ -90,7 +119,7 @@ def _v_mean(
     guide: ChordGuide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
     """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows (module text)."""
-    run = guide.stretch[at]
+    run = guide.run[at]
     T1, T2 = T1[run], T2[run]
     second, fourth = (T1**2 + T2**2) / 12.0, (T1**4 + T2**4) / 80.0 + T1**2 * T2**2 / 24.0
     x, w = np.sqrt(fourth / second), second**2 / (2.0 * fourth)
@@ -102,7 +131,7 @@ def _v_mean(
         k = open_
         reach = np.minimum(
             v[k] * x[k], np.minimum(here[k] - begin[k], end[k] - here[k])
-        )  # the path ends at a stretch's ends
+        )  # the path ends at a run's ends
         D = guide_point(guide, here[k] - reach) + guide_point(guide, here[k] + reach) - 2.0 * middle[k]
         by_error = w[k] * np.linalg.norm(D, axis=1) / guide.tol[at[k]]
         over = np.maximum(by_error, (np.abs(D) / acceleration).max(axis=1) / x[k] ** 2)
@@ -122,7 +151,7 @@ def _slower_corners(
     if not len(chord):
         return by
     first = np.flatnonzero(np.diff(guide.corner[chord], prepend=-2))
-    at, run = chord[first], guide.stretch[chord[first]]
+    at, run = chord[first], guide.run[chord[first]]
     last = np.append(chord[first[1:] - 1], chord[-1])
     V = np.sqrt(most[at] * most[last])
     gap = T1[run] + T2[run] - overlap_time(guide.whole[at], V, guide.sin_half[at], T1[run], T2[run])
@@ -134,5 +163,5 @@ def _slower_corners(
 
 
 def guide_point(guide: ChordGuide, s: FloatArray) -> FloatArray:
-    """Points (n, A) of the chords at lengths (n,)."""
+    """(n, A) points of the chords [mm] at the lengths s (n,) from the start [mm]."""
     return np.stack([np.interp(s, guide.s, axis) for axis in guide.point.T], axis=1)

@@ -6,7 +6,7 @@ With w(t) the commanded velocity the filtered jerk is (docs/papers.md, universal
 
 constant but where an edge of the command (w jumps by Dw at t_e) is 0, T2, T1 or Td old. Between such times the motion is integrated
 exactly. So that nothing adds up over a long program, it is set anew every now and then, and where all filters have the same input,
-by superposition of the edges that still have an effect, on what the interval that was commanded Td ago contributes by itself:
+by superposition of the edges that still have an effect, on what the step that was commanded Td ago contributes by itself:
 
     p = p_e + w_e (t - t_e - Td/2) + sum Dw R(t - t_e),    v = w_e + sum Dw S(t - t_e),    a = sum Dw h(t - t_e).
 """
@@ -30,12 +30,12 @@ ANCHOR_EVERY = 32
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Filtered:
-    """L pieces of constant jerk, over the A axes and the course (column A), in S stretches.
+    """L pieces of constant jerk, over the A axes and the guide (column A), in S runs.
 
     t     : (L,) start of each piece [s]
     state : (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the piece [mm/s3]
-    first : (S+1,) first piece of each stretch
-    end   : (S,) when each stretch is over, its dwell too [s]
+    first : (S+1,) first piece of each run
+    end   : (S,) when each run is over, its dwell too [s]
     """
 
     t: FloatArray
@@ -54,7 +54,7 @@ class Filtered:
 
     @property
     def begin(self) -> FloatArray:
-        """(S,) start of each stretch [s]."""
+        """(S,) start of each run [s]."""
         return self.t[self.first[:-1]]
 
     @property
@@ -77,7 +77,7 @@ class _Command(NamedTuple):
 
 
 def superpose(command: Command) -> Filtered:
-    """Filter a command."""
+    """Filter a command: the motion behind T1 and T2 of each run, exact."""
     most = 4 * len(command.t) + len(command.begin)
     t, state = np.empty(most), np.empty((4, most, command.velocity.shape[1]))
     first = np.zeros(len(command.begin) + 1, np.int64)
@@ -87,7 +87,7 @@ def superpose(command: Command) -> Filtered:
 
 @njit(cache=True, error_model="numpy")
 def _superpose(command, t_out, state, first_out):
-    """Filter all stretches; returns the number of pieces."""
+    """Filter all runs; returns the number of pieces."""
     t, velocity = command.t, command.velocity
     axes = velocity.shape[1]
     now = np.zeros((4, axes))  # position, velocity, acceleration, jerk

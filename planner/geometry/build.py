@@ -95,7 +95,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
-    """Angles between unit vectors u1 and u2, (n, A) each, row by row (n,) [rad]. Exact to rounding near 0 and pi, unlike acos."""
+    """(n,) angles between the unit vectors u1 and u2 (n, A), row by row [rad]. Exact to rounding near 0 and pi, unlike acos."""
     return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
 
 
@@ -119,6 +119,7 @@ def _of_axes(arcs: Arcs, axis: Array) -> Arcs:
 
 
 def _check_coordinates(program: Program) -> None:
+    """Raise InputError for a coordinate beyond `COORDINATE_MAX`."""
     bad = np.flatnonzero(np.abs(program.end).max(axis=1, initial=0.0) > COORDINATE_MAX)
     if len(bad):
         block = int(bad[0])
@@ -161,6 +162,7 @@ def _arcs(program: Program, start: FloatArray, end: FloatArray, rows: Array) -> 
 def _tangents(
     start: FloatArray, end: FloatArray, length: FloatArray, arc: Array, arcs: Arcs
 ) -> tuple[FloatArray, FloatArray]:
+    """Unit tangents (M, A) at both ends of the segments."""
     first = (end - start) / length[:, None]
     last = first.copy()
     is_arc = arc >= 0
@@ -183,6 +185,7 @@ def _curvature_bound(arcs: Arcs) -> FloatArray:
 
 
 def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
+    """Programmed feed (M,) [mm/s] of the segments, at most `feed_max` of the machine."""
     feed = program.feed[block].copy()
     if machine.feed_max is not None:
         cut = program.kind[block] != Kind.RAPID

@@ -1,8 +1,8 @@
 """Arcs as chords, for motions that consist of straight legs and corners.
 
 A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices rise linearly along arc and
-chord alike. The sagitta is a given share of the tolerance of the arc, and is subtracted from the tolerance at the joints of the chords:
-corners rounded inside the polygon then keep the tolerance of the arc.
+chord alike. The sagitta is a given fraction of the tolerance of the arc, and is subtracted from the tolerance at the joints of the
+chords: corners rounded inside the polygon then keep the tolerance of the arc.
 """
 
 from __future__ import annotations
@@ -20,44 +20,48 @@ CHORD_ANGLE_MAX = np.pi / 4
 
 
 def chord_angle(radius: FloatArray, sagitta: FloatArray) -> FloatArray:
-    """Angle by which a chord with a given `sagitta` [mm] turns on an arc of a given `radius` [mm], (n,) each -> (n,) [rad]."""
+    """(n,) angle by which a chord turns [rad], at most `CHORD_ANGLE_MAX`.
+
+    radius  : (n,) of the arc [mm]
+    sagitta : (n,) largest distance of the chord from the arc [mm]
+    """
     # acos(1 - x) = 2 asin(sqrt(x/2)), which keeps its digits for small x
     return np.minimum(4.0 * np.arcsin(np.sqrt(np.minimum(sagitta / (2.0 * radius), 1.0))), CHORD_ANGLE_MAX)
 
 
-def arc_sagitta(toolpath: Toolpath, share: float) -> tuple[Array, FloatArray]:
+def arc_sagitta(toolpath: Toolpath, fraction: float) -> tuple[Array, FloatArray]:
     """Into how many chords each segment is cut.
 
-    share : sagitta over tolerance [-]
+    fraction : sagitta over tolerance [-]
 
     Returns the number of chords (M,), 1 for lines, and their largest distance from the segment (M,) [mm].
     """
     arcs, curved = toolpath.arcs, toolpath.arc >= 0
     count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
     row = toolpath.arc[curved]
-    budget = share * np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved]
+    budget = fraction * np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved]
     sweep = np.abs(arcs.rate[row]) * toolpath.length[curved]
     count[curved] = np.maximum(1, np.ceil(sweep / chord_angle(arcs.radius[row], budget) * (1.0 - 1e-9)))
     sagitta[curved] = 2.0 * arcs.radius[row] * np.sin(sweep / count[curved] / 4.0) ** 2
     return count, sagitta
 
 
-def chorded(toolpath: Toolpath, share: float, whole: Array) -> Toolpath:
+def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     """The same path with its arcs cut into chords.
 
-    share : sagitta over tolerance, 0 < share < 1 [-]
-    whole : (M,) True for arcs that stay arcs and get a full stop at both ends
+    fraction : sagitta over tolerance, 0 < fraction < 1 [-]
+    whole    : (M,) True for arcs that stay arcs and get a full stop at both ends
     """
-    count, sagitta = arc_sagitta(toolpath, share)
+    count, sagitta = arc_sagitta(toolpath, fraction)
     count[whole], sagitta[whole] = 1, 0.0
     cut = (toolpath.arc >= 0) & ~whole
     segment = np.repeat(np.arange(len(toolpath)), count)
     first = np.cumsum(count) - count
-    part = np.arange(len(segment)) - first[segment]
+    number = np.arange(len(segment)) - first[segment]  # of a chord within its segment
     start = toolpath.start[segment].copy()
-    inner = np.flatnonzero(part > 0)
+    inner = np.flatnonzero(number > 0)
     at = segment[inner]
-    along = toolpath.length[at] * part[inner] / count[at]
+    along = toolpath.length[at] * number[inner] / count[at]
     start[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(toolpath, at, along)
     end = np.vstack([start[1:], toolpath.end[-1:]])
     straight = toolpath.arc[segment] < 0
@@ -112,7 +116,11 @@ def parted_by_feed(toolpath: Toolpath) -> Toolpath:
 
 
 def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
-    """Points (n, A) relative to the centres of the arcs `segment` (n,), at their parameters x (n,) [mm]."""
+    """(n, A) points of arcs [mm], relative to their centres.
+
+    segment : (n,) the arcs, as segments of the toolpath
+    x       : (n,) their parameters [mm]
+    """
     arcs, row = toolpath.arcs, toolpath.arc[segment]
     angle = arcs.rate[row] * x
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]

@@ -1,7 +1,7 @@
-"""Legs: the straight or circular stretches between which corners are rounded.
+"""Legs: the straight lines and arcs between which corners are rounded.
 
-A leg is a maximal run of collinear lines, or one arc. Collinear lines are joined because where a CAM system cut a straight line
-into blocks must not change the motion: a corner may reach back over several short blocks of the same line.
+A leg is one arc, or all collinear lines that follow one another. Collinear lines are joined because where a CAM system cut a straight
+line into blocks must not change the motion: a corner may reach back over several short blocks of the same line.
 
 The kernels see one numpy record per leg (`leg_dtype`): a single array argument costs numba nothing to pass on, whereas a tuple
 of ten arrays costs ten reference counts per call, measured at 0.25 us against 0.01 us.
@@ -60,7 +60,7 @@ def leg_dtype(axes: int) -> np.dtype:
 
 
 def legs_of(toolpath: Toolpath) -> Legs:
-    """Join collinear lines; every other segment is a leg of its own."""
+    """The legs of a toolpath: collinear lines joined, every other segment a leg of its own."""
     line = toolpath.arc < 0
     joined = (toolpath.joint[1:-1] == Joint.SMOOTH) & line[:-1] & line[1:]
     turned = np.cumsum(np.where(joined, toolpath.theta[1:-1], 0.0))
@@ -84,7 +84,7 @@ def legs_of(toolpath: Toolpath) -> Legs:
 
 @njit(cache=True, error_model="numpy")
 def leg_point(legs, leg, x, out):
-    """Point and first three x-derivatives of a leg at x, into out (4, A)."""
+    """Point [mm] and first three x-derivatives of a leg at x [mm], into out (4, A); legs: records of `leg_dtype`."""
     data = legs[leg]
     axes = out.shape[1]
     if not data.round:
@@ -107,7 +107,7 @@ def leg_point(legs, leg, x, out):
 
 @njit(cache=True, error_model="numpy")
 def leg_tangent(legs, leg, x, out):
-    """First x-derivative of a leg at x, into out (A,)."""
+    """First x-derivative of a leg at x [mm], into out (A,); legs: records of `leg_dtype`."""
     data = legs[leg]
     if not data.round:
         for k in range(len(out)):

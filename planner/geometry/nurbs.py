@@ -29,14 +29,15 @@ from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind, PathControl, Program
 
-# Gauss points of an arc length, and parts of a knot span that they are applied to: good to 1e-9 of the butterfly's length (tested).
+# Gauss points of an arc length, and steps of a knot span that they are applied to: good to 1e-9 of the butterfly's length (tested).
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 GAUSS_NODES, GAUSS_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
-LENGTH_PARTS = 64
-# Chords: parts of a span to begin with, halvings at most, places at which the deviation of a chord is measured [share of the chord].
+LENGTH_STEPS = 64
+# Chords: how many a span has to begin with, halvings at most, places at which the deviation of a chord is measured [fraction of the
+# chord].
 CHORDS_MIN, HALVINGS = 4, 40
 MEASURED = (0.25, 0.5, 0.75)
-# The deviation between these places may be larger; chords stay below this share of what is allowed [-].
+# The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
 CHORD_SAFETY = 0.9
 NEWTON_STEPS = 30
 
@@ -105,7 +106,7 @@ class Nurbs:
         return np.array([spline(self.breaks[:-1], nu=power) / factorial(power) for power in powers])
 
     def at(self, u: FloatArray, *, before: bool = False) -> FloatArray:
-        """Point and derivatives by u at parameters (n,).
+        """Point and derivatives by u at the parameters u (n,).
 
         before : take the values just before a knot instead of just behind it
 
@@ -129,7 +130,7 @@ class Nurbs:
         return np.stack([r, r1, r2, r3], axis=1)
 
     def along(self, u: FloatArray, *, before: bool = False) -> FloatArray:
-        """Point [mm] and derivatives by the arc length at parameters (n,) -> (n, 4, A); `before` as in `at`."""
+        """(n, 4, A) point [mm] and derivatives by the arc length at the parameters u (n,); `before` as of `at`."""
         r, r1, r2, r3 = (self.at(u, before=before)[:, k] for k in range(4))
         sigma = np.linalg.norm(r1, axis=1)[:, None]
         sigma1 = (r1 * r2).sum(axis=1)[:, None] / sigma
@@ -140,7 +141,7 @@ class Nurbs:
         return np.stack([r, s1, s2, s3], axis=1)
 
     def length_between(self, u0: FloatArray, u1: FloatArray) -> FloatArray:
-        """Arc length between parameters u0 and u1 (n,), each pair within one span -> (n,) [mm]."""
+        """(n,) arc length between the parameters u0 and u1 (n,), each pair within one span [mm]."""
         u0, step = np.asarray(u0, float), np.asarray(u1, float) - u0
         inside = u0[:, None] + step[:, None] * GAUSS_NODES
         rate = np.linalg.norm(self.at(inside.ravel())[:, 1], axis=1).reshape(inside.shape)
@@ -149,8 +150,8 @@ class Nurbs:
     @cached_property
     def _lengths(self) -> tuple[FloatArray, FloatArray]:
         """Parameters, and the arc length up to them."""
-        parts = np.linspace(self.breaks[:-1], self.breaks[1:], LENGTH_PARTS, endpoint=False, axis=1).ravel()
-        u = np.append(parts, self.breaks[-1])
+        steps = np.linspace(self.breaks[:-1], self.breaks[1:], LENGTH_STEPS, endpoint=False, axis=1).ravel()
+        u = np.append(steps, self.breaks[-1])
         return u, np.concatenate([[0.0], np.cumsum(self.length_between(u[:-1], u[1:]))])
 
     @property
@@ -159,19 +160,19 @@ class Nurbs:
         return float(self._lengths[1][-1])
 
     def arc_length(self, u: FloatArray) -> FloatArray:
-        """Arc length from the start to parameters (n,) -> (n,) [mm]."""
+        """(n,) arc length from the start to the parameters u (n,) [mm]."""
         knots, length = self._lengths
-        part = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
-        return length[part] + self.length_between(knots[part], u)
+        n = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
+        return length[n] + self.length_between(knots[n], u)
 
     def parameter(self, s: FloatArray) -> FloatArray:
-        """Parameters at arc lengths (n,) [mm] -> (n,), by Newton's method within the span that holds each."""
+        """(n,) parameters at the arc lengths s (n,) [mm], by Newton's method within the step that holds each."""
         knots, length = self._lengths
-        part = np.clip(np.searchsorted(length, s, side="right") - 1, 0, len(knots) - 2)
-        low, high = knots[part], knots[part + 1]
-        u = low + (high - low) * (s - length[part]) / (length[part + 1] - length[part])
+        n = np.clip(np.searchsorted(length, s, side="right") - 1, 0, len(knots) - 2)
+        low, high = knots[n], knots[n + 1]
+        u = low + (high - low) * (s - length[n]) / (length[n + 1] - length[n])
         for _ in range(NEWTON_STEPS):
-            miss = length[part] + self.length_between(low, u) - s
+            miss = length[n] + self.length_between(low, u) - s
             if (np.abs(miss) <= 1e-13 * self.length).all():
                 break
             u = np.clip(u - miss / np.linalg.norm(self.at(u)[:, 1], axis=1), low, high)
@@ -179,18 +180,21 @@ class Nurbs:
 
     @cached_property
     def kinks(self) -> FloatArray:
-        """Parameters inside the domain at which the tangent jumps."""
+        """(k,) parameters inside the domain at which the tangent jumps."""
         inner = self.breaks[1:-1]
         tangents = [self.at(inner, before=side)[:, 1] for side in (True, False)]
         units = [t / np.linalg.norm(t, axis=1, keepdims=True) for t in tangents]
         return inner[turning_angle(*units) > COLLINEAR_ANGLE]
 
     def stations(self, sagitta: float) -> FloatArray:
-        """Parameters, all knots among them, between which the chords leave the curve by at most `sagitta` [mm]."""
+        """(k,) parameters, all knots among them, between which the chords leave the curve by at most `sagitta` [mm].
+
+        Raises InputError unless that is positive.
+        """
         if not sagitta > 0:
             raise InputError(f"chords with a deviation of {sagitta} mm; it must be positive")
-        parts = np.linspace(self.breaks[:-1], self.breaks[1:], CHORDS_MIN, endpoint=False, axis=1).ravel()
-        u = np.append(parts, self.breaks[-1])
+        ends = np.linspace(self.breaks[:-1], self.breaks[1:], CHORDS_MIN, endpoint=False, axis=1).ravel()
+        u = np.append(ends, self.breaks[-1])
         for _ in range(HALVINGS):
             wide = np.flatnonzero(self._deviation(u[:-1], u[1:]) > CHORD_SAFETY * sagitta)
             if not len(wide):
@@ -204,8 +208,8 @@ class Nurbs:
         chord = end - start
         size_sq = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
         worst = np.zeros(len(u0))
-        for share in MEASURED:
-            off = self.at(u0 + share * (u1 - u0))[:, 0] - start
+        for fraction in MEASURED:
+            off = self.at(u0 + fraction * (u1 - u0))[:, 0] - start
             along = np.clip((off * chord).sum(axis=1) / size_sq, 0.0, 1.0)
             worst = np.maximum(worst, np.linalg.norm(off - along[:, None] * chord, axis=1))
         return worst
@@ -215,6 +219,8 @@ class Nurbs:
 
         sagitta : largest distance of a chord from the curve [mm]; its ends are on the curve
         feed    : programmed feed [mm/s]
+
+        Raises InputError unless both are positive and finite.
         """
         if not 0 < feed < np.inf:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")

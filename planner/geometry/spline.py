@@ -1,4 +1,4 @@
-"""Splines: smooth curves that replace a run of blocks, as polynomials of degree five, one per span.
+"""Splines: smooth curves that replace legs and corners, in runs, as polynomials of degree five, one per span.
 
 On a span the point is sum_m coef[m] tau^m, tau in [0, 1]; it stands for the programmed path from the place `begin` to
 `begin + width`, counted along the legs from the start of the job [mm].
@@ -55,7 +55,7 @@ class Spline:
 
 
 def no_spline(axes: int) -> Spline:
-    """A spline without runs."""
+    """The spline of a path on which no corner is replaced, over `axes` axes."""
     none = np.zeros(0, np.int64)
     return Spline(
         first=np.zeros(1, np.int64),
@@ -70,7 +70,7 @@ def no_spline(axes: int) -> Spline:
 
 @njit(cache=True, error_model="numpy")
 def span_point(spans, i, tau, out):
-    """Point and three tau-derivatives of span i at tau, into out (4, A)."""
+    """Point [mm] and three tau-derivatives of span i at tau in [0, 1], into out (4, A); spans: records of `span_dtype`."""
     coef = spans[i].coef
     for k in range(out.shape[1]):
         value, first, second, third = 0.0, 0.0, 0.0, 0.0
@@ -84,7 +84,7 @@ def span_point(spans, i, tau, out):
 
 @njit(cache=True, error_model="numpy")
 def span_tangent(spans, i, tau, out):
-    """First tau-derivative of span i at tau, into out (A,)."""
+    """First tau-derivative of span i at tau in [0, 1], into out (A,); spans: records of `span_dtype`."""
     coef = spans[i].coef
     for k in range(len(out)):
         value = 0.0

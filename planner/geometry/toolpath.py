@@ -7,7 +7,7 @@ Segment i runs from joint i to joint i+1. Every segment is a curve over its own 
 
 `rate` [rad/mm] is signed; e1 points from the centre to the start, e2 is e1 turned by 90 degrees counter-clockwise about the
 plane's normal; `drift` is the helix' rise per mm. Programs print arcs with rounded numbers, so that start and end lie on
-circles of slightly different radius; the gap is spread over the arc as a part of `drift` inside the plane, which makes the
+circles of slightly different radius; the gap is spread over the arc as a component of `drift` inside the plane, which makes the
 curve smooth and lets it end exactly on the programmed point. x is the arc length but for that gap (relative error gap/length),
 so nothing downstream may assume |dp/dx| = 1 on arcs.
 """
@@ -71,7 +71,7 @@ class Toolpath:
     theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
-    zero_length     : blocks that move nowhere, kept as events
+    zero_length     : (Z,) blocks that move nowhere, kept as events
     """
 
     source: str

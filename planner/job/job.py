@@ -17,7 +17,7 @@ from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
 from planner.delivery.periods import settled
 from planner.feedrate.solution import Status
-from planner.geometry.passing import segments_at
+from planner.geometry.point_matching import SegmentsInOrder
 from planner.geometry.toolpath import Toolpath
 from planner.job.notes import job_notes
 from planner.job.plan import Plan
@@ -26,6 +26,7 @@ from planner.job.stages import Stages
 from planner.job.trace import Tell
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
+from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
@@ -132,11 +133,20 @@ class Job:
         machine, toolpath = self.real
         with self.stage("sample"):
             motion = self.settled(motion, not_limited)
-            trajectory = self._named(sample_motion(motion, machine.dt))
-        self.motion_of[trajectory] = motion
+            trajectory = sample_motion(motion, machine.dt)
+            places = SegmentsInOrder(toolpath)
+
+            def take(chunk: Trajectory) -> None:
+                places.take(chunk.position, chunk.feed)
+
+            if isinstance(trajectory, TrajectoryOnDemand):
+                judged: Trajectory = trajectory.heard_by(take)
+            else:
+                take(trajectory)
+                judged = trajectory
         with self.stage("verify") as progress:
             verdict = verify(
-                trajectory,
+                judged,
                 toolpath,
                 machine,
                 motion=motion,
@@ -144,6 +154,8 @@ class Job:
                 not_limited=not_limited,
                 progress=progress,
             )
+        trajectory = self._named(trajectory, places)
+        self.motion_of[trajectory] = motion
         return trajectory, verdict
 
     def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
@@ -151,16 +163,19 @@ class Job:
         machine, toolpath = self.real
         return settled(motion, toolpath, machine, "jerk" not in not_limited)
 
-    def _named(self, trajectory: Trajectory) -> Trajectory:
+    def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
         method's own blocks and a note."""
-        _, toolpath = self.real
-        segment = segments_at(toolpath, trajectory.position, trajectory.feed)
-        if segment is None:
+        toolpath, runs = self.real[1], places.runs()
+        if runs is None:
             self.note(
                 "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
             )
             return trajectory
+        first, segment = runs
+        if isinstance(trajectory, TrajectoryOnDemand):
+            return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
+        segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))
         return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
 
     def plan(

@@ -108,7 +108,8 @@ class DearCorners:
 class PriceList:
     """What limits and tolerance cost: derivatives of the cycle time T, negative where more of a limit saves time.
 
-    limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]
+    limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]; of limits of one's own
+                dT/d(least bound on the path), in their own units, with the bound elsewhere in proportion
     feed      : dT/d(ln feed override) [s]
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known
     saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE` more "tolerance" [s]

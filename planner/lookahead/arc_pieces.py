@@ -25,6 +25,9 @@ def spline_at_rest(
     position : (n + moves, A) points before and after every piece, move after move [mm]
     last     : (n + moves,) True at the last point of each move
     """
+    if not len(duration):
+        empty = np.empty((0, position.shape[1]))
+        return empty, empty, empty
     from scipy.linalg import solve_banded  # 0.2 s
 
     start = np.flatnonzero(~last)  # the points that a piece starts at

@@ -17,27 +17,27 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.constraints import filter_error
 from planner.constraints.assemble import feedrate_problem
-from planner.corners.allocation import filter_rate
-from planner.corners.elements import element_point, to_arc_length
+from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.geometry.toolpath import Toolpath
-from planner.lookahead.look_ahead import LegLimits, Passage
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import Machine
 from planner.path.samples import PathSamples
 
-PARTS = 4  # of a grid interval, for its samples: peaks are then good to the fourth order (module text)
-# Limits along blocks that differ by less than this share are the same [-]: coordinates rounded to 1e-9 of a block's length.
+STEPS = 4  # in which a grid interval is sampled: peaks are then good to the fourth order (module text)
+# Limits along blocks that differ by less than this fraction are the same [-]: coordinates rounded to 1e-9 of a block's length.
 SAME = 1e-9
 QUANTITIES = ("acceleration", "jerk")
 
 
 class CornerSpeeds(NamedTuple):
-    """The largest constant speed in each of R+1 joints' corners.
+    """The largest constant speeds in the corners of a path of R legs.
 
     speed      : (R+1,) [mm/s]; inf where there is no corner
-    limited_by : (R+1,) name of the limit
+    limited_by : (R+1,) name of the limit that holds it
     """
 
     speed: FloatArray
@@ -45,7 +45,7 @@ class CornerSpeeds(NamedTuple):
 
 
 def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
-    """The largest speed at which each corner of a path can be run through from end to end."""
+    """The largest speed at which each corner of a sampled path can be run through from end to end (module text)."""
     axes = samples.path.toolpath.axes
     limits = np.array([machine.limits("acceleration", axes), machine.limits("jerk", axes)])
     problem = feedrate_problem(samples, machine.with_own(()))
@@ -54,7 +54,7 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     joint = ~samples.element[at]
     bends = np.zeros((len(at), 2))
     which = np.zeros((len(at), 2), np.int64)
-    on = CornerIntervals(*samples.table, samples.element[at], samples.w0[at], samples.w1[at])
+    on = ElementIntervals(*samples.table, samples.element[at], samples.w0[at], samples.w1[at])
     _bends(on, limits, bends, which)
     ends = np.where(problem.feed_sq_max[at] <= problem.feed_sq_max[at + 1], at, at + 1)
     with np.errstate(divide="ignore"):
@@ -80,7 +80,7 @@ class CornerChain(NamedTuple):
     legs    : what is free between two joints, each with what the corners beside it took of their legs
     passage : of every joint
     joint   : (n+1,) the path's joint if it is a corner, -1 otherwise
-    run     : (n,) which run between full stops a leg belongs to
+    run     : (n,) run between full stops that a leg belongs to
     begin   : (n,) where each leg begins, or the corner before it [mm]
     """
 
@@ -103,7 +103,7 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
     run = np.searchsorted(samples.piece, at, side="right") - 1
     joint = np.where(element < 0, ~element, -1)
     limits = _block_limits(path.toolpath, machine)[:, samples.segment[at]]
-    # Where a line is cut into blocks must not part it, and the directions of its blocks differ by rounding.
+    # Blocks that cut a line must not make two legs of it, and their directions differ by rounding.
     other = (np.abs(np.diff(limits)) > SAME * limits[:, 1:]).any(axis=0) & (joint[1:] < 0)
     change = (np.diff(run) != 0) | (np.diff(joint) != 0) | other
     first = np.insert(np.flatnonzero(change) + 1, 0, 0)
@@ -113,7 +113,7 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
     corner = joint >= 0
     bare = (corner[:-1] & corner[1:]) | ((np.diff(run) != 0) & (corner[:-1] | corner[1:]))
     if bare.any() or corner[0] or corner[-1]:
-        raise ValueError("corner_chain: corners must leave a part of every leg free")
+        raise ValueError("corner_chain: corners must leave something of every leg free")
 
     leg = np.flatnonzero(~corner)
     v, a, j = limits[:, leg]
@@ -144,31 +144,26 @@ def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
     by them."""
     v, a, j = block_limits(toolpath, machine)
     if machine.fir is not None:
-        a = np.minimum(a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_rate(machine))
+        a = np.minimum(
+            a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_error.rate(machine)
+        )
     return np.stack([v, a, j])
-
-
-class CornerIntervals(NamedTuple):
-    """Grid intervals on corners: where the kernels evaluate the path (corners/elements.py)."""
-
-    legs: Array
-    corners: Array
-    spans: Array
-    element: Array
-    w0: FloatArray
-    w1: FloatArray
 
 
 @njit(cache=True, error_model="numpy")
 def _bends(on, limits, bends, which):
-    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and the axes k into which (n, 2)."""
+    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and their axes k into which (n, 2).
+
+    on     : `ElementIntervals`
+    limits : (2, A) accelerations and jerks of the axes
+    """
     axes = limits.shape[1]
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
-    values = np.empty((2, axes, PARTS + 1))
+    values = np.empty((2, axes, STEPS + 1))
     for i in range(len(on.element)):
         w_ref = 0.5 * (on.w0[i] + on.w1[i])
-        for p in range(PARTS + 1):
-            w = on.w0[i] + (on.w1[i] - on.w0[i]) * p / PARTS
+        for p in range(STEPS + 1):
+            w = on.w0[i] + (on.w1[i] - on.w0[i]) * p / STEPS
             element_point(on.legs, on.corners, on.spans, on.element[i], w, w_ref, work, here)
             to_arc_length(here)
             for k in range(axes):
@@ -177,9 +172,9 @@ def _bends(on, limits, bends, which):
             for k in range(axes):
                 g = values[q, k]
                 largest, second = 0.0, 0.0
-                for p in range(PARTS + 1):
+                for p in range(STEPS + 1):
                     largest = max(largest, abs(g[p]))
-                    if 0 < p < PARTS:
+                    if 0 < p < STEPS:
                         second = max(second, abs(g[p - 1] - 2.0 * g[p] + g[p + 1]))
                 ratio = (largest + second / 8.0) / limits[q, k]
                 if ratio > bends[i, q]:

@@ -25,15 +25,15 @@ from planner.geometry.chords import arc_point
 from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Toolpath
 from planner.lookahead.arc_pieces import spline_at_rest
-from planner.lookahead.look_ahead import LegLimits, Passage
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import ENTRY, PHASES, ZERO, corner_at, leg_end, leg_phases, phase_times_of
 
 # A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius.
 ARC_PIECE = 0.01
-# Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this share
-# of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets in, and
-# 2 kappa a^2 where the acceleration is constant.
-ARC_PARTS, ARC_ACCURACY = 16, 1e-4
+# Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this
+# fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets
+# in, and 2 kappa a^2 where the acceleration is constant.
+ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
 # Shortest piece of all [s]: at 1000 mm/s it is 1e-13 mm long.
 SHORTEST = 1e-16
 # Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
@@ -59,17 +59,23 @@ class PieceRows(NamedTuple):
 
 
 class CornerPieces(NamedTuple):
-    """L pieces of constant jerk, and the toolpath's segment (L,) that each belongs to."""
+    """L pieces of constant jerk.
+
+    rows    : what the kernels know of them
+    segment : (L,) segment of the toolpath that each belongs to
+    """
 
     rows: PieceRows
     segment: Array
 
 
 def corner_pieces(passage: Passage, limits: LegLimits, path: Legs, dwell: FloatArray) -> CornerPieces:
-    """The motion of a look-ahead.
+    """The motion of a look-ahead over n legs, in pieces (module text).
 
-    path  : the same legs with their segments
-    dwell : (n+1,) standstill at each joint [s]
+    passage : what was chosen at the n+1 joints
+    limits  : of the legs
+    path    : the same legs with their segments
+    dwell   : (n+1,) standstill at each joint [s]
     """
     rows = _empty(_emit(passage.table, limits.table, dwell, _empty(0)))
     _emit(passage.table, limits.table, dwell, rows)
@@ -117,6 +123,7 @@ def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[
 
 
 def _empty(count: int) -> PieceRows:
+    """Room for so many pieces."""
     return PieceRows(
         joint=np.zeros(count, np.int64),
         leg=np.zeros(count, np.int64),
@@ -159,10 +166,10 @@ def _emit(ways, legs, dwell, rows):
             T1, T2 = phase_times_of(way.V, way.p, way.q)
             state[0, 0], state[0, 1] = -reach, way.V
             bend = way.V / (T1 * T2)
-            for part in range(4):  # jerk +, half of the plateau; half of the plateau, jerk -
-                state[1, 3] = bend if part == 0 else (-bend if part == 3 else 0.0)
+            for phase in range(4):  # jerk +, half of the plateau; half of the plateau, jerk -
+                state[1, 3] = bend if phase == 0 else (-bend if phase == 3 else 0.0)
                 state[0, 3] = -state[1, 3]
-                n = _put(n, T2 if part in (0, 3) else 0.5 * (T1 - T2), k, k - 1 + part // 2, state, rows)
+                n = _put(n, T2 if phase in (0, 3) else 0.5 * (T1 - T2), k, k - 1 + phase // 2, state, rows)
         elif lasting > 0.0 and way.kind == ENTRY:
             state[0, 0], state[0, 1], state[0, 2] = -reach, way.V, -A
             state[0, 3] = state[1, 3] = A / lasting
@@ -199,10 +206,10 @@ def _emit_arc(n, k, leg, phases, state, rows):
         moved = phase * (two[1] + phase * (0.5 * two[2] + phase * two[3] / 6.0))
         accuracy = max(np.sqrt(abs(jerk) / (3.0 * leg.v)), abs(two[2]) / (2.45 * leg.v))
         accuracy /= np.sqrt(ARC_ACCURACY)
-        parts = max(ARC_PARTS, 1 + int(max(leg.turning * moved / ARC_PIECE, phase * accuracy)))
-        parts = min(parts, int(phase / ARC_SHORTEST))
-        for _ in range(parts):
-            n = _put(n, phase / parts, k, k, state, rows)
+        pieces = max(ARC_PIECES_MIN, 1 + int(max(leg.turning * moved / ARC_PIECE, phase * accuracy)))
+        pieces = min(pieces, int(phase / ARC_SHORTEST))
+        for _ in range(pieces):
+            n = _put(n, phase / pieces, k, k, state, rows)
             if pending > 0.0 and n <= len(rows.duration):
                 rows.duration[n - 1] += pending
                 rows.after[n - 1, 0] = began

@@ -15,19 +15,20 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import normal_limit
+from planner.constraints import filter_error, normal_limit
 from planner.corners import kinematic as corner
-from planner.corners.allocation import error_rate, filter_rate
+from planner.corners.allocation import error_rate
 from planner.corners.sharing import share_legs
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.lookahead.look_ahead import LegLimits, Passage, capped, needed
+from planner.lookahead.look_ahead import capped, needed
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import Machine
 
-# Arcs that are run whole get this share of their limits [-]: their cubic pieces exceed the arc's accelerations by up to 2e-4
+# Arcs that are run whole get this fraction of their limits [-]: their cubic pieces exceed the arc's accelerations by up to 2e-4
 # (corner_pieces.ARC_PIECE).
 ARC_LIMITS = 1.0 - 3e-4
 
@@ -43,7 +44,7 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
     if machine.fir is not None:
         tolerance = toolpath.tolerance[path.first]
-        a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_rate(machine))
+        a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_error.rate(machine))
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
     return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
@@ -52,8 +53,13 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
 def candidates(
     path: Legs, toolpath: Toolpath, legs: LegLimits, machine: Machine, start_stop: float
 ) -> list[Passage]:
-    """Zero entry acceleration, entry deceleration and, if `start_stop` [mm/s] is not 0, a step of velocity at the vertex, as fast as
-    tolerance, limits and the feeds of both legs allow. Joints without a corner are passed straight on by every candidate."""
+    """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, at n+1 joints.
+
+    Each is as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints without a corner are passed
+    straight on by every candidate.
+
+    start_stop : step of velocity that the drives make from standstill [mm/s]; 0 for none, then there are two candidates
+    """
     at = path.first
     turns = (toolpath.joint[at] == Joint.CORNER) & (toolpath.theta[at] >= COLLINEAR_ANGLE)
     bare = np.where(turns | (toolpath.joint[at] == Joint.STOP), JointKind.STOP, JointKind.PASS)
@@ -72,7 +78,7 @@ def candidates(
 
 
 def fitted(passage: Passage, legs: LegLimits) -> Passage:
-    """A candidate slowed down to what its legs have room for; a leg is shared where both of its corners would be equally fast."""
+    """A candidate slowed down to what its n legs have room for; a leg is divided where both of its corners would be equally fast."""
     longest = np.minimum(np.append(legs.length, np.inf), np.insert(legs.length, 0, np.inf))
     wanted = np.minimum(needed(passage, legs), longest)
     ease = np.divide(passage.V**2, wanted, out=np.ones(len(wanted)), where=wanted > 0)

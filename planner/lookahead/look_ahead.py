@@ -23,19 +23,16 @@ Everything is linear in the number of joints.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
+from planner.lookahead.passage import WAY, LegLimits, Passage, passage_of
 from planner.lookahead.ramps import (
     ENTRY,
-    LEG,
     PASS,
     PHASES,
-    WAY,
     ZERO,
     corner_at,
     gain_max,
@@ -51,79 +48,8 @@ BISECTIONS = 60  # of a speed's bracket: to its last digit
 SPEED_ROUNDING = 4e-16
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class LegLimits:
-    """Limits of n legs.
-
-    length  : (n,) from joint to joint, with what corners take of it [mm], > 0
-    v       : (n,) largest speed [mm/s]: programmed feed and axis speeds
-    a, j    : (n,) acceleration and jerk along the leg [mm/s2], [mm/s3]
-    turning : (n,) of legs that are run as arcs from rest to rest [rad/mm], 0 on others; None if there are none
-    """
-
-    length: FloatArray
-    v: FloatArray
-    a: FloatArray
-    j: FloatArray
-    turning: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        if self.turning is None:
-            object.__setattr__(self, "turning", np.zeros(len(self.length)))
-        for name in ("length", "v", "a", "j", "turning"):
-            freeze(self, name, np.float64, (len(self.length),))
-
-    def __len__(self) -> int:
-        return len(self.length)
-
-    @cached_property
-    def table(self) -> Array:
-        """(n,) records `LEG`, the same for the kernels."""
-        return _table(self, LEG)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Passage:
-    """One way of passing each of the n+1 joints; the first and the last are stops.
-
-    kind    : (n+1,) `JointKind`
-    V       : (n+1,) speed [mm/s], 0 at stops; of candidates the largest
-    p, q, r : (n+1,) parameters of the kind; r may be left out where no corner is of constant speed
-    """
-
-    kind: Array
-    V: FloatArray
-    p: FloatArray
-    q: FloatArray
-    r: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        freeze(self, "kind", np.int64, (None,))
-        if self.r is None:
-            object.__setattr__(self, "r", np.zeros(len(self.kind)))
-        for name in ("V", "p", "q", "r"):
-            freeze(self, name, np.float64, (len(self.kind),))
-
-    @cached_property
-    def table(self) -> Array:
-        """(n+1,) records `WAY`, the same for the kernels."""
-        return _table(self, WAY)
-
-
-def _table(record: LegLimits | Passage, dtype: np.dtype) -> Array:
-    names = dtype.names or ()
-    table = np.empty(len(getattr(record, names[0])), dtype)
-    for name in names:
-        table[name] = getattr(record, name)
-    return table
-
-
-def _passage(ways: Array) -> Passage:
-    return Passage(**{name: ways[name] for name in WAY.names or ()})
-
-
 def look_ahead(legs: LegLimits, candidates: Sequence[Passage], k: float = 1.0) -> tuple[Passage, FloatArray]:
-    """The fastest choice of a candidate or a stop at every joint, and when (n+1,) the motion is past each joint's corner [s].
+    """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each joint's corner [s].
 
     Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the corners beside them allow.
 
@@ -137,22 +63,27 @@ def look_ahead(legs: LegLimits, candidates: Sequence[Passage], k: float = 1.0) -
         _sweep(way, legs.table, k)
     rows["V"][1:, straight] = wished["V"][:, straight]
     ways, time = _choose(rows, straight, legs.table, k)
-    return _passage(ways), time
+    return passage_of(ways), time
 
 
 def swept(legs: LegLimits, passage: Passage, k: float = 1.0) -> Passage:
-    """The same ways with the largest speeds at which every leg can be run."""
+    """The same ways, lowered to the largest speeds at which every leg can be run.
+
+    k : factor of the short-segment rule, 0 < k <= 1
+    """
     ways = passage.table.copy()
     _sweep(ways, legs.table, k)
-    return _passage(ways)
+    return passage_of(ways)
 
 
 def capped(passage: Passage, legs: LegLimits, room: FloatArray) -> Passage:
-    """The same candidates, slowed down until each needs at most `room` (n+1,) of both legs [mm], ramps included, and the ramps
-    stay below the legs' speeds."""
+    """The same candidates, slowed down until they have room and their ramps stay below the legs' speeds.
+
+    room : (n+1,) what each may need of the leg before it and of the one behind, ramps included [mm]
+    """
     ways = passage.table.copy()
     _cap(ways, legs.table, room)
-    return _passage(ways)
+    return passage_of(ways)
 
 
 def needed(passage: Passage, legs: LegLimits) -> FloatArray:
@@ -181,6 +112,7 @@ def _feasible(one, other, leg, k, slack):
 
 @njit(cache=True, error_model="numpy")
 def _needed(ways, legs):
+    """(n+1,) length that each of the ways needs of its legs [mm]."""
     out = np.zeros(len(ways))
     for i in range(1, len(ways) - 1):
         way = ways[i]
@@ -191,6 +123,7 @@ def _needed(ways, legs):
 
 @njit(cache=True, error_model="numpy")
 def _cap(ways, legs, room):
+    """Lower the speeds of the ways, in place, as `capped` says."""
     for i in range(1, len(ways) - 1):
         way = ways[i]
         low, high = 0.0, way.V
@@ -346,6 +279,7 @@ def _choose(rows, straight, legs, k):
 
 @njit(cache=True, error_model="numpy")
 def _moves(ways, legs, duration, jerk):
+    """Write durations and jerks of `moves` into duration and jerk (n, 8)."""
     phases = np.empty((2, PHASES))
     for i in range(len(legs)):
         one = leg_end(ways[i], ways[i].V, legs[i].j, True)

@@ -1,5 +1,7 @@
 """One leg of a look-ahead between two corners: how much speed it can gain, and how fast it is run.
 
+The kernels take legs and ways to pass a joint as records `LEG` and `WAY` (lookahead/passage.py).
+
 On a leg with the limits a, j along it the motion runs from (V1, A1) to (V2, -A2). A ramp from (V, A) to a speed W with zero
 acceleration is the end of one that began with zero acceleration at V' = V - A^2/(2j), `pre` = V' A/j + A^3/(6 j^2) before:
 
@@ -44,18 +46,14 @@ class JointKind(IntEnum):
 
 STOP, PASS, ZERO, ENTRY, CONSTANT = (int(kind) for kind in JointKind)  # numba reads plain integers
 
-# The kernels' records of a leg and of a way to pass a joint (look_ahead.LegLimits, look_ahead.Passage).
-LEG = np.dtype([(name, np.float64) for name in ("length", "v", "a", "j", "turning")])
-WAY = np.dtype([("kind", np.int64), *((name, np.float64) for name in ("V", "p", "q", "r"))])
-
 
 class End(NamedTuple):
-    """One end of a leg, where the corner at it is over.
+    """One end of a leg, where the corner at it is over (module text).
 
     corner : length that the corner takes of the leg [mm]
     A      : acceleration away from the corner [mm/s2]
-    start  : V' [mm/s]
-    pre    : [mm]
+    start  : V', speed at which a ramp would have begun without acceleration [mm/s]
+    pre    : length of that ramp before this end [mm]
     top    : W = V + A^2/(2j), the lowest speed without acceleration [mm/s]
     ramp   : length of the ramp up to it [mm]
     """
@@ -74,7 +72,10 @@ entry_acceleration_of = njit(cache=True, error_model="numpy")(entry_acceleration
 
 @njit(cache=True, error_model="numpy")
 def gain_max(start, distance, a, j):
-    """By how much the speed can grow at most [mm/s] over a distance [mm] from `start`, with zero acceleration at both ends."""
+    """By how much the speed can grow at most [mm/s] over a distance [mm] from `start` [mm/s], with zero acceleration at both ends.
+
+    a, j : limits of acceleration and jerk along the leg [mm/s2], [mm/s3]
+    """
     if distance >= (2.0 * start + a * a / j) * a / j:
         mean = start + 0.5 * a * a / j  # x^2/2 + mean x = a distance - start a^2/j
         right = 2.0 * (a * distance - start * a * a / j)
@@ -92,7 +93,10 @@ def gain_max(start, distance, a, j):
 
 @njit(cache=True, error_model="numpy")
 def ramp(start, gain, a, j):
-    """Length [mm] and time [s] from the speed `start` to W = start + gain with zero acceleration at both ends, and dU/dW."""
+    """Length U [mm] and time [s] from the speed `start` to W = start + gain [mm/s] with zero acceleration at both ends, and dU/dW [s].
+
+    a, j : limits of acceleration and jerk along the leg [mm/s2], [mm/s3]
+    """
     if gain <= a * a / j:
         time, peak = 2.0 * np.sqrt(gain / j), np.sqrt(j * gain)
     else:
@@ -102,7 +106,11 @@ def ramp(start, gain, a, j):
 
 @njit(cache=True, error_model="numpy")
 def corner_at(way, V, behind):
-    """Start deceleration A [mm/s2], the length [mm] that it takes of the leg before or `behind`, and duration [s] of a corner at V."""
+    """A corner passed at V [mm/s]: start deceleration A [mm/s2], length [mm] that it takes of a leg, duration [s].
+
+    way    : record `WAY`
+    behind : True for the leg behind the corner, False for the one before
+    """
     if V <= 0.0 or way.kind in (STOP, PASS):
         return 0.0, 0.0, 0.0
     if way.kind == CONSTANT:
@@ -116,7 +124,11 @@ def corner_at(way, V, behind):
 
 @njit(cache=True, error_model="numpy")
 def leg_end(way, V, j, behind):
-    """The `End` of a leg with jerk j at a joint passed at V; `behind` the joint, or before it."""
+    """The `End` of a leg with jerk j [mm/s3] at a joint passed at V [mm/s].
+
+    way    : record `WAY`
+    behind : True for the leg behind the joint, False for the one before
+    """
     A, length, _ = corner_at(way, V, behind)
     lost, time = 0.5 * A * A / j, A / j
     pre = time * (V - lost) + A * time * time / 6.0
@@ -125,7 +137,9 @@ def leg_end(way, V, j, behind):
 
 @njit(cache=True, error_model="numpy")
 def leg_top(one, other, leg):
-    """Highest speed on a leg, how far it is above each end's V', and the length that is left to be run at it [mm].
+    """Highest speed W on a leg [mm/s], how far it is above each end's V' [mm/s], and the length that is left to be run at it [mm].
+
+    one, other, leg : `End`, `End`, record `LEG`
 
     The unknown is how far the speed is above the higher end, not the speed itself: a gain of 1e-10 mm/s is lost in the rounding of
     100 mm/s, but takes 2e-8 s at 1e6 mm/s3.
@@ -161,7 +175,7 @@ def leg_top(one, other, leg):
 
 @njit(cache=True, error_model="numpy")
 def leg_time(one, other, leg):
-    """Shortest time [s] of a leg between its ends."""
+    """Shortest time [s] of a leg (record `LEG`) between its ends (`End`)."""
     W, first, second, rest = leg_top(one, other, leg)
     time = ramp(one.start, first, leg.a, leg.j)[1] + ramp(other.start, second, leg.a, leg.j)[1]
     return time - (one.A + other.A) / leg.j + (rest / W if rest > 0.0 else 0.0)
@@ -169,15 +183,15 @@ def leg_time(one, other, leg):
 
 @njit(cache=True, error_model="numpy")
 def leg_phases(one, other, leg, out):
-    """Durations [s] and jerks [mm/s3] of a leg's phases, into out (2, 7)."""
+    """Durations [s] and jerks [mm/s3] of the seven phases of a leg (record `LEG`) between its ends (`End`), into out (2, 7)."""
     W, first, second, rest = leg_top(one, other, leg)
     a, j = leg.a, leg.j
     for side in range(2):
         x, A = (first, one.A) if side == 0 else (second, other.A)
         peak = min(a, np.sqrt(j * x))
         held = x / a - a / j if x > a * a / j else 0.0
-        for part in range(3):
-            f = part if side == 0 else PHASES - 1 - part
-            out[0, f] = ((peak - A) / j, held, peak / j)[part]
-            out[1, f] = (j, 0.0, -j)[part]
+        for phase in range(3):
+            f = phase if side == 0 else PHASES - 1 - phase
+            out[0, f] = ((peak - A) / j, held, peak / j)[phase]
+            out[1, f] = (j, 0.0, -j)[phase]
     out[0, 3], out[1, 3] = (rest / W if rest > 0.0 else 0.0), 0.0

@@ -19,12 +19,16 @@ from planner.corners.allocation import error_rate
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
-AT_REST = 1e-12  # an axis with a smaller share of the direction does not limit; below the rounding of unit vectors [-]
+AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
 PHASES = 7  # a jerk-limited move from rest to rest
 
 
 def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> FloatArray:
-    """Shortest times (n,) [s] from rest to rest over `length` (n,) [mm] with limits v, a, j (n,)."""
+    """(n,) shortest times from rest to rest [s] (module text).
+
+    length  : (n,) [mm]
+    v, a, j : (n,) limits of speed, acceleration and jerk along the block [mm/s], [mm/s2], [mm/s3]
+    """
     peak = _peak(length, v, a, j)
     return length / peak + np.where(peak < a**2 / j, 2 * np.sqrt(peak / j), peak / a + a / j)
 
@@ -32,7 +36,11 @@ def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: Floa
 def rest_to_rest_phases(
     length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Durations [s] and jerks [mm/s3], each (n, 7), of the same moves."""
+    """Durations [s] and jerks along the block [mm/s3], each (n, 7), of the moves of `rest_to_rest_times`.
+
+    length  : (n,) [mm]
+    v, a, j : (n,) limits as there
+    """
     peak = _peak(length, v, a, j)
     largest = np.minimum(a, np.sqrt(peak * j))
     rise = largest / j
@@ -51,7 +59,7 @@ def _peak(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> Fl
 
 
 def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Limits v, a, j (M,) along each segment such that every axis keeps its own, wherever on the segment.
+    """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment such that every axis keeps its own, wherever on the segment.
 
     On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest axis limit must hold
     for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with

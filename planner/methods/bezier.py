@@ -1,6 +1,6 @@
 """Method `bezier`: paper 002. Rational Bezier pairs, the error allocation of eq. (18)-(20), S-curves between corners at constant speed.
 
-1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the share of the tolerance
+1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the fraction of the tolerance
    that eq. (20) gives it (three sources: rounding, chord error, filters that follow).
 2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes' limits, jerk included, allow
    from its one end to the other (lookahead/constant_speed_corners.py).
@@ -35,9 +35,9 @@ from planner.optimal.tighten import slowed
 from planner.path.samples import PathSamples, sample_path
 from planner.sensitivity.closed_form import corner_apexes, corners_at
 
-# The share of every leg that its corners leave free, to change the speed on it [-]. Circle of chords 5.5 s with 0 (all corners as slow
-# as the first), 2.62 with 0.2, 2.54 with 0.3, 2.71 with 0.4; 100 random paths 2.4, 2.4, 2.8, 3.2 % faster than stopping.
-FREE_SHARE = 0.3
+# The fraction of every leg that its corners leave free, to change the speed on it [-]. Circle of chords 5.5 s with 0 (all corners as
+# slow as the first), 2.62 with 0.2, 2.54 with 0.3, 2.71 with 0.4; 100 random paths 2.4, 2.4, 2.8, 3.2 % faster than stopping.
+FREE_FRACTION = 0.3
 # Interpolation period [s] for which the corners are rounded without allocation: its chord error is nothing.
 NO_PERIOD = 1e-9
 
@@ -64,7 +64,7 @@ class BezierMethod(Method):
         machine = job.machine
         with job.stage("geometry"):
             shares = machine if self.allocate else machine.model_copy(update={"dt": NO_PERIOD, "fir": None})
-            path = round_corners(job.toolpath, shares, self.corner, blend_tangents=True, free=FREE_SHARE)
+            path = round_corners(job.toolpath, shares, self.corner, blend_tangents=True, free=FREE_FRACTION)
             samples = sample_path(path, shares)
         with job.stage("solve"):
             limits = constant_speeds(samples, shares)
@@ -94,9 +94,9 @@ class BezierMethod(Method):
 
 def _stopped(path: SmoothPath, joint: Array) -> SmoothPath:
     """The same path with full stops at the vertices of some corners."""
-    columns = {name: getattr(path, name).copy() for name in ("joint", "d", "params", "stretch", "tol_ap")}
+    columns = {name: getattr(path, name).copy() for name in ("joint", "d", "params", "scale", "tol_ap")}
     columns["joint"][joint] = Joint.STOP
-    columns["stretch"][joint] = 1.0
+    columns["scale"][joint] = 1.0
     for name in ("d", "params", "tol_ap"):
         columns[name][joint] = 0.0
     return dataclasses.replace(path, **columns)

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.feedrate.solution import Status
-from planner.fir.course import StraightCourse, course_of
 from planner.fir.design import plain_plan
-from planner.fir.filtered import axes_of, check_profile_filters, reached
+from planner.fir.fastest_schedule import fastest_schedule
+from planner.fir.filtered_axes import axes_of, check_profile_filters, reached
+from planner.fir.leg_guide import LegGuide, guide_of_legs
 from planner.fir.schedule import Schedule
-from planner.fir.search import fastest_schedule
 from planner.fir.superpose import Filtered, superpose
 from planner.job.job import Job
 from planner.job.method import Method
@@ -38,6 +38,8 @@ class FirMethod(Method):
 
     plain           : the paper's rules as they are, whatever they exceed
     profile_filters : lengths of the two filters that the setpoints are made with [s]; None to choose them
+
+    Raises InputError unless these are two positive lengths.
     """
 
     plain: bool = False
@@ -54,11 +56,11 @@ class FirMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
-            course = course_of(job.toolpath, job.machine, self.profile_filters)
+            guide = guide_of_legs(job.toolpath, job.machine, self.profile_filters)
         with job.stage("solve"):
-            schedule = (plain_plan if self.plain else fastest_schedule)(course, job.machine)
+            schedule = (plain_plan if self.plain else fastest_schedule)(guide, job.machine)
             filtered = superpose(schedule.command())
-            motion = motion_of(schedule.course, filtered)
+            motion = motion_of(schedule.guide, filtered)
         return job.plan(
             job.deliver(motion if self.plain else job.behind_filters(motion)),
             method="fir-plain" if self.plain else "fir",
@@ -70,18 +72,19 @@ class FirMethod(Method):
         )
 
 
-def motion_of(course: StraightCourse, motion: Filtered) -> AxisMotion:
-    """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the course."""
-    ends = course.joint_at[course.first]
-    stretch = np.repeat(np.arange(course.stretches), np.diff(motion.first))
-    segment = np.searchsorted(np.cumsum(course.lines.length), reached(motion), side="right")
-    segment = np.clip(segment, ends[stretch], ends[stretch + 1] - 1)
-    return axes_of(motion, segment, 0, course.lines, course.point[0])
+def motion_of(guide: LegGuide, motion: Filtered) -> AxisMotion:
+    """The axes of a filtered motion along a guide; each piece belongs to the block that its middle has reached."""
+    ends = guide.joint_at[guide.first]
+    run = np.repeat(np.arange(guide.runs), np.diff(motion.first))
+    segment = np.searchsorted(np.cumsum(guide.lines.length), reached(motion), side="right")
+    segment = np.clip(segment, ends[run], ends[run + 1] - 1)
+    return axes_of(motion, segment, 0, guide.lines, guide.point[0])
 
 
 def _sentence(plan: Schedule) -> str:
-    waits = int((plan.gap()[plan.course.inner] > 0).sum())
-    turns = int((plan.course.sin_half > 0).sum())
+    """What the plan says of its corners and filters."""
+    waits = int((plan.gap()[plan.guide.inner] > 0).sum())
+    turns = int((plan.guide.sin_half > 0).sum())
     longest = plan.T1 + plan.T2
     return (
         f"{waits} of {turns} corners are waited at, the others run through; filters of {1e3 * longest.min():.3g} to "

@@ -7,7 +7,7 @@
    is fastest (lookahead/look_ahead.py).
 4. Legs and corners are pieces of constant jerk of every axis (lookahead/corner_pieces.py): the motion itself, nothing is sampled.
 
-A stretch between full stops that is not faster than stopping at every block is run as method `stop` runs it.
+A run between full stops that is not faster than stopping at every block is made as method `stop` makes it.
 """
 
 from __future__ import annotations
@@ -20,9 +20,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
-from planner.corners.allocation import (
-    error_rate,
-)
+from planner.corners.allocation import error_rate
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
@@ -34,16 +32,17 @@ from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces
 from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
-from planner.lookahead.look_ahead import LegLimits, Passage, look_ahead
+from planner.lookahead.look_ahead import look_ahead
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl
 
-# Share of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill their
-# chords: those leave the vertex by 2/3 to 1 of the sagitta.
-CHORD_SHARE = 0.5
+# Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill
+# their chords: those leave the vertex by 2/3 to 1 of the sagitta.
+CHORD_FRACTION = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,50 +69,53 @@ class KinematicMethod(Method):
     def plan_job(self, job: Job) -> Plan:
         exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
         with job.stage("solve"):
-            course = self._course(job.toolpath, job.machine, exact)
-            motion = _motion(course, job.toolpath.axes)
+            chain = self._chain(job.toolpath, job.machine, exact)
+            motion = _motion(chain, job.toolpath.axes)
         made = job.deliver(job.behind_filters(motion))
         with job.stage("report"):
-            rounded = _corner_table(course, job.machine)
+            rounded = _corner_table(chain, job.machine)
         return job.plan(
             made,
             method="kinematic",
             corner="kinematic",
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=_sentence(course),
-            grid_points=len(course.path) + 1,
+            sentence=_sentence(chain),
+            grid_points=len(chain.path) + 1,
             tables=Tables(rounded=rounded),
         )
 
-    def _course(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Course:
+    def _chain(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Chain:
         """Look ahead over the program, arcs as chords where that is faster; `exact` (M,) blocks keep to the path."""
         curved = toolpath.arc >= 0
         whole = curved & (exact | _faster_whole(toolpath, machine))
         while True:
-            course = self._look_ahead(toolpath, machine, whole)
-            slow = curved & ~whole & _slower_than_stops(course, toolpath, machine)
+            chain = self._look_ahead(toolpath, machine, whole)
+            slow = curved & ~whole & _slower_than_stops(chain, toolpath, machine)
             if not slow.any():
-                return course
+                return chain
             whole |= slow
 
-    def _look_ahead(self, toolpath: Toolpath, machine: Machine, whole: Array) -> _Course:
-        lines = parted_by_feed(chorded(toolpath, CHORD_SHARE, whole))
+    def _look_ahead(self, toolpath: Toolpath, machine: Machine, whole: Array) -> _Chain:
+        """The chain with the arcs `whole` (M,) as they are, and all others as chords."""
+        lines = parted_by_feed(chorded(toolpath, CHORD_FRACTION, whole))
         path = legs_of(lines)
         legs = leg_limits(path, lines, machine)
         free = candidates(path, lines, legs, machine, self.start_stop)
         fitting = [fitted(way, legs) for way in free]
         passage, time = look_ahead(legs, fitting, self.short_segment)
-        return _Course(
+        return _Chain(
             lines=lines, path=path, legs=legs, free=free, fitting=fitting, passage=passage, time=time
         )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Course:
-    """A program laid out as legs and corners: n legs, n+1 joints.
+class _Chain:
+    """A program as a chain of n legs with n+1 joints, and how the look-ahead passes them.
 
     lines   : the toolpath with its arcs as chords
+    path    : its legs
+    legs    : what they allow
     free    : the candidates by themselves
     fitting : the candidates that fit on their legs
     passage : what was chosen
@@ -139,7 +141,7 @@ def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
     """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners between these."""
     arc = np.flatnonzero(toolpath.arc >= 0)
     whole = np.zeros(len(toolpath), bool)
-    count, _ = arc_sagitta(toolpath, CHORD_SHARE)
+    count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
     chord = toolpath.length[arc] / count[arc]
     bend = np.minimum(toolpath.curvature[arc] * chord, np.pi)
     a, j = (machine.limits(q, toolpath.axes).max() / bend for q in ("acceleration", "jerk"))
@@ -149,20 +151,21 @@ def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
     return whole
 
 
-def _slower_than_stops(course: _Course, toolpath: Toolpath, machine: Machine) -> Array:
+def _slower_than_stops(chain: _Chain, toolpath: Toolpath, machine: Machine) -> Array:
     """(M,) True for the segments between two full stops that take longer than if every block ran from rest to rest."""
-    lines, at = course.lines, course.path.first
+    lines, at = chain.lines, chain.path.first
     stop = np.flatnonzero(lines.joint[at] == Joint.STOP)
-    lasting = np.diff(course.time[stop])
+    lasting = np.diff(chain.time[stop])
     first = np.searchsorted(toolpath.block, lines.block[np.minimum(at[stop], len(lines) - 1)])
     first[-1] = len(toolpath)
     times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
     return np.repeat(lasting > np.add.reduceat(times, first[:-1]), np.diff(first))
 
 
-def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
-    pieces = corner_pieces(course.passage, course.legs, course.path, course.lines.dwell[course.path.first])
-    position, velocity, acceleration, jerk = along_axes(pieces, course.path, course.lines)
+def _motion(chain: _Chain, axes: tuple[str, ...]) -> AxisMotion:
+    """The pieces of legs and corners, along the axes."""
+    pieces = corner_pieces(chain.passage, chain.legs, chain.path, chain.lines.dwell[chain.path.first])
+    position, velocity, acceleration, jerk = along_axes(pieces, chain.path, chain.lines)
     end = np.cumsum(pieces.rows.duration)
     return AxisMotion(
         axes=axes,
@@ -171,17 +174,17 @@ def _motion(course: _Course, axes: tuple[str, ...]) -> AxisMotion:
         velocity=velocity,
         acceleration=acceleration,
         jerk=jerk,
-        block=course.lines.block[pieces.segment],
-        line=course.lines.line[pieces.segment],
+        block=chain.lines.block[pieces.segment],
+        line=chain.lines.line[pieces.segment],
         end=float(end[-1]),
     )
 
 
-def _corner_table(course: _Course, machine: Machine) -> CornerTable:
+def _corner_table(chain: _Chain, machine: Machine) -> CornerTable:
     """The corners that are run through, at their apexes."""
-    kind, V, p, q = (getattr(course.passage, name) for name in ("kind", "V", "p", "q"))
+    kind, V, p, q = (getattr(chain.passage, name) for name in ("kind", "V", "p", "q"))
     k = np.flatnonzero((kind == JointKind.ZERO) | (kind == JointKind.ENTRY))
-    lines, at, u = course.lines, course.path.first[k], course.path.table["direction"]
+    lines, at, u = chain.lines, chain.path.first[k], chain.path.table["direction"]
     V, p, q, zero = V[k], p[k], q[k], kind[k] == JointKind.ZERO
     theta, tol = lines.theta[at], lines.tolerance[at]
     s, c = np.sin(theta / 2), np.cos(theta / 2)
@@ -201,26 +204,27 @@ def _corner_table(course: _Course, machine: Machine) -> CornerTable:
         kappa_max=normal / speed**2,
         feed_closed_form=speed * np.sqrt(largest / normal),
         feed_planned=speed,
-        limited_by=_limited_by(course, k),
+        limited_by=_limited_by(chain, k),
     )
 
 
-def _limited_by(course: _Course, k: Array) -> Array:
+def _limited_by(chain: _Chain, k: Array) -> Array:
     """What keeps each of the corners k from being taken faster."""
-    V, kind = course.passage.V[k], course.passage.kind[k]
+    V, kind = chain.passage.V[k], chain.passage.kind[k]
     said = np.full(len(k), "look-ahead", dtype=object)
-    for free, fitting in zip(course.free, course.fitting, strict=True):
+    for free, fitting in zip(chain.free, chain.fitting, strict=True):
         mine = free.kind[k] == kind
         said[mine & (fitting.V[k] == V)] = "leg length"
         said[mine & (free.V[k] == V)] = "tolerance"
-    said[np.minimum(course.legs.v[k - 1], course.legs.v[k]) == V] = "feed"
+    said[np.minimum(chain.legs.v[k - 1], chain.legs.v[k]) == V] = "feed"
     return said.astype(str)
 
 
-def _sentence(course: _Course) -> str:
-    turns, kind = course.turns, course.passage.kind
+def _sentence(chain: _Chain) -> str:
+    """What the plan says of its corners."""
+    turns, kind = chain.turns, chain.passage.kind
     if not turns.any():
-        return "there is no corner between full stops; every stretch is run in the shortest time"
+        return "there is no corner between full stops; every run takes the shortest time"
     stops, steps = (int((turns & (kind == which)).sum()) for which in (JointKind.STOP, JointKind.PASS))
     text = f"{int(turns.sum()) - stops} corners are run through"
     text += f", {steps} of them with a step of velocity, which breaks acceleration and jerk" if steps else ""

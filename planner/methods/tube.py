@@ -29,20 +29,20 @@ from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.methods.optimal import OptimalMethod
 from planner.motion.axis_motion import AxisMotion
-from planner.motion.passing import passing_times, standstills
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
+from planner.motion.vertex_times import passing_times, standstills
 from planner.nc.program import Program
 from planner.tube.guess import guess_from
 from planner.tube.motion import Steps, steps_of
 from planner.tube.nlp import TubeNLP
 from planner.tube.run import TubeRun, tube_runs_of
-from planner.tube.splice import Part, Spliced
+from planner.tube.splice import Spliced, SplicedRun
 
 # A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
 # 7 s, one of 400 two minutes and 0.44 GB.
 LEGS_MAX = 500
-# The start is sampled at this share of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
+# The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
 
 
@@ -82,6 +82,7 @@ class TubeMethod(Method):
     def _plan(
         self, job: Job, made: Delivered | None, status: Status, sentence: str, grid_points: int
     ) -> Plan:
+        """The plan of this method with what was delivered."""
         return job.plan(
             made,
             method="tube",
@@ -139,11 +140,11 @@ class _Start:
         """Time along run k [s]."""
         return float(self.arrival[k + 1] - self.departure[k])
 
-    def part(self, k: int) -> Part:
+    def spliced(self, k: int) -> SplicedRun:
         """The motion along run k, with the standstill before it, and the one at the end of the job."""
         begin = self.arrival[k] if k else 0.0
         last = k + 2 == len(self.arrival)
-        return Part(
+        return SplicedRun(
             motion=self.motion,
             begin=float(begin),
             end=self.motion.end if last else float(self.arrival[k + 1]),
@@ -155,13 +156,13 @@ class _Start:
         inside = np.searchsorted(self.seen.t, [begin, end])
         window = slice(inside[0], inside[1] + 1)
         columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
-        part = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
+        along = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
         # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
         seen = np.append(np.diff(t) > 0, True)
         seen[1:-1] &= t[1:-1] < end
-        return part, np.interp(run.offset, run.offset[seen], t[seen])
+        return along, np.interp(run.offset, run.offset[seen], t[seen])
 
 
 class _Starts:
@@ -185,10 +186,11 @@ class _Starts:
 
 
 def _check_size(runs: list[TubeRun], program: Program) -> None:
+    """Raise InputError for a job with more legs, or steps on arcs, than `LEGS_MAX`."""
     legs = sum(float(np.maximum(np.ceil(run.length / run.step_max), 1.0).sum()) for run in runs)
     if legs > LEGS_MAX:
         raise InputError(
-            f"{legs:.0f} lines and parts of arcs; method tube is for short jobs and takes at most {LEGS_MAX}: split the program, "
+            f"{legs:.0f} lines and steps on arcs; method tube is for short jobs and takes at most {LEGS_MAX}: split the program, "
             "or plan with method optimal",
             source=program.source,
         )
@@ -206,8 +208,8 @@ def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered,
         kept = list(range(len(found)))
     while len(kept) < len(found):
         motion = Spliced(
-            parts=tuple(
-                first.part(k) if k in kept else _part(job.toolpath, found[k]) for k in range(len(found))
+            runs=tuple(
+                first.spliced(k) if k in kept else _spliced(job.toolpath, found[k]) for k in range(len(found))
             )
         )
         made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
@@ -249,7 +251,7 @@ def _said(job: Job, first: _Start, found: list[_Found], kept: list[int], why: st
     return worst.status if worst and not kept else Status.ACCEPTABLE, text
 
 
-def _part(toolpath: Toolpath, found: _Found) -> Part:
+def _spliced(toolpath: Toolpath, found: _Found) -> SplicedRun:
     """The steps along a run as a motion, with the dwell before it, and the one at the end of the job."""
     run, steps = found.run, found.steps
     assert steps is not None
@@ -277,8 +279,9 @@ def _part(toolpath: Toolpath, found: _Found) -> Part:
         end=float(t[-1] + behind),
         **columns,
     )
-    return Part(motion=motion, begin=0.0, end=motion.end)
+    return SplicedRun(motion=motion, begin=0.0, end=motion.end)
 
 
 def _lines(run: TubeRun, toolpath: Toolpath) -> str:
+    """The source lines of a run."""
     return f"{toolpath.line[run.first[0]]} to {toolpath.line[run.first[-1] - 1]}"

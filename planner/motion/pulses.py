@@ -36,13 +36,13 @@ TIME_ROUNDING = 1e-13  # of a period: where a pulse is on it [-]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisPulses:
-    """The n pulses of one axis.
+    """The n pulses of one axis over a trajectory of T samples.
 
-    axis      : its letter
-    steps     : pulses per mm (rotary axes: per degree)
-    time      : (n,) when each pulse is sent [s], non-decreasing
-    direction : (n,) +1 or -1
-    line      : (n,) source line of the NC program
+    axis       : its letter
+    steps      : pulses per mm (rotary axes: per degree)
+    time       : (n,) when each pulse is sent [s], non-decreasing
+    direction  : (n,) +1 or -1
+    line       : (n,) source line of the NC program
     per_period : (T-1,) pulses between two samples, up minus down
     """
 
@@ -84,8 +84,10 @@ class AxisPulses:
 class Drive:
     """What the drives' inputs take.
 
-    frequency_max : pulses per second
-    width         : shortest time that the step signal has to be high, and low, for each pulse [s]
+    frequency_max : pulses per second [Hz]; None for no limit
+    width         : shortest time that the step signal has to be high, and low, for each pulse [s]; None for no limit
+
+    Raises InputError unless they are positive and finite.
     """
 
     frequency_max: float | None = None
@@ -134,6 +136,7 @@ def overrun(trains: tuple[AxisPulses, ...], drive: Drive) -> list[str]:
 
 
 def _check(trajectory: Trajectory, steps: dict[str, float]) -> None:
+    """Raise InputError as `pulses_of` says."""
     for axis, value in steps.items():
         if axis not in trajectory.axes:
             raise InputError(
@@ -143,12 +146,12 @@ def _check(trajectory: Trajectory, steps: dict[str, float]) -> None:
             raise InputError(f"steps: {axis} = {value}; pulses per mm must be positive and finite")
     total = 0.0
     for k, axis in enumerate(trajectory.axes):
-        way = float(np.abs(np.diff(trajectory.position[:, k])).sum())
+        moved = float(np.abs(np.diff(trajectory.position[:, k])).sum())
         if axis in steps:
-            total += way * _resolution(axis, steps[axis])
-        elif way > 0:
+            total += moved * _resolution(axis, steps[axis])
+        elif moved > 0:
             unit = "mm" if axis in LINEAR_AXES else "rad"
-            raise InputError(f"steps: axis {axis} moves by {way:.6g} {unit} in all; give its steps too")
+            raise InputError(f"steps: axis {axis} moves by {moved:.6g} {unit} in all; give its steps too")
     if total > PULSES_MAX:
         raise InputError(f"steps: {total:.3g} pulses; at most {PULSES_MAX:.0e} are made: split the program")
 
@@ -159,6 +162,7 @@ def _resolution(axis: str, steps: float) -> float:
 
 
 def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
+    """The pulses of axis k."""
     K = _resolution(trajectory.axes[k], steps)
     place = K * (trajectory.position[:, k] - trajectory.position[0, k])
     rate = K * trajectory.velocity[:, k]
@@ -185,13 +189,13 @@ def _count(t, place, rate, per_period, number, time, direction):
     for k in range(len(t) - 1):
         h, before, first = t[k + 1] - t[k], counter, n
         a, b, c = _cubic(place[k + 1] - place[k], rate[k] * h, rate[k + 1] * h)
-        parts = _monotone(a, b, c, ends)
-        for part in range(parts):
-            low, high = ends[part], ends[part + 1]
+        branches = _monotone(a, b, c, ends)
+        for m in range(branches):
+            low, high = ends[m], ends[m + 1]
             up = _value(a, b, c, high) >= _value(a, b, c, low)
             sign = 1 if up else -1
             goal = place[k] + _value(a, b, c, high)
-            if part == parts - 1:
+            if m == branches - 1:
                 goal = place[k + 1]
             while sign * (goal - counter) >= 0.5 + HYSTERESIS:
                 edge = counter + sign * (0.5 + HYSTERESIS) - place[k]
@@ -205,30 +209,31 @@ def _count(t, place, rate, per_period, number, time, direction):
 
 
 @njit(cache=True, error_model="numpy")
-def _cubic(way, v0, v1):
-    """Coefficients a, b, c of a q^3 + b q^2 + c q on [0, 1] with the value `way` at 1 and the slopes v0, v1 at the ends."""
-    return v0 + v1 - 2.0 * way, 3.0 * way - 2.0 * v0 - v1, v0
+def _cubic(moved, v0, v1):
+    """Coefficients a, b, c of a q^3 + b q^2 + c q on [0, 1] with the value `moved` at 1 and the slopes v0, v1 at the ends."""
+    return v0 + v1 - 2.0 * moved, 3.0 * moved - 2.0 * v0 - v1, v0
 
 
 @njit(cache=True, error_model="numpy")
 def _value(a, b, c, q):
+    """a q^3 + b q^2 + c q."""
     return q * (c + q * (b + q * a))
 
 
 @njit(cache=True, error_model="numpy")
 def _monotone(a, b, c, ends):
-    """Cut [0, 1] where the slope 3a q^2 + 2b q + c changes its sign; writes the ends, returns how many parts there are."""
-    ends[0], parts = 0.0, 0
+    """Cut [0, 1] where the slope 3a q^2 + 2b q + c changes its sign; writes the ends (4,), returns how many branches there are."""
+    ends[0], branches = 0.0, 0
     square = b * b - 3.0 * a * c
     if square > 0.0:
         root = -(b + np.copysign(np.sqrt(square), b))
         one, two = root / (3.0 * a), c / root  # inf or NaN where there is no second one
         for q in (min(one, two), max(one, two)):
-            if ends[parts] < q < 1.0:
-                parts += 1
-                ends[parts] = q
-    ends[parts + 1] = 1.0
-    return parts + 1
+            if ends[branches] < q < 1.0:
+                branches += 1
+                ends[branches] = q
+    ends[branches + 1] = 1.0
+    return branches + 1
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,4 +1,4 @@
-"""Input shaping: set points that leave no vibration behind.
+"""Input shaping: setpoints that leave no vibration behind.
 
 A mode of frequency w and damping ratio z that is shaken by p(t) rings on after the end with an amplitude that is proportional to
 |integral of p''(t) exp(-P t) dt|, P = -z w + i w sqrt(1 - z^2). Instead of p a machine can be given a mean of delayed copies,
@@ -36,7 +36,11 @@ from planner.motion.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shaper:
-    """n delayed copies: delays t_i (n,) [s], ascending from 0, and weights A_i (n,) [-], positive, of sum 1."""
+    """n delayed copies of a motion (module text).
+
+    delay  : (n,) t_i [s], ascending from 0
+    weight : (n,) A_i [-], positive, of sum 1
+    """
 
     delay: FloatArray
     weight: FloatArray
@@ -64,7 +68,7 @@ class Shaper:
 
 
 def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
-    """The zero-vibration shaper of all modes: 2^n copies for n modes; one copy without any."""
+    """The zero-vibration shaper of all modes (Singer and Seering 1990): 2^n copies for n modes; one copy without any."""
     delay, weight = np.zeros(1), np.ones(1)
     for mode in modes:
         half = 0.5 * damped_period(mode.frequency, mode.damping)
@@ -112,6 +116,7 @@ class ShapedMotion:
 
     @cached_property
     def _ends(self) -> tuple[Trajectory, Trajectory]:
+        """The first and the last moment of the motion."""
         first, last = (self.motion.at(np.array([time]), 1.0) for time in (0.0, self.motion.end))
         return first, last
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+
+COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,13 +64,25 @@ class Trajectory:
         """Duration of the motion [s]."""
         return float(self.t[-1] - self.t[0])
 
+    def chunks(self) -> Iterator[Trajectory]:
+        """All samples in order, one part after the other. What goes through a long motion takes its parts, so that only one of them
+        has to be in memory (motion/on_demand.py)."""
+        yield self
+
+    def rows(self, k: Array) -> Trajectory:
+        """The samples with the ascending indices k (n,)."""
+        return dataclasses.replace(self, **{name: getattr(self, name)[k] for name in COLUMNS})
+
+    def first_not_before(self, times: FloatArray) -> Array:
+        """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
+        return np.asarray(np.searchsorted(self.t, times))
+
 
 def joined(chunks: list[Trajectory]) -> Trajectory:
     """One trajectory from consecutive chunks; a sample that a chunk shares with the one before counts once."""
-    names = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
     fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])
-        for name in names
+        for name in COLUMNS
     }
     return dataclasses.replace(chunks[0], **columns)

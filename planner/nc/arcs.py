@@ -58,7 +58,15 @@ def arc_from_centre(
     turns: int,
     unit: float,
 ) -> Arc:
-    """The arc about a given centre. Raises ArcError if start and end are not on one circle."""
+    """The arc about a given centre.
+
+    start, end, centre : (3,) [mm]
+    normal             : index of the axis normal to its plane
+    turns              : 1 for less than a full turn, one more for every further turn
+    unit               : mm per programmed length unit, which decides how far start and end may be off one circle
+
+    Raises ArcError if start and end are not on one circle.
+    """
     fault = _not_closed(start, end, centre, normal, unit)
     if fault:
         raise ArcError(fault)
@@ -75,8 +83,12 @@ def arc_from_radius(
     turns: int,
     unit: float,
 ) -> Arc:
-    """The arc of a given radius [mm], more than half a turn if it is negative. Raises ArcError if there is
-    none."""
+    """The arc of a given radius [mm], more than half a turn if it is negative.
+
+    start, end : (3,) [mm]; the others as of `arc_from_centre`
+
+    Raises ArcError if there is none.
+    """
     a, b = IN_PLANE[normal]
     da, db = end[a] - start[a], end[b] - start[b]
     half, size = math.hypot(da, db) / 2.0, abs(radius)
@@ -97,7 +109,7 @@ def arc_from_radius(
 
 
 def closes(start: FloatArray, end: FloatArray, centre: FloatArray, *, normal: int, unit: float) -> bool:
-    """Whether start and end lie on one circle about the centre."""
+    """Whether start and end lie on one circle about the centre, (3,) each [mm]; the others as of `arc_from_centre`."""
     return _not_closed(start, end, centre, normal, unit) is None
 
 

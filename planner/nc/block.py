@@ -50,6 +50,7 @@ class Block:
     partial: bool = False
 
     def has(self, letters: str) -> bool:
+        """Whether the block has a word with one of the letters."""
         return any(letter in self.value for letter in letters)
 
     def first_of(self, letters: str) -> int:

@@ -48,6 +48,7 @@ class Interpreter:
         self._notes: dict[str, list[int]] = {}  # in their order: first line, times
 
     def program(self) -> Program:
+        """The program that was read; call it after `run`, and if there are no faults."""
         return self.store.finish(self.source, self.notes)
 
     @property
@@ -59,6 +60,7 @@ class Interpreter:
         )
 
     def run(self) -> None:
+        """Read all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
         row, rows, begun, ended = 0, len(self.words.line), False, False
         while row < rows and not ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
@@ -79,6 +81,7 @@ class Interpreter:
         self._note_units()
 
     def report(self, word: int, message: str) -> None:
+        """Keep a fault of a word, by its index."""
         self._reports.append((word, message))
 
     def faults(self) -> FaultList:
@@ -89,6 +92,7 @@ class Interpreter:
         return FaultList(self.words, sorted(found + self._reports))
 
     def note(self, text: str, line: int) -> None:
+        """Keep what was assumed on a line."""
         self._notes.setdefault(text, [line, 0])[1] += 1
 
     def _note_units(self) -> None:

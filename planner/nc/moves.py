@@ -43,7 +43,7 @@ def target(state: State, block: Block) -> FloatArray:
 
 
 def arc(state: State, block: Block, end: FloatArray) -> Arc:
-    """The arc to `end`. Raises WordFault if its words are missing or contradict each other."""
+    """The arc of a block to `end` (3,) [mm]. Raises WordFault if its words are missing or contradict each other."""
     try:
         return _arc(state, block, end)
     except ArcError as fault:
@@ -116,6 +116,7 @@ def check_no_arc_words(state: State, block: Block) -> None:
 
 
 def unused(letter: str) -> str:
+    """What is said of a word that no code of its block uses."""
     return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
 
 

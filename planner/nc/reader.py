@@ -12,7 +12,6 @@ from planner.base.files import require_ending
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none
-from planner.nc.hpgl.plotter import read_drawing
 from planner.nc.interpreter import Interpreter
 from planner.nc.lexer import split_words
 from planner.nc.program import Program
@@ -51,6 +50,8 @@ def interpret(
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
     _check_text(data, source)
     if is_plotter_file(data, source):
+        from planner.nc.hpgl.plotter import read_drawing  # 10 ms
+
         return read_drawing(data, machine, source)
     foreign = recognise(data)
     words = split_words(b"" if foreign else data, block_delete=block_delete)

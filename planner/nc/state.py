@@ -71,6 +71,7 @@ class Setup:
 
     @classmethod
     def of(cls, machine: Machine | None) -> Setup:
+        """A machine's setup; None for no machine."""
         if machine is None:
             return cls()
         return cls(
@@ -81,6 +82,7 @@ class Setup:
         )
 
     def start(self) -> State:
+        """The modal state at the start of a program."""
         state = State(path_control=self.path_control)
         self.apply_offsets(state)
         return state
@@ -94,6 +96,7 @@ class Setup:
 
 
 def set_units(state: State, code: int) -> None:
+    """G20 (code 200): inches, G21: millimetres, from here on."""
     state.unit = MM_PER_INCH if code == 200 else 1.0
 
 

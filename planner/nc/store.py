@@ -27,6 +27,7 @@ class BlockColumns(NamedTuple):
 
     @classmethod
     def of_size(cls, rows: int) -> BlockColumns:
+        """Room for so many blocks."""
         return cls(
             kind=np.empty(rows, dtype=np.uint8),
             end=np.empty((rows, 3)),
@@ -47,6 +48,7 @@ class EventColumns(NamedTuple):
 
     @classmethod
     def of_size(cls, rows: int) -> EventColumns:
+        """Room for so many events."""
         return cls(
             block=np.empty(rows, dtype=np.int64),
             line=np.empty(rows, dtype=np.int32),
@@ -90,6 +92,7 @@ class Store:
         self.blocks += 1
 
     def add_arc(self, arc: Arc, line: int, state: State) -> None:
+        """Append an arc that ends at the state's position."""
         self.arcs.append((self.blocks, arc.centre, state.normal, arc.sweep))
         self.add(Kind.ARC, line, state)
 
@@ -100,6 +103,7 @@ class Store:
         self.add(Kind.DWELL if seconds > 0 else Kind.STOP, line, state)
 
     def add_event(self, letter: str, value: float, line: int) -> None:
+        """Append an event before the next block."""
         event, k = self.event, self.events
         event.block[k] = self.blocks
         event.line[k] = line

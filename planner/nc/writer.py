@@ -70,6 +70,7 @@ def _edits(
     """
     edits: list[Edit] = []
     texts: dict[float, str] = {}
+    as_given: dict[float, str] = {}
     move = np.full(len(f_word), -1)
     move[row] = np.arange(len(row))
     in_force = 0.0  # [mm per minute]
@@ -79,7 +80,10 @@ def _edits(
             value = float(wanted[k])
             number = texts.get(value) or texts.setdefault(value, round_down(value))
         elif k >= 0 and word < 0:
-            number = np.format_float_positional(programmed[k], trim="-")
+            value = float(programmed[k])
+            number = as_given.get(value) or as_given.setdefault(
+                value, np.format_float_positional(value, trim="-")
+            )
         given = float(number or words.value[word]) * unit[r]
         if number and (word >= 0 or abs(given - in_force) > SAME_FEED * in_force):
             edits.append(_edit(words, r, word, number))

@@ -15,6 +15,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints.limits import FILTER_ERROR
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.filters import ROOM_LEAST, Behind, Places, kept, rested
 from planner.job.job import Job
@@ -33,7 +34,7 @@ CHANGE_MIN, CHANGE_MAX = 0.1, 2.0
 AIM = 0.01  # of the tolerance: what the search leaves unused [-]; it ends where no feed may grow by more than WORTH [-]
 WORTH = 0.05
 CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-], or the motion would stand where it cannot go on
-BOUND = "filter_error"
+BOUND = FILTER_ERROR.name
 
 
 def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> tuple[OnPath, Motion]:

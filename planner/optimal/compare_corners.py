@@ -18,6 +18,7 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
 from planner.machine import Machine
+from planner.optimal.effort import COARSE
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, second_order
 from planner.path.samples import RESOLUTION, sample_path
@@ -28,6 +29,10 @@ COMPARED_POINTS = 1_000_000  # some 10 s and 1 GB
 # share of it is less than what corners take (tested). The errors of a grid go with the square of its intervals: it has a tenth of the
 # usual one's points (22.7 and 213 for each corner on chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
+
+# Corners that take so many times as long as splines on the coarse grid are not tried on the final one [-]: times on the coarse grid are
+# up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
+CLOSE = 1.01
 
 
 class CornerBounds(NamedTuple):
@@ -49,13 +54,21 @@ def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
 
 
 def with_corners(
-    rounded: SmoothPath, best: OnPath, corners: CornerBounds, job: Job, order: Order, resolution: float
+    rounded: SmoothPath,
+    best: OnPath,
+    coarse: OnPath,
+    corners: CornerBounds,
+    job: Job,
+    order: Order,
+    resolution: float,
 ) -> tuple[OnPath, Array]:
-    """Corners instead of splines between the full stops where they are faster, and where that was too much to find out.
+    """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which that was too much to find
+    out.
 
     rounded : the path with the corners that the splines of `best` replace
+    coarse  : the motion on the splines of `best` on the coarse grid of optimal/effort.py, on which most corners are ruled out
     corners : bounds on the motion on them
-    resolution : of the grid of `best`, and of the motions that compete with it
+    resolution : of the grid of `best`, and of the motions that compete with it at last
     """
     none = np.zeros(0, dtype=np.int64)
     shape = best.shape
@@ -73,24 +86,25 @@ def with_corners(
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
-    job.tell("bound on corners", found=corners.time.sum(), stretches=len(ranked), left=len(left))
-    for _ in range(2):  # the second time on those that turned out to be faster
+    job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
+    # on the final grid the second time on those that turned out to be faster
+    for grid, splines, share in ((COARSE, coarse, CLOSE), (resolution, best, 1.0), (resolution, best, 1.0)):
         fits = shape.laid.fits & ~chosen[piece]
         if (fits == shape.laid.fits).all():
             break
         mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
-        planned = order.solve(with_spline(rounded, mixed), job, resolution, [best])
+        planned = order.solve(with_spline(rounded, mixed), job, grid, [splines])
         if not planned.solution.solved:
             break
         job.tell(
             "corners",
             found=planned.solution.cycle_time,
-            before=best.solution.cycle_time,
-            kept=planned.faster_than(best),
-            stretches=int(chosen.sum()),
+            before=splines.solution.cycle_time,
+            kept=planned.faster_than(splines),
+            runs=int(chosen.sum()),
         )
-        slower = chosen & (planned.stop_to_stop() >= best.stop_to_stop())
-        if not slower.any():
+        slower = chosen & (planned.stop_to_stop() >= share * splines.stop_to_stop())
+        if grid == resolution and not slower.any():
             faster = planned.faster_than(best)
             return dataclasses.replace(planned, shape=mixed) if faster else best, left
         chosen &= ~slower

@@ -48,8 +48,8 @@ def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
 def not_compared_note(rounded: SmoothPath, left: Array, points: FloatArray) -> tuple[str, ...]:
     """That single corners were not compared on some runs between full stops (optimal/compare_corners.py).
 
-    left   : (L,) these stretches
-    points : (G,) of the grid that each stretch would have
+    left   : (L,) these runs
+    points : (G,) of the grid that each run would have
     """
     if not len(left):
         return ()

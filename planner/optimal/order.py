@@ -34,7 +34,9 @@ class Order(Protocol):
     jerk_limited: ClassVar[bool]
 
     @property
-    def solver(self) -> FeedrateSolver: ...
+    def solver(self) -> FeedrateSolver:
+        """What finds the feed along a path."""
+        ...
 
     def solve(self, path: SmoothPath, job: Job, resolution: float, known: Sequence[OnPath] = ()) -> OnPath:
         """The time-optimal motion on a path, on a grid of that resolution (path/samples.py); pieces between full stops that a
@@ -55,6 +57,7 @@ class ThirdOrder:
     jerk_limited: ClassVar[bool] = True
 
     def solve(self, path: SmoothPath, job: Job, resolution: float, known: Sequence[OnPath] = ()) -> OnPath:
+        """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as of `Order`."""
         with job.stage("geometry"):
             samples = sample_path(path, job.machine, resolution, third_order=True)
         with job.stage("solve") as progress:
@@ -71,7 +74,7 @@ class ThirdOrder:
 class SecondOrder:
     """All limits but jerk; multipliers are found from the profile (feedrate/costates.py).
 
-    to_tighten : limits will be tightened in places, on straight stretches too, which then need points inside
+    to_tighten : limits will be tightened in places, on straight elements too, which then need points inside
     """
 
     solver: FeedrateSolver
@@ -80,6 +83,7 @@ class SecondOrder:
     jerk_limited: ClassVar[bool] = False
 
     def solve(self, path: SmoothPath, job: Job, resolution: float, known: Sequence[OnPath] = ()) -> OnPath:
+        """The time-optimal motion without jerk limits, on a grid with points where the profile switches; arguments as of `Order`."""
         with job.stage("geometry"):
             samples = sample_path(path, job.machine, resolution)
         with job.stage("solve"):
@@ -101,7 +105,7 @@ def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolve
 
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
-    """Solve, add the points where the profile switches on straight stretches, and solve again; a failure is the solution's status."""
+    """Solve, add the points where the profile switches on straight elements, and solve again; a failure is the solution's status."""
     problem = feedrate_problem(samples, machine, measured=True)
     solution = solver.solve(problem)
     if solution.solved:
@@ -116,7 +120,7 @@ def _known(motions: Sequence[OnPath]) -> list[Known]:
 
 
 def _tell(job: Job, planned: OnPath, resolution: float) -> None:
-    facts: dict[str, Any] = {"points": len(planned.samples), "stretches": len(planned.samples.piece) - 1}
+    facts: dict[str, Any] = {"points": len(planned.samples), "runs": len(planned.samples.piece) - 1}
     facts["resolution"] = resolution
     if planned.solution.iterations:
         facts["iterations"] = planned.solution.iterations

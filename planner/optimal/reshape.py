@@ -26,6 +26,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.constraints.limits import FEED, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
@@ -35,6 +36,7 @@ from planner.smoothing.relax import Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
 FIRST_FORCE = 0.5  # of the pull; 0.3 and 1 gain the same within 1e-3 in eight rounds
+GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]
 GAP = 1e-4  # of a round's convex problem, share of the run's time [-]: below what a round gains
 
@@ -101,22 +103,27 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     row = np.searchsorted(planned.path.spline.first, span[on], side="right") - 1
     within = span[on] - planned.path.spline.first[row]
     interval = np.searchsorted(kept[row], np.arange(len(laid.fits) + 1))
-    v = np.sqrt(solution.feed_sq)
     duration, jerk = solution.duration[on], solution.jerk_s[on]
-    acc = np.stack([solution.acc_s[on], solution.acc_s[on] + jerk * duration], axis=1)
     axes = problem.machine_axes
     motion = SplineMotion(
         interval=interval,
         span=within,
-        tau=np.stack([samples.w0[on], samples.w1[on]], axis=1),
-        feed=np.stack([v[on], v[on + 1]], axis=1),
-        acc=acc,
+        tau=_inside(samples.w0[on], samples.w1[on]),
+        feed=np.sqrt(_inside(solution.feed_sq[on], solution.feed_sq[on + 1])),
+        acc=_inside(solution.acc_s[on], solution.acc_s[on] + jerk * duration),
         jerk=jerk,
         duration=duration,
-        price=_prices(problem, solution, on),
+        price=_inside(*np.moveaxis(_prices(problem, solution, on), 1, 0)),
     )
     H, Q = motion_bands(laid, motion, np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]]))
     return H, Q
+
+
+def _inside(start: FloatArray, end: FloatArray) -> FloatArray:
+    """(I, 2, ..) values at the two places of Gauss's rule inside each interval, from those at its ends (I, ..): the multipliers of the
+    ends stand for what the limits cost along the interval, and a shape that is only paid for at grid points bends between them (after
+    16 rounds on the bracket 8e-4 of the time, on a zig-zag 2e-3)."""
+    return np.stack([start + GAUSS * (end - start), end + GAUSS * (start - end)], axis=1)
 
 
 def _shape(planned: OnPath) -> SplineShape:
@@ -145,8 +152,8 @@ def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> 
     price[:, 0, :, 2], price[:, 1, :, 2] = (0.5 * rows[:, :, k] * slower[k - 1] ** 6 for k in (1, 2))
     name = np.array(problem.bound_names)[problem.feed_sq_bound[on]]
     feed = solution.multipliers.feed[on].sum(axis=1) / problem.feed_sq_limit[on]
-    price[:, 0, :, 0] = np.where(name == "feed", feed, 0.0)[:, None]
+    price[:, 0, :, 0] = np.where(name == FEED.name, feed, 0.0)[:, None]
     for k, axis in enumerate(problem.axes[:axes]):
-        at = name == f"velocity.{axis}"
+        at = name == VELOCITY.called(axis)
         price[at, 0, k, 0] = feed[at] / problem.d1[on[at], k] ** 2
     return price

@@ -50,12 +50,13 @@ def plan_of_solution(
 
 
 def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
-    """What the limits of a jerk-limited motion cost; None where the solver does not tell, behind filters, of which the problem knows
-    only a part, and with limits of one's own."""
-    if not best.solution.multipliers or machine.fir is not None or machine.own:
+    """What the limits of a jerk-limited motion cost; None where the solver does not tell, and behind filters, of which the problem
+    knows only a part. With limits of one's own the tolerance of splines has no price: the machine alone pulls at their shapes."""
+    if not best.solution.multipliers or machine.fir is not None:
         return None
     by_site = None
-    if best.shape is not None and len(best.path.spline):  # what the corridor of the splines costs
+    # what the corridor of the splines costs
+    if best.shape is not None and len(best.path.spline) and not machine.own:
         now, wider = (corridor_prices(best, more) for more in (0.0, MORE_TOLERANCE))
         by_site = SitePrices(place=best.shape.laid.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

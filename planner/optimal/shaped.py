@@ -28,7 +28,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.constraints.own import ratios
 from planner.delivery.filters import Behind
-from planner.delivery.pacing import paced, runs_of
+from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job
@@ -165,8 +165,8 @@ class _Settling:
         slower, first = np.ones(len(runs)), np.ones(len(planned.problem))
         delivered = ShapedMotion(plain, self.shaper)
         for n in range(ROUNDS):
-            motion = paced(plain, runs, slower, np.zeros(len(runs)))
-            motion = paced(motion, runs_of(motion), np.ones(len(runs)), self._rests(motion, planned))
+            motion = slower_runs(plain, runs, slower)
+            motion = standing_longer(motion, runs_of(motion), self._rests(motion, planned))
             delivered = ShapedMotion(motion, self.shaper)
             factor = self._factor(motion, delivered)
             if n == 0:
@@ -255,7 +255,7 @@ def _miss(into: FloatArray, out: FloatArray, rest: FloatArray, shaper: Shaper) -
 
 
 def shaped_plan(job: Job, settings: Settings) -> Plan:
-    """The plan of a job with shaped set points. Raises InputError for a machine without vibration modes; else as `shaped`."""
+    """The plan of a job with shaped setpoints. Raises InputError for a machine without vibration modes; else as `shaped`."""
     if not job.machine.modes:
         raise InputError(
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "

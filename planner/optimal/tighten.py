@@ -14,10 +14,11 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import normal_limit
+from planner.base.kernels import njit
+from planner.constraints.limits import LIMITS
 from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
-from planner.delivery.pacing import paced, runs_of
+from planner.delivery.pacing import runs_of, slower_runs
 from planner.geometry.toolpath import Toolpath
 from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
@@ -41,7 +42,7 @@ SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
-ORDER = {"feed": 1, "velocity": 1, "acceleration": 2, normal_limit.NAME: 2, "jerk": 3}
+ORDER = {limit.name: limit.order for limit in LIMITS}
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
@@ -49,7 +50,7 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     middle, where it is fastest and, if it lies on one grid interval, at the peaks of parabolas through these; <= 1 where it keeps
     them."""
     axes = toolpath.axes
-    limits = [machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")]
+    limits = np.array([machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")])
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
     programmed[toolpath.block] = toolpath.feed
     factor = np.zeros(len(motion.law.t))
@@ -59,11 +60,9 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         part = slice(first, first + CHUNK // len(WATCHED))
         own, times = pieces[part], inside[part]
         seen = motion.at(times.ravel(), machine.dt)
-        worst = (seen.feed / programmed[seen.block]).reshape(times.shape).max(axis=1)
+        worst = np.empty(len(own))
         motions = (seen.velocity, seen.acceleration, seen.jerk)
-        for order, (values, limit) in enumerate(zip(motions, limits, strict=True), start=1):
-            most = _most((values / limit).reshape(*times.shape, -1), smooth[own]).max(axis=1)
-            worst = np.maximum(worst, most ** (1.0 / order))
+        _worst(seen.feed / programmed[seen.block], motions, limits, smooth[own], worst)
         for order, ratio in ratios(machine.own, seen):
             worst = np.maximum(worst, ratio.reshape(times.shape).max(axis=1) ** (1.0 / order))
         factor[own] = worst
@@ -86,19 +85,37 @@ def _on_one_interval(motion: Motion) -> Array:
     return np.asarray(beyond <= grid[np.minimum(interval + 1, len(grid) - 1)])
 
 
-def _most(y: FloatArray, smooth: Array) -> FloatArray:
-    """(n, A) largest |y| of values (n, 3, A) at the shares `WATCHED` of pieces, on smooth ones of the parabolas through them too."""
-    seen = np.abs(y).max(axis=1)
-    slope = (y[:, 2] - y[:, 0]) / (WATCHED[2] - WATCHED[0])
-    bend = (y[:, 2] - 2.0 * y[:, 1] + y[:, 0]) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
-    inside = smooth[:, None] & (np.abs(slope) < np.abs(bend))  # less than half of the piece from its middle
-    peak = np.abs(y[:, 1] - np.divide(slope**2, 4.0 * bend, out=np.zeros_like(bend), where=inside))
-    known = np.maximum(seen, 1.0)
-    return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
+@njit(cache=True, error_model="numpy")
+def _worst(feed, motions, limits, smooth, out):
+    """The factor of each of n pieces, into out (n,), from what is seen of it at the shares `WATCHED`: feed (3 n,) over the programmed
+    one, and velocities, accelerations and jerks (3 n, A) with their limits (3, A); on smooth pieces (n,) of the parabolas through
+    them too."""
+    apart = WATCHED[2] - WATCHED[0]
+    for n in range(len(out)):
+        worst = max(feed[3 * n], feed[3 * n + 1], feed[3 * n + 2])
+        for order in range(3):
+            values, most = motions[order], 0.0
+            for k in range(values.shape[1]):
+                limit = limits[order, k]
+                y0, y1, y2 = (
+                    values[3 * n, k] / limit,
+                    values[3 * n + 1, k] / limit,
+                    values[3 * n + 2, k] / limit,
+                )
+                seen = max(abs(y0), abs(y1), abs(y2))
+                slope = (y2 - y0) / apart
+                bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+                peak = abs(y1)
+                if smooth[n] and abs(slope) < abs(bend):  # less than half of the piece from its middle
+                    peak = abs(y1 - slope * slope / (4.0 * bend))
+                known = max(seen, 1.0)
+                most = max(most, known + PEAK_MORE * (peak - known) if peak > known else max(seen, peak))
+            worst = max(worst, most ** (1.0 / (order + 1)))
+        out[n] = worst
 
 
 def fastest_inside(law: TimeLaw) -> FloatArray:
-    """When the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
     lasting = np.diff(np.append(law.t, law.end))
     braking = np.flatnonzero(law.jerk_s < 0.0)
     tau = -law.acc_s[braking] / law.jerk_s[braking]
@@ -123,8 +140,8 @@ def within_limits(
     if not order.jerk_limited:
         return planned, motion
     factor = excess(motion, toolpath, machine)
-    best = planned, slowed(motion, toolpath, machine, factor)
-    tell("between points", found=best[1].end, excess=float(factor.max() - 1.0))
+    best, least = (planned, motion, factor), _slowed_once(motion, factor).end
+    tell("between points", found=least, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
     for _ in range(1 if large else TIGHTENING_ROUNDS):
@@ -137,17 +154,12 @@ def within_limits(
             break
         motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
-        kept = slowed(motion, toolpath, machine, factor)
-        tell(
-            "tighten",
-            found=kept.end,
-            before=best[1].end,
-            kept=kept.end < best[1].end,
-            excess=float(factor.max() - 1.0),
-        )
-        if kept.end < best[1].end:
-            best = tighter, kept
-    return best
+        end = _slowed_once(motion, factor).end
+        tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0))
+        if end < least:
+            best, least = (tighter, motion, factor), end
+    planned, motion, factor = best
+    return planned, slowed(motion, toolpath, machine, factor)
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
@@ -155,15 +167,21 @@ def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatAr
     if factor is None:
         factor = excess(motion, toolpath, machine)
     for _ in range(SLOWING_ROUNDS):
-        of_run = _of_runs(motion, factor)
-        slow = of_run > 1.0 + EXCESS_ROUNDING
-        if not slow.any():
+        slow = _slowed_once(motion, factor)
+        if slow is motion:
             break
-        motion = slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0))
+        motion = slow
         if factor.max() <= 1.0 + SEEN_EXCESS_MAX:
             break  # what the samples of the slower motion may find more, the verifier will see
         factor = excess(motion, toolpath, machine)
     return motion
+
+
+def _slowed_once(motion: Motion, factor: FloatArray) -> Motion:
+    """The motion with every run slowed down by its factor, and by a little more; the motion itself where none needs it."""
+    of_run = _of_runs(motion, factor)
+    slow = of_run > 1.0 + EXCESS_ROUNDING
+    return slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0)) if slow.any() else motion
 
 
 def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
@@ -186,4 +204,4 @@ def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion 
 
 def slower(motion: Motion, factor: FloatArray) -> Motion:
     """Every run (G,) slowed down by its factor."""
-    return paced(motion, runs_of(motion), factor, np.zeros(len(factor)))
+    return slower_runs(motion, runs_of(motion), factor)

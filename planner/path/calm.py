@@ -1,7 +1,7 @@
-"""Where nothing happens along a path: stretches on which a motion keeps the programmed feed, or tracks smoothly what the curve allows.
+"""Where nothing happens along a path: ranges on which a motion keeps the programmed feed, or tracks smoothly what the curve allows.
 
-A grid for jerk-limited motions needs intervals of a part of a/j where the acceleration switches; a machine whose a/j is a thousandth of
-the time that its motions last would fill the memory with them. Two bounds say where they are not needed:
+A grid for jerk-limited motions needs intervals of a fraction of a/j where the acceleration switches; a machine whose a/j is a
+thousandth of the time that its motions last would fill the memory with them. Two bounds say where they are not needed:
 
 * An acceleration that switches over an interval of h seconds instead of at once costs a h^2/(8 v) seconds. With h = 0.03 v/a that is
   1e-4 of v/a, the time which lies between two such switches because the speed has to change between them.
@@ -26,13 +26,13 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 
 SWITCHING_WAY = 0.03  # h above [v/a]
-FREE_SHARE = 0.5  # of accelerations and jerks, on calm curves [-]
-GROWTH = 0.25  # of intervals by their distance from what is not calm [-]: as on straight stretches (feedrate/grid.py, STEP/NEAR)
+FREE_FRACTION = 0.5  # of accelerations and jerks, on calm curves [-]
+GROWTH = 0.25  # of intervals by their distance from what is not calm [-]: as on straight elements (feedrate/grid.py, STEP/NEAR)
 PLACES = 9  # on every curve, at which it is looked at
 
 
 class Calm(NamedTuple):
-    """busy (B, 2) ascending stretches of the path that are not calm, counted along the legs [mm]; feed_sq (R+S,) a lower bound of
+    """busy (B, 2) ascending ranges of the path that are not calm, counted along the legs [mm]; feed_sq (R+S,) a lower bound of
     feed^2 that each leg's and span's curvature leaves, inf where it is straight."""
 
     busy: FloatArray
@@ -40,7 +40,11 @@ class Calm(NamedTuple):
 
 
 def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatArray, FloatArray]) -> Calm:
-    """Where the path is calm; `limits` of velocity, acceleration and jerk (A,) each."""
+    """Where the path is calm (module text).
+
+    table  : of the path's elements
+    limits : velocity [mm/s], acceleration [mm/s2] and jerk [mm/s3] of the axes, (A,) each
+    """
     velocity, acceleration, jerk = limits
     legs, spans = path.legs, table.spans
     bend, twist = _turning(*table, acceleration, jerk)
@@ -50,25 +54,28 @@ def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatA
     of_span = feed[np.clip(np.searchsorted(passed, ends, side="right") - 1, 0, len(feed) - 1)].max(axis=0)
     F = np.concatenate([of_leg, of_span])
     with np.errstate(invalid="ignore"):  # rapids: inf times 0
-        lively = (velocity.min() < F) | (bend * F**2 > FREE_SHARE) | (twist * F**3 > FREE_SHARE)
+        lively = (velocity.min() < F) | (bend * F**2 > FREE_FRACTION) | (twist * F**3 > FREE_FRACTION)
     with np.errstate(divide="ignore"):
         feed_sq = np.minimum(1.0 / bend, twist ** (-2.0 / 3.0))
     joint = place[legs.first]
     changes = passed[1:-1][feed[1:] != feed[:-1]]
     leg, span = lively[: len(legs)] & ~_replaced(path), spans[lively[len(legs) :]]
     alone = ~_inside(path)
-    stretches = [
+    ranges = [
         np.stack([joint - path.d_in, joint + path.d_out], axis=1)[alone & (path.joint == Joint.CORNER)],
         np.stack([joint, joint], axis=1)[alone],
         np.stack([changes, changes], axis=1),
         np.stack([joint[:-1], joint[1:]], axis=1)[leg],
         np.stack([span["begin"], span["begin"] + span["width"]], axis=1),
     ]
-    return Calm(busy=_merged(np.concatenate(stretches)), feed_sq=feed_sq)
+    return Calm(busy=_merged(np.concatenate(ranges)), feed_sq=feed_sq)
 
 
 def quiet_way(feed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(M,) how far from what is not calm a motion at `feed` (M,) may still change its speed [mm] (module text)."""
+    """(M,) how far from what is not calm a motion at `feed` (M,) [mm/s] may still change its speed [mm] (module text).
+
+    acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
+    """
     slowest = float((1.0 / acceleration).max())
     return np.asarray(feed * (2.0 * feed * slowest + float((acceleration / jerk).max())))
 
@@ -106,9 +113,9 @@ def _replaced(path: SmoothPath) -> Array:
     return np.asarray(path.legs.length - path.d_out[:-1] - path.d_in[1:] <= 0.0)
 
 
-def _merged(stretches: FloatArray) -> FloatArray:
-    """Ascending stretches (B, 2) without overlaps."""
-    order = stretches[np.argsort(stretches[:, 0], kind="stable")]
+def _merged(ranges: FloatArray) -> FloatArray:
+    """Ascending ranges (B, 2) without overlaps."""
+    order = ranges[np.argsort(ranges[:, 0], kind="stable")]
     end = np.maximum.accumulate(order[:, 1])
     fresh = np.concatenate([[True], order[1:, 0] > end[:-1]])
     last = np.append(np.flatnonzero(fresh)[1:] - 1, len(order) - 1)
@@ -117,8 +124,14 @@ def _merged(stretches: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def interval_ends(start, left, right, base, most, quiet, busy):
-    """Places (n+1,) from left to right, counted from `start`, at which a stretch of one curve and one block is cut: intervals of `base`
-    at most [mm], longer ones, up to `most`, where it is calm and `quiet` away from anything else."""
+    """Ends (n+1,) of the intervals of a row from `left` to `right`: of `base` at most, longer ones, up to `most`, where the path is
+    calm and `quiet` away from what is not.
+
+    start                     : place that left and right are counted from [mm]
+    left, right, base, most   : [mm]
+    quiet                     : `quiet_way` [mm]
+    busy                      : (B, 2) ranges that are not calm [mm]
+    """
     middle = start + 0.5 * (left + right)
     gap = np.searchsorted(busy[:, 0], middle, side="right") - 1
     since = busy[gap, 1] if gap >= 0 else -np.inf
@@ -126,11 +139,11 @@ def interval_ends(start, left, right, base, most, quiet, busy):
     calm_here = since <= middle
     since, until = since - start, until - start
     if not calm_here or not GROWTH * (0.5 * (until - since) - quiet) > base:
-        parts = max(int(np.ceil(max((right - left) / min(base, most), 1.0))), 1)
-        ends = np.empty(parts + 1)
-        for part in range(parts):
-            ends[part] = left + (right - left) * part / parts
-        ends[parts] = right
+        count = max(int(np.ceil(max((right - left) / min(base, most), 1.0))), 1)
+        ends = np.empty(count + 1)
+        for i in range(count):
+            ends[i] = left + (right - left) * i / count
+        ends[count] = right
         return ends
     ends = np.empty(0)
     for sweep in range(2):

@@ -45,7 +45,7 @@ class OwnRows:
     names              : of the limits
     d1                 : (P, V) q'
     d2_left, d2_right, d3_left, d3_right : (P, V) as those of the axes
-    velocity           : (V,) least bounds, for the record
+    least              : (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded
     acceleration, jerk : (P, V) bounds at the points
     feed_sq_max        : (P, V) what the bounds of the velocity allow; inf where nothing
     error              : (P,) of the interval to the right, share of the acceleration bounds [-]
@@ -58,7 +58,7 @@ class OwnRows:
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
-    velocity: FloatArray
+    least: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
     feed_sq_max: FloatArray
@@ -110,9 +110,48 @@ def own_rows(samples: PathSamples, machine: Machine, resolution: float = np.inf)
     coarse[at] &= samples.s[at + 1] - samples.s[at] > LEAST
     return OwnRows(
         names=tuple(limit.name for limit in machine.own),
-        velocity=np.array([column.velocity for column in columns]),
+        least=np.stack([column.least for column in columns], axis=1),
         error=error,
         coarse=coarse,
+        **stacked,
+    )
+
+
+def own_rows_at_points(samples: PathSamples, machine: Machine) -> OwnRows:
+    """The rows of the machine's own limits at the points alone, nothing looked at between them: for grids that were thinned out, whose
+    intervals may lie on several elements."""
+    axes, points = samples.path.toolpath.axes, len(samples)
+    left = (samples.position, samples.d1, samples.d2_left, samples.d3_left)
+    right = (samples.position, samples.d1, samples.d2_right, samples.d3_right)
+    here = Place(axes, list(samples.position.T), samples.d1)
+    real = _real_bounds(samples, machine, np.arange(points), np.stack(right, axis=1))
+    v = np.sqrt(real.feed_sq)
+    columns: list[dict[str, FloatArray]] = []
+    for limit in machine.own:
+        before, after = _along(limit, axes, left, here), _along(limit, axes, right, here)
+        bound, size = bounds_at(limit, here, points), np.abs(after[0])
+        second = size * real.acceleration + np.abs(after[1]) * real.feed_sq
+        third = size * real.jerk + 3.0 * np.abs(after[1]) * v * real.acceleration + np.abs(after[2]) * v**3
+        with np.errstate(divide="ignore"):
+            feed_sq = (bound[:, 0] / size) ** 2
+        columns.append(
+            {
+                "d1": after[0],
+                "d2_left": before[1],
+                "d2_right": after[1],
+                "d3_left": before[2],
+                "d3_right": after[2],
+                "least": bound.min(axis=0),
+                "acceleration": np.minimum(bound[:, 1], BEYOND * second.max(initial=1.0)),
+                "jerk": np.minimum(bound[:, 2], BEYOND * third.max(initial=1.0)),
+                "feed_sq_max": feed_sq,
+            }
+        )
+    stacked = {name: np.stack([column[name] for column in columns], axis=1) for name in columns[0]}
+    return OwnRows(
+        names=tuple(limit.name for limit in machine.own),
+        error=np.zeros(points),
+        coarse=np.zeros(points, dtype=bool),
         **stacked,
     )
 
@@ -150,7 +189,7 @@ class _Column:
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
-    velocity: float
+    least: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
     feed_sq_max: FloatArray
@@ -177,7 +216,8 @@ class _Column:
         with np.errstate(divide="ignore", over="ignore"):
             feed_sq = (bound[:, 0] / np.abs(q_right[0])) ** 2
             feed_sq_mid = (bound_mid[:, 0] / np.abs(q_mid[0])) ** 2
-        limited = np.isfinite(bound[:, 0]).any() or np.isfinite(bound_mid[:, 0]).any()
+        least = np.minimum(bound.min(axis=0), bound_mid.min(axis=0))
+        limited = bool(np.isfinite(least[0]))
         feed_sq, short, jump = _between(feed_sq, feed_sq_mid, real_sq, FAR * real.feed_sq, at)
         # what the intervals can be run with, for the errors of their rows
         x = np.minimum(real.feed_sq, np.minimum(np.maximum(feed_sq[a], feed_sq[b]), feed_sq_mid))
@@ -193,14 +233,14 @@ class _Column:
         jerk, short_j, jump_j = _between(
             np.minimum(bound[:, 2], beyond_j), np.minimum(bound_mid[:, 2], beyond_j), None, None, at
         )
-        least = np.minimum(np.minimum(acceleration[a], acceleration[b]), bound_mid[:, 1])
+        strongest = np.minimum(np.minimum(acceleration[a], acceleration[b]), bound_mid[:, 1])
         with np.errstate(divide="ignore", invalid="ignore"):
-            x = np.fmin(x, (least + size * u) / np.abs(q_mid[1]))
-            u = np.fmin(u, (least + np.abs(q_mid[1]) * x) / size)
+            x = np.fmin(x, (strongest + size * u) / np.abs(q_mid[1]))
+            u = np.fmin(u, (strongest + np.abs(q_mid[1]) * x) / size)
         h = samples.s[b] - samples.s[a]
         error = x * np.abs(q_mid[1] - 0.5 * (q_right[1][a] + q_left[1][b]))
         error = error + 0.5 * u * h * np.abs(q_left[1][b] - q_right[1][a])
-        error = (error + u * np.abs(q_mid[0] - 0.5 * (q_right[0][a] + q_right[0][b]))) / least
+        error = (error + u * np.abs(q_mid[0] - 0.5 * (q_right[0][a] + q_right[0][b]))) / strongest
         bend = x**1.5 * np.abs(q_mid[2] - 0.5 * (q_right[2][a] + q_left[2][b])) / np.minimum(jerk[a], jerk[b])
         return cls(
             d1=q_right[0],
@@ -208,7 +248,7 @@ class _Column:
             d2_right=q_right[1],
             d3_left=q_left[2],
             d3_right=q_right[2],
-            velocity=float(min(bound[:, 0].min(), bound_mid[:, 0].min())) if limited else np.finfo(float).max,
+            least=least,
             acceleration=acceleration,
             jerk=jerk,
             feed_sq_max=feed_sq if limited else np.full(points, np.inf),

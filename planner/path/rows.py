@@ -1,4 +1,4 @@
-"""The smooth path cut into rows, the stretches of one element and one block that the grid then divides (kernels of path/samples.py).
+"""The smooth path cut into rows of one element and one block each, which the grid then divides (kernels of path/samples.py).
 
 In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans that begins there. Free
 parts and corners are cut at all ends of blocks, spans where the motion passes changes of the feed. Where a piece ends there is a
@@ -20,8 +20,8 @@ from planner.path.calm import SWITCHING_WAY, interval_ends
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
 ARC_STEP = np.pi / 8
 # ... and with so many at least, so that a short arc between two stops can start and stop.
-ARC_PARTS_MIN = 4
-# Free parts of legs shorter than this share of the leg are nothing but rounding: longer ones are at least CLOSE [-].
+ARC_INTERVALS_MIN = 4
+# Free parts of legs shorter than this fraction of the leg are nothing but rounding: longer ones are at least CLOSE [-].
 FREE_PART_MIN = 1e-9
 
 # curve, w0, w1: element and its parameters; segment: of the toolpath; begin, end: place along the legs from the start of the job [mm];
@@ -53,7 +53,7 @@ class Joints(NamedTuple):
 
     first: Array  # (R+1,) the first segment of each leg, then M (geometry/legs.py)
     place: FloatArray  # (M+1,) where each segment starts, counted along the legs [mm]
-    passed: FloatArray  # (M+1,) where the path passes that start; the same but on spans (geometry/spline_passing.py) [mm]
+    passed: FloatArray  # (M+1,) where the path passes that start; the same but on spans (geometry/spline_joints.py) [mm]
     d_in: FloatArray  # (R+1,) what its corner or run takes from the leg before [mm]
     d_out: FloatArray  # (R+1,) and from the leg after [mm]
     blended: Array  # (R+1,) True where there is a corner
@@ -69,14 +69,14 @@ class Longest(NamedTuple):
     """How long the intervals on curves may be (path/calm.py)."""
 
     duration: float  # at the fastest feed [s]; inf for second-order solvers, where the rest is not looked at
-    busy: FloatArray  # (B, 2) stretches of the path that are not calm [mm]
+    busy: FloatArray  # (B, 2) ranges of the path that are not calm [mm]
     feed_sq: FloatArray  # (R+S,) bound of feed^2 by the curvature of each leg and span [mm2/s2]
     quiet: FloatArray  # (M,) `quiet_way` at each segment's feed [mm]
 
 
 @njit(cache=True, error_model="numpy")
 def grown(rows, needed):
-    """`rows`, or a larger copy if it does not have room for `needed`."""
+    """`rows`, or a copy at least twice as long if there is no room in it for `needed` rows."""
     if needed <= len(rows):
         return rows
     out = np.empty(max(2 * len(rows), needed), rows.dtype)
@@ -87,7 +87,7 @@ def grown(rows, needed):
 
 @njit(cache=True, error_model="numpy")
 def set_row(row, curve, segment, w0, w1, begin, end, last):
-    """Fill a row."""
+    """Fill a record `ROW` in place."""
     row.curve, row.segment = curve, segment
     row.w0, row.w1, row.begin, row.end, row.last = w0, w1, begin, end, last
 
@@ -120,17 +120,17 @@ def _arc_feed(leg, feed, limits):
 def _cut_leg(rows, n, leg, seg, start, ends):
     """Rows of the free part of a leg that starts at the place `start`, cut at `ends` on it; returns the rows and their number."""
     rows = grown(rows, n + len(ends) - 1)
-    for part in range(len(ends) - 1):
-        left, right = ends[part], ends[part + 1]
+    for i in range(len(ends) - 1):
+        left, right = ends[i], ends[i + 1]
         set_row(rows[n], leg, seg, left, right, start + left, start + right, False)
         n += 1
     return rows, n
 
 
 @njit(cache=True, error_model="numpy")
-def _cut_corner(rows, n, corners, k, seg, part, vertex, breaks):
-    """Rows of a part (wa, wb) of corner k whose vertex is at `vertex` [mm], cut at its breaks; returns the rows and their number."""
-    wa, wb = part
+def _cut_corner(rows, n, corners, k, seg, between, vertex, breaks):
+    """Rows of corner k, vertex at `vertex` [mm], between (wa, wb), cut at its breaks; returns the rows and their number."""
+    wa, wb = between
     rows = grown(rows, n + len(breaks) + 1)
     cut = 0
     left = wa
@@ -155,6 +155,8 @@ def _base(longest, feed, feed_sq, acceleration):
 
 
 class _Pace(NamedTuple):
+    """The limits as `_cut_span` needs them."""
+
     feed: FloatArray  # (M,) programmed [mm/s]
     changes: Array  # segments at whose start it changes, ascending
     speed: float  # of all axes together [mm/s]
@@ -164,11 +166,12 @@ class _Pace(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def _pace(limits):
     """What `_cut_span` needs of the limits."""
-    speed_sq = 0.0
+    speed_sq, acceleration_sq = 0.0, 0.0
     for k in range(len(limits.velocity)):
         speed_sq += limits.velocity[k] * limits.velocity[k]
+        acceleration_sq += limits.acceleration[k] * limits.acceleration[k]
     changes = np.flatnonzero(limits.feed[1:] != limits.feed[:-1]) + 1
-    return _Pace(limits.feed, changes, np.sqrt(speed_sq), float(np.linalg.norm(limits.acceleration)))
+    return _Pace(limits.feed, changes, np.sqrt(speed_sq), np.sqrt(acceleration_sq))
 
 
 @njit(cache=True, error_model="numpy")
@@ -194,8 +197,8 @@ def _cut_span(rows, n, span, curve, seg, passed, limits, longest):
         base = _base(longest.duration, fastest, longest.feed_sq[curve], limits.acceleration)
         ends = interval_ends(0.0, left, right, base, np.inf, longest.quiet[seg], longest.busy)
         rows = grown(rows, n + len(ends) - 1)
-        for part in range(len(ends) - 1):
-            a, b = ends[part], ends[part + 1]
+        for i in range(len(ends) - 1):
+            a, b = ends[i], ends[i + 1]
             w0 = 0.0 if a == begin else (a - begin) / span.width
             w1 = 1.0 if b == end else (b - begin) / span.width
             set_row(rows[n], curve, seg, w0, w1, a, b, False)
@@ -208,7 +211,10 @@ def _cut_span(rows, n, span, curve, seg, passed, limits, longest):
 
 @njit(cache=True, error_model="numpy")
 def cut_path(table, joints, limits, longest):
-    """Rows (n,) of the whole path in order (module text); table: `ElementTable` (corners/elements.py)."""
+    """Rows (n,) `ROW` of the whole path in order (module text).
+
+    table, joints, limits, longest : `ElementTable` (corners/elements.py), `Joints`, `PathLimits`, `Longest`
+    """
     legs, corners, spans = table
     rows = np.empty(8 * len(legs) + 4 * len(spans) + 64, ROW)
     n = 0
@@ -228,7 +234,7 @@ def cut_path(table, joints, limits, longest):
                 if legs[leg].round:
                     fastest = _arc_feed(legs[leg], feed[seg], limits)
                     base = _base(longest.duration, fastest, longest.feed_sq[leg], pace.acceleration)
-                    most = min(ARC_STEP / abs(legs[leg].rate), (wb - wa) / ARC_PARTS_MIN)
+                    most = min(ARC_STEP / abs(legs[leg].rate), (wb - wa) / ARC_INTERVALS_MIN)
                     ends = interval_ends(start, wa, wb, base, most, longest.quiet[seg], longest.busy)
                 rows, n = _cut_leg(rows, n, leg, seg, start, ends)
         run = joints.run[k]

@@ -10,7 +10,7 @@ length h, fastest x and largest u that the limits allow there)
 `RESOLUTION`; for solvers of third order the error of the axis jerk at constant speed, relative to its limit, may be `JERK_SHARE`
 times as large, and x is bounded by the jerk limits as well. What remains is kept per interval as `margin`, and the constraints are
 tightened by it, so that they hold between
-grid points and not only at them. Straight stretches need one interval: there g is exactly linear.
+grid points and not only at them. Straight elements need one interval: there g is exactly linear.
 
 PathLimits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
 is convex there, so a line through two caps would cut the corner; the end with the larger curvature keeps its cap and the other
@@ -107,7 +107,7 @@ class PathSamples:
 
     @property
     def intervals(self) -> Array:
-        """Indices of the points that have an interval to their right."""
+        """(n,) indices of the points that have an interval to their right."""
         inner = np.ones(len(self), dtype=bool)
         inner[self.piece[1:] - 1] = False
         return np.flatnonzero(inner)
@@ -213,7 +213,7 @@ def _joints(path: SmoothPath) -> Joints:
 
 def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
     """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the free part of each leg
-    is stretched from its first and last block's ends, and the margins stay as they are."""
+    is scaled from its first and last block's ends, and the margins stay as they are."""
     legs, element, segment = path.legs, samples.element, samples.segment
     free = element >= 0
     leg = np.maximum(element, 0)
@@ -240,7 +240,7 @@ def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
 
 
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
-    """Add grid points at arc lengths `s` (n,) inside straight intervals (n,), sorted by place.
+    """Add grid points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by place.
 
     Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
     """
@@ -283,7 +283,7 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
 
 
 def straight(legs: Array, element: Array) -> Array:
-    """True for the elements that are the free part of a straight leg."""
+    """(n,) True where `element` (n,) is what is free of a straight leg; `legs` (R,) are records of geometry/legs.py."""
     leg = (element >= 0) & (element < len(legs))
     return leg & ~legs["round"][np.where(leg, element, 0)]
 

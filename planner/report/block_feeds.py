@@ -23,12 +23,14 @@ loses. Blocks that have no sample of their own are timed by the same formula.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory, joined
 
 # A highest feed within this share of the programmed one is the programmed one [-]: solvers stay a little away from their limits.
 SAME = 1e-3
@@ -40,6 +42,14 @@ SPREAD = 0.5
 RUN_PERIODS = 20
 
 
+@dataclass(frozen=True, eq=False)
+class PlannedBlocks:
+    """What the M segments of a path are planned to take: (M,) time [s], dwells not included, and (M,) highest feed [mm/s]."""
+
+    duration: FloatArray
+    highest: FloatArray
+
+
 def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
     """F words for the blocks of a program: an upper envelope of the planned feed (module text).
 
@@ -47,13 +57,15 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
 
     Returns the feed of each block (blocks,) [mm/s]; NaN for rapids and for blocks that move nowhere.
     """
-    joint = _joint_times(trajectory, toolpath)
-    duration = _block_times(joint, toolpath)
-    highest = _highest_feeds(trajectory, toolpath, joint, duration)
+    return feeds_of(planned_blocks(trajectory, toolpath), toolpath, machine, blocks)
+
+
+def feeds_of(planned: PlannedBlocks, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
+    """(blocks,) `block_feeds` [mm/s] from what is known of the blocks."""
     cut = np.flatnonzero(~toolpath.rapid)
-    run = runs_of_feed(highest[cut], duration[cut], RUN_PERIODS * machine.dt)
+    run = runs_of_feed(planned.highest[cut], planned.duration[cut], RUN_PERIODS * machine.dt)
     cap = np.zeros(len(cut))  # of each run
-    np.maximum.at(cap, run, highest[cut])
+    np.maximum.at(cap, run, planned.highest[cut])
     cap = cap[run]
     programmed = toolpath.feed[cut]
     feeds = np.full(blocks, np.nan)
@@ -62,7 +74,12 @@ def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, bl
 
 
 def runs_of_feed(highest: FloatArray, duration: FloatArray, least: float) -> Array:
-    """(n,) the run of each block, from 0; `least` [s] as the module says."""
+    """(n,) the run of each block, from 0 (module text).
+
+    highest  : (n,) highest feed of each block [mm/s]
+    duration : (n,) how long each takes [s]
+    least    : shortest time of a run [s]
+    """
     run = np.empty(len(highest), np.int64)
     count, lasted = 0, 0.0
     low = high = highest[0] if len(highest) else 0.0
@@ -78,50 +95,88 @@ def runs_of_feed(highest: FloatArray, duration: FloatArray, least: float) -> Arr
 
 def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
     """(M,) planned time on each segment [s], dwells not included. With the dwells they add up to the cycle time."""
-    return _block_times(_joint_times(trajectory, toolpath), toolpath)
+    return planned_blocks(trajectory, toolpath).duration
 
 
-def _block_times(joint: FloatArray, toolpath: Toolpath) -> FloatArray:
-    return np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
+def planned_blocks(trajectory: Trajectory, toolpath: Toolpath) -> PlannedBlocks:
+    """Times and highest feeds of the blocks of a path, see `BlockWatch`."""
+    watch = BlockWatch(toolpath)
+    for chunk in trajectory.chunks():
+        watch.take(chunk)
+    return watch.planned(trajectory)
 
 
-def _highest_feeds(
-    trajectory: Trajectory, toolpath: Toolpath, joint: FloatArray, duration: FloatArray
-) -> FloatArray:
-    """(M,) highest planned feed on each segment [mm/s]: at its samples, half-way between them, as far as feeds and accelerations at
-    both tell, and at its joints. Its mean at least; twice that where both joints are passed at less than half of it, as between two
-    full stops without a sample: from rest to rest no jerk-limited motion is faster."""
-    t, feed = trajectory.t, trajectory.feed
-    passed = np.interp(joint, t, feed)
-    highest = np.maximum(passed[:-1], passed[1:])
-    segment = np.searchsorted(toolpath.block, trajectory.block)
-    np.maximum.at(highest, segment, feed)
-    push = (trajectory.velocity * trajectory.acceleration).sum(axis=1)
+class BlockWatch:
+    """Times and highest feeds of the blocks of a path, from a trajectory that comes chunk by chunk.
+
+    The highest feed of a block is that at its samples, half-way between them, as far as feeds and accelerations at both tell, and at
+    its joints. Its mean at least; twice that where both joints are passed at less than half of it, as between two full stops without a
+    sample: from rest to rest no jerk-limited motion is faster.
+    """
+
+    def __init__(self, toolpath: Toolpath):
+        self._toolpath = toolpath
+        self._joint, self._passed = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath) + 1)  # when, how fast
+        self._highest = np.zeros(len(toolpath))
+        self._along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
+        self._last: Trajectory | None = None
+
+    def take(self, chunk: Trajectory) -> None:
+        """The next samples."""
+        part = chunk if self._last is None else joined([self._last, chunk])
+        segment = np.searchsorted(self._toolpath.block, part.block)
+        joints = np.arange(segment[0] + 1, segment[-1] + 1)
+        self._joint[joints], self._passed[joints] = _passed(
+            part, segment, joints, self._toolpath, self._along
+        )
+        _look_between(part, segment, self._highest, self._last is None)
+        self._last = part.rows(np.array([len(part) - 1]))
+
+    def planned(self, trajectory: Trajectory) -> PlannedBlocks:
+        """What was found, all samples of the trajectory taken."""
+        toolpath, joint, passed, last = self._toolpath, self._joint, self._passed, self._last
+        assert last is not None
+        joint[-1], passed[-1] = last.t[-1], last.feed[-1]
+        joint[0] = last.t[-1] - trajectory.cycle_time + toolpath.dwell[0]
+        at = np.clip(trajectory.first_not_before(joint[:1])[0], 1, len(trajectory) - 1)
+        beside = trajectory.rows(np.array([at - 1, at]))
+        passed[0] = np.interp(joint[0], beside.t, beside.feed)
+        duration = np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
+        highest = np.maximum(self._highest, np.maximum(passed[:-1], passed[1:]))
+        mean = np.divide(toolpath.length, duration, out=np.zeros(len(toolpath)), where=duration > 0)
+        return PlannedBlocks(duration, np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean))
+
+
+def _look_between(part: Trajectory, segment: Array, highest: FloatArray, first: bool) -> None:
+    """Take in the feeds of samples at segments (n,) and half-way between them; the first one is new if it is the `first` of all."""
+    feed, push = part.feed, (part.velocity * part.acceleration).sum(axis=1)
     push = np.divide(push, feed, out=np.zeros_like(feed), where=feed > 0)
-    half_way = (feed[1:] + feed[:-1]) / 2 + np.diff(t) / 8 * (push[:-1] - push[1:])
+    np.maximum.at(highest, segment[not first :], feed[not first :])
+    half_way = (feed[1:] + feed[:-1]) / 2 + np.diff(part.t) / 8 * (push[:-1] - push[1:])
     np.maximum.at(highest, segment[1:], half_way)
     np.maximum.at(highest, segment[:-1], half_way)
-    mean = np.divide(toolpath.length, duration, out=np.zeros(len(toolpath)), where=duration > 0)
-    return np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean)
 
 
-def _joint_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(M+1,) when the motion leaves each joint, dwell over [s]; the last: when it ends."""
-    t, feed = trajectory.t, trajectory.feed
-    segment = np.searchsorted(toolpath.block, trajectory.block)
-    along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
-    # Coordinates of the samples along the programmed path: reckoned back from the end of their segment, and on from its start.
-    before = along[segment + 1] - np.linalg.norm(trajectory.position - toolpath.end[segment], axis=1)
-    after = along[segment] + np.linalg.norm(trajectory.position - toolpath.start[segment], axis=1)
+def _passed(
+    part: Trajectory, segment: Array, joint: Array, toolpath: Toolpath, along: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """When the motion leaves each of n joints, dwell over (n,) [s], and how fast (n,) [mm/s].
 
-    joint = np.arange(1, len(toolpath))
+    segment : (T,) of the samples; all of the joints lie between two of them
+    along   : (M+1,) where the joints are along the path [mm]
+    """
+    t, feed = part.t, part.feed
     k = np.searchsorted(segment, joint) - 1  # the last sample before the joint
-    distance = after[k + 1] - before[k]
-    share = np.divide(along[joint] - before[k], distance, out=np.zeros(len(joint)), where=distance > 0).clip(
+    here, there = segment[k], segment[k + 1]
+    # Coordinates of the samples along the programmed path: reckoned back from the end of their segment, and on from its start.
+    before = along[here + 1] - np.linalg.norm(part.position[k] - toolpath.end[here], axis=1)
+    after = along[there] + np.linalg.norm(part.position[k + 1] - toolpath.start[there], axis=1)
+    distance = after - before
+    share = np.divide(along[joint] - before, distance, out=np.zeros(len(joint)), where=distance > 0).clip(
         0.0, 1.0
     )
     v0, v1 = feed[k], feed[k + 1]
     root = v0 + np.sqrt(v0**2 + share * (v1**2 - v0**2))
     tau = np.divide(share * (v0 + v1), root, out=share.copy(), where=root > 0)
-    inner = t[k] + tau * (t[k + 1] - t[k])
-    return np.concatenate([[t[0] + toolpath.dwell[0]], inner, [t[-1]]])
+    when = t[k] + tau * (t[k + 1] - t[k])
+    return when, np.interp(when, t, feed)

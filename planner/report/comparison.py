@@ -114,7 +114,7 @@ def comparison_csv(rows: list[Row]) -> str:
     tail += ["after_filters_mm", "ringing_mm", "planning_time_s", "sentence"]
     write.writerow([*head, *limits, *tail])
     for row in rows:
-        worst = [cell for q in QUANTITIES for cell in (row.worst or {}).get(q, (None, None))]
+        worst = [value for q in QUANTITIES for value in (row.worst or {}).get(q, (None, None))]
         first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
         errors = [
             row.contour_error,

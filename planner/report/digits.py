@@ -25,7 +25,8 @@ FLOAT64 = 4e-16  # relative rounding of a product, twice
 
 
 def rounding(column: Array) -> float:
-    """Largest rounding error of the numbers of a column, from the digits they are written with, in its unit; 0 if they show none."""
+    """Largest rounding error of the numbers of a column (T,), from the digits they are written with, in its unit; 0 if they show
+    none."""
     if column.dtype.kind == "f" and column.dtype.itemsize < 8:
         return float(np.spacing(np.abs(column).max(initial=0))) / 2.0
     numbers = np.unique(np.abs(column.astype(np.float64)))
@@ -47,7 +48,7 @@ def _has(numbers: FloatArray, decade: FloatArray, digits: int) -> bool:
 
 
 def on_grid(t: Array) -> tuple[FloatArray, float, float, float]:
-    """Times (T,) [s] from 0, replaced by k dt if they agree with it within their rounding.
+    """Times t (T,) [s] from 0, replaced by k dt if they agree with it within their rounding.
 
     Returns the times [s], the rounding they were written with [s], and what remains of it for all times and for the last alone [s].
     """

@@ -23,8 +23,10 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.motion.on_demand import TrajectoryOnDemand
+from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
-from planner.report.planned import LeftOut, planned_notes, planned_program
+from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
@@ -61,11 +63,17 @@ def write_plan(
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
     directory = Path(directory)
     run_id = uuid.uuid4().hex
-    program, notes = _planned(plan, directory)
     kept = {PLANNED} if _is_source(plan, directory / PLANNED) else set()
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
-        write_trajectory(new / f"trajectory.{file_format}", plan.trajectory, about)
+        trajectory, blocks = plan.trajectory, None
+        if isinstance(trajectory, TrajectoryOnDemand):  # evaluated once for both files
+            watch = BlockWatch(plan.toolpath)
+            write_trajectory(new / f"trajectory.{file_format}", trajectory.heard_by(watch.take), about)
+            blocks = watch.planned(trajectory)
+        else:
+            write_trajectory(new / f"trajectory.{file_format}", trajectory, about)
+        program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
         if plots:
@@ -181,13 +189,12 @@ def versions() -> dict[str, str]:
     return found | {name: metadata.version(name) for name in PACKAGES}
 
 
-def _planned(plan: Plan, directory: Path) -> tuple[bytes | None, list[str]]:
-    """The re-timed program, or None, and notes on it."""
+def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple[bytes | None, list[str]]:
+    """The re-timed program, or None, and notes on it; `blocks` if their times are known already."""
     if _is_source(plan, directory / PLANNED):
         return None, [f"{PLANNED} is the program that was planned, and stays as it is"]
     try:
-        text = planned_program(plan)
-        return text, planned_notes(plan, text)
+        return planned_program(plan, blocks)
     except LeftOut as why:
         return None, [f"{PLANNED} is left out: {why}"]
 

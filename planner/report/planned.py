@@ -17,7 +17,7 @@ from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.text import program_text
 from planner.nc.writer import retimed
-from planner.report.block_feeds import block_feeds, block_times
+from planner.report.block_feeds import PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -38,8 +38,11 @@ class LeftOut(Exception):
     """There is no program with planned feeds; the message says why."""
 
 
-def planned_program(plan: Plan) -> bytes:
-    """The program file of a plan, with an F word where the planned feed changes.
+def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[bytes, list[str]]:
+    """The program file of a plan, with an F word where the planned feed changes, and notes on blocks for which a control gains nothing
+    from it.
+
+    planned : what the blocks are planned to take, if it is known already
 
     Raises LeftOut if the file has changed since it was planned, or if the result does not read back as the same motion, for example
     because a line would become too long.
@@ -52,21 +55,21 @@ def planned_program(plan: Plan) -> bytes:
         raise LeftOut(f"the program was not read from a file, or {source} is no longer there") from None
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
-    feeds = block_feeds(plan.trajectory, plan.toolpath, plan.machine, len(plan.program))
+    planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
+    feeds = feeds_of(planned, plan.toolpath, plan.machine, len(plan.program))
     if is_plotter_file(data, plan.program.source):
-        return _written_anew(plan, feeds)
-    text = retimed(data, plan.program, feeds)
-    if not _reads_as(text, plan, feeds=False):
-        raise LeftOut(f"{source} with F words does not read back as the same motion")
-    return text
+        text = _written_anew(plan, feeds)
+    else:
+        text = retimed(data, plan.program, feeds)
+        if not _reads_as(text, plan, feeds=False):
+            raise LeftOut(f"{source} with F words does not read back as the same motion")
+    return text, _notes(plan, planned, text)
 
 
-def planned_notes(plan: Plan, text: bytes) -> list[str]:
-    """Notes on blocks for which a control gains nothing from the planned feeds."""
-    assert plan.trajectory is not None
+def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
     if _is_source(plan, text):
         return ["planned.ngc equals the program: no block is planned slower than its F word"]
-    lasting = block_times(plan.trajectory, plan.toolpath)[~plan.toolpath.rapid]
+    lasting = planned.duration[~plan.toolpath.rapid]
     short = int((lasting < plan.machine.dt).sum())
     if short <= MANY_SHORT * len(lasting):
         return []

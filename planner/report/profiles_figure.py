@@ -140,7 +140,12 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
 
 
 def majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
-    """For each of COLUMNS columns over [0, end], the kind (of intervals from t[i]) that fills most of it."""
+    """For each of C = `COLUMNS` columns over [0, end] the kind that fills most of it (C,).
+
+    t     : (n,) starts of the intervals [s], ascending
+    kind  : (n,) kind of each, below `kinds`
+    end   : of the last interval [s]
+    """
     cuts = np.union1d(t, np.linspace(0.0, end, COLUMNS + 1))
     middle = 0.5 * (cuts[1:] + cuts[:-1])
     of = kind[np.clip(np.searchsorted(t, middle, side="right") - 1, 0, len(kind) - 1)]
@@ -150,7 +155,7 @@ def majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
 
 
 def draw_profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> None:
-    """A curve; with many samples the band between the least and the largest value of each column."""
+    """Draw values (T,) over t (T,) [s] as a curve; of many the band between the least and the largest value of each column."""
     if len(t) <= 4 * COLUMNS:
         panel.plot(t, values, color=colour)
         return

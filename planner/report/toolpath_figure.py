@@ -103,11 +103,11 @@ def _flat_view(extent: FloatArray) -> list[int] | None:
 
 
 def one_per_pixel(points: FloatArray) -> Array:
-    """Indices of the first and the last point and of every point that enters another pixel (or voxel)."""
+    """Indices (k,) of the first and the last of the points (n, 2 or 3), and of every point that enters another pixel (or voxel)."""
     pixel = max(float(np.ptp(points, axis=0).max()) / PIXELS, 1e-9)
     while True:
-        cell = np.floor((points - points.min(axis=0)) / pixel).astype(np.int32)
-        keep = np.flatnonzero((np.diff(cell, axis=0) != 0).any(axis=1)) + 1
+        pixels = np.floor((points - points.min(axis=0)) / pixel).astype(np.int32)
+        keep = np.flatnonzero((np.diff(pixels, axis=0) != 0).any(axis=1)) + 1
         if len(keep) <= POINTS_MAX:
             return np.unique(np.concatenate([[0], keep, [len(points) - 1]]))
         pixel *= 1.5

@@ -19,7 +19,7 @@ from __future__ import annotations
 import json
 import math
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -39,6 +39,7 @@ KNOWN = {"t", "s", "feed", "line", "block"} | {
 }
 Format = Literal["parquet", "csv", "npz"]
 FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")
+ROW_GROUP = 2**20  # samples in memory while a file is written: 138 MB with three axes
 CSV_METADATA = ".meta.json"  # takes the place of the suffix .csv
 # Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
 # are noise.
@@ -51,15 +52,15 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, 
     Raises InputError for another suffix.
     """
     path = Path(path)
-    columns, text = _columns(trajectory), json.dumps(about or {}, allow_nan=False)
+    text = json.dumps(about or {}, allow_nan=False)
     match path.suffix:
         case ".parquet":
-            _write_parquet(path, columns, text)
+            _write_parquet(path, trajectory, text)
         case ".csv":
-            _write_csv(path, columns)
+            _write_csv(path, trajectory)
             path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
         case ".npz":
-            np.savez(path, metadata=np.array(text), allow_pickle=False, **columns)
+            np.savez(path, metadata=np.array(text), allow_pickle=False, **_columns(trajectory))
         case _:
             raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
 
@@ -89,32 +90,61 @@ def _columns(trajectory: Trajectory) -> dict[str, Array]:
     }
 
 
-def _write_parquet(path: Path, columns: dict[str, Array], text: str) -> None:
+def _groups(trajectory: Trajectory) -> Iterator[dict[str, Array]]:
+    """The columns of `ROW_GROUP` samples at a time."""
+    parts: list[dict[str, Array]] = []
+    count = 0
+    for chunk in trajectory.chunks():
+        columns, done = _columns(chunk), 0
+        while done < len(chunk):
+            new = min(ROW_GROUP - count, len(chunk) - done)
+            parts.append({name: column[done : done + new] for name, column in columns.items()})
+            done, count = done + new, count + new
+            if count == ROW_GROUP:
+                yield _end_to_end(parts)
+                parts, count = [], 0
+    if parts:
+        yield _end_to_end(parts)
+
+
+def _end_to_end(parts: list[dict[str, Array]]) -> dict[str, Array]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _write_parquet(path: Path, trajectory: Trajectory, text: str) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    table = pa.table({name: np.ascontiguousarray(column) for name, column in columns.items()})
-    # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its fastest level
-    # then leaves 55 % of the bytes, as fast as writing them raw. Higher levels take longer and save nothing;
-    # dictionaries make it larger.
-    parquet.write_table(
-        table.replace_schema_metadata({"planner": text}),
-        path,
-        compression="zstd",
-        compression_level=1,
-        use_dictionary=["line", "block"],
-        use_byte_stream_split=[name for name in columns if name not in ("line", "block")],
-    )
+    writer = None
+    for columns in _groups(trajectory):
+        table = pa.table(columns).replace_schema_metadata({"planner": text})
+        if writer is None:
+            # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its fastest level
+            # then leaves 55 % of the bytes, as fast as writing them raw. Higher levels take longer and save nothing;
+            # dictionaries make it larger.
+            writer = parquet.ParquetWriter(
+                path,
+                table.schema,
+                compression="zstd",
+                compression_level=1,
+                use_dictionary=["line", "block"],
+                use_byte_stream_split=[name for name in columns if name not in ("line", "block")],
+            )
+        writer.write_table(table)
+    assert writer is not None
+    writer.close()
 
 
-def _write_csv(path: Path, columns: dict[str, Array]) -> None:
+def _write_csv(path: Path, trajectory: Trajectory) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
-    table = pa.table({name: np.ascontiguousarray(column) for name, column in columns.items()})
     with path.open("wb") as file:
-        file.write((",".join(columns) + "\n").encode())  # pyarrow would put the names in quotes
-        csv.write_csv(table, file, csv.WriteOptions(include_header=False, batch_size=65536))
+        file.write(
+            (",".join(units(trajectory.axes)) + "\n").encode()
+        )  # pyarrow would put the names in quotes
+        for columns in _groups(trajectory):
+            csv.write_csv(pa.table(columns), file, csv.WriteOptions(include_header=False, batch_size=65536))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -25,7 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.assemble import feedrate_problem, interval_sides
+from planner.constraints.assemble import feedrate_problem
+from planner.constraints.limits import ACCELERATION, CHORD_ERROR, FILTER_ERROR
+from planner.constraints.on_grid import interval_sides
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
@@ -44,7 +46,10 @@ CANDIDATES = 30  # corners whose own price is looked at
 # Joints on either side of a corner whose sizes it can change: neighbours share legs, one more in each round (corners/sharing.py).
 REACH = 12
 TIGHT = 1e-3  # legs with a smaller free share are shared by their corners, to rounding of that sharing [-]
-BUDGETS = ("chord_error", "filter_error")  # bounds in proportion to what the rounding leaves of the tolerance
+BUDGETS = (
+    CHORD_ERROR.name,
+    FILTER_ERROR.name,
+)  # bounds in proportion to what the rounding leaves of the tolerance
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,7 +69,7 @@ class CornerPrices:
 
     def by_acceleration(self, axis: str) -> float:
         """dT/d(ln acceleration) of an axis, as far as it acts through sizes and budgets of the corners [s]."""
-        machine = more_of(self.machine, f"acceleration.{axis}")(STEP)
+        machine = more_of(self.machine, ACCELERATION.called(axis))(STEP)
         return float(self._change(machine, self.path.toolpath.tolerance).sum()) / STEP
 
     def by_tolerance(self) -> FloatArray:
@@ -157,9 +162,10 @@ def corner_prices(
     turns = (joints % 2 == 0, joints % 2 == 1) if path.legs.table["round"].any() else (joints >= 0,)
     for own in turns:
         by = np.where(own, growth, 0.0)
-        grown = dataclasses.replace(path, stretch=path.stretch * (1.0 + by)[:, None])
+        grown = dataclasses.replace(path, scale=path.scale * (1.0 + by)[:, None])
         moved = feedrate_problem(moved_grid(samples, grown), machine)
-        there = lagrangian(dataclasses.replace(moved, limit_scale=problem.limit_scale), solution)
+        moved = dataclasses.replace(moved, limit_scale=problem.limit_scale, margin=problem.margin)
+        there = lagrangian(moved, solution)
         change = there.value - now.value
         total += sums(~samples.element[corner], change[corner], len(joints))
         on_leg = sums(leg[~corner], change[~corner], len(joints) - 1)

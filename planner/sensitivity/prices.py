@@ -34,11 +34,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints import chord_error
 from planner.constraints.assemble import feedrate_problem
+from planner.constraints.limits import ACCELERATION, FEED, OF_AXES, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
-from planner.feedrate.solution import FeedrateSolution
+from planner.feedrate.solution import FeedrateSolution, Prices
 from planner.geometry.toolpath import Joint
 from planner.job.records import SAVED_MIN, DearCorners, PriceList
 from planner.machine import Machine
@@ -94,16 +96,11 @@ def price_list(
     now = lagrangian(problem, solution)
     prices = solution.prices
     assert prices is not None  # solvers that give multipliers give prices
-    limit = {
-        f"{quantity}.{axis}": float(getattr(problem, quantity)[k])
-        for quantity in ("velocity", "acceleration", "jerk")
-        for k, axis in enumerate(problem.axes)
-    }
-    direct = np.concatenate([prices.velocity, prices.acceleration, prices.jerk])
-    by_share = {name: price * limit[name] for name, price in zip(limit, direct.tolist(), strict=True)}
+    limit, by_share = _by_share(problem, prices)
     changes = {name: Change(machine=more_of(machine, name)) for name in limit}
-    changes["feed"] = Change(machine=lambda share: machine, feed=lambda share: 1.0 + share)
-    speeds = ["feed", *(name for name in limit if name.startswith("velocity") and by_share[name] < 0.0)]
+    changes[FEED.name] = Change(machine=lambda share: machine, feed=lambda share: 1.0 + share)
+    velocities = [name for name in map(VELOCITY.called, problem.axes) if name in limit]
+    speeds = [FEED.name, *(name for name in velocities if by_share[name] < 0.0)]
     for name in speeds:  # these are dT/d(ln limit)
         by_share[name] = _by_speed(samples, problem, now, changes[name])
     dear, tolerance = None, None
@@ -115,8 +112,8 @@ def price_list(
         dear = _dearest(samples.path, together, -0.5 * MORE_TOLERANCE * (together + wider))
     elif isinstance(samples.path, SmoothPath) and not len(samples.path.spline):
         corners = corner_prices(samples.path, samples, problem, solution, machine, now)
-        for axis in problem.axes:
-            by_share[f"acceleration.{axis}"] += corners.by_acceleration(axis)
+        for axis in problem.axes[: problem.machine_axes]:
+            by_share[ACCELERATION.called(axis)] += corners.by_acceleration(axis)
         together = corners.by_tolerance()
         tolerance = float(together.sum()) + corners.between()
         dear = corners.dearest(together)
@@ -134,13 +131,29 @@ def price_list(
     found = {name: saving if name == "tolerance" else saving.below(most) for name, saving in found.items()}
     return PriceList(
         limits={name: by_share[name] / limit[name] for name in limit},
-        feed=by_share["feed"],
+        feed=by_share[FEED.name],
         tolerance=tolerance,
         saved={name: saving.middle for name, saving in found.items()},
         corners=dear,
         ranges={name: (saving.least, saving.most) for name, saving in found.items()},
         hints=tuple(name for name, saving in found.items() if saving.vague(solution.cycle_time)),
     )
+
+
+def _by_share(problem: FeedrateProblem, prices: Prices) -> tuple[dict[str, float], dict[str, float]]:
+    """The limits of the axes and of one's own by their names, as far as they bound anything: the limit itself, of one's own the least
+    that was met, in its own unit; and dT/d(ln limit) [s]."""
+    limit, by_share = {}, {}
+    for quantity, kind in enumerate(OF_AXES):
+        planned, price = getattr(problem, kind.name), getattr(prices, kind.name)
+        for k, axis in enumerate(problem.axes):
+            least = planned[k]
+            if problem.own_least is not None and k >= problem.machine_axes:
+                least = problem.own_least[quantity, k - problem.machine_axes]
+            if np.isfinite(least):
+                name = kind.called(axis)
+                limit[name], by_share[name] = float(least), float(price[k]) * float(planned[k])
+    return limit, by_share
 
 
 class Saving(NamedTuple):
@@ -241,7 +254,7 @@ def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machin
     """The largest share of the tolerance that chords between samples use, kappa v^2 dt^2 / 8 over eps, eq. (18)."""
     kappa = np.maximum(samples.kappa_left, samples.kappa_right)
     tolerance = samples.path.toolpath.tolerance[samples.segment]
-    chord = kappa * solution.feed_sq * machine.dt**2 / 8.0
+    chord = kappa * solution.feed_sq * chord_error.rate(machine)
     return float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())
 
 

@@ -1,7 +1,7 @@
 """Where a spline needs its knots: near to each other where the path turns much within its tolerance.
 
-A control polygon that follows the path leaves it by about a quarter of the turning on a stretch times its length. So knots stand
-at distances
+A control polygon that follows the path leaves it by about a quarter of the turning between two knots times their distance. So knots
+stand at distances
 
     h(u) = the longest h with  turning within h around u  *  h <= FITTING * tolerance,
 

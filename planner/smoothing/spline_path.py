@@ -115,7 +115,7 @@ def _cusp_spans(splines):
 
 
 def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Array:
-    """Joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the corridor, without a
+    """(k,) joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the corridor, without a
     certificate or with a cusp, of the joints around it the one that turns most, or those on both sides of it (`fence`), which leave
     a run of a few joints there."""
     laid, runs = shape.laid, shape.runs

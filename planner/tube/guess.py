@@ -27,7 +27,7 @@ STEPS_PER_UNIT = 4.0
 STEPS_OF_LEG = 2.0
 # Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
 LONGEST, MOST_FOR_LENGTH = 8.0, 30
-# Steps on arcs are at most this share of what the problem allows them (run.py) [-], which leaves room to move.
+# Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to move.
 ARC_STEP = 0.8
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
@@ -61,12 +61,16 @@ class Guess:
         return len(self.h)
 
     def slower(self, by: float) -> Guess:
-        """The same way in `by` times the time."""
+        """The same path in `by` times the time."""
         return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
 
 
 def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> Guess:
-    """Cut a motion along the run into steps. vertex_time: (R+1,) when it passes the vertices [s], strictly ascending."""
+    """Cut a motion along a run of R legs into steps.
+
+    motion      : along this run alone, at rest at both ends
+    vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
+    """
     leg, nodes = _steps(run, motion, vertex_time)
     of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
     state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
@@ -90,14 +94,15 @@ def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> tuple[A
         inside = motion.t[(motion.t > begin) & (motion.t < end)]
         t = np.concatenate([[begin], inside, [end]])
         even = (t - begin) / (end - begin)
-        share = np.interp(t, motion.t, spent)
-        share += least[r] * even - share[0]
-        steps[r] = int(np.ceil(share[-1]))
-        times.append(np.interp(share[-1] * np.arange(steps[r]) / steps[r], share, t))
+        fraction = np.interp(t, motion.t, spent)
+        fraction += least[r] * even - fraction[0]
+        steps[r] = int(np.ceil(fraction[-1]))
+        times.append(np.interp(fraction[-1] * np.arange(steps[r]) / steps[r], fraction, t))
     return np.repeat(np.arange(len(run)), steps), np.append(np.concatenate(times), vertex_time[-1])
 
 
 def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArray:
+    """(n, A) a column (T, A) at times t (T,), interpolated at the times (n,)."""
     return np.stack([np.interp(at, t, values) for values in column.T], axis=1)
 
 
@@ -110,8 +115,8 @@ def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelle
     begin = np.append(0, last[:-1] + 1)
     per_length = run.length / (travelled[last + 1] - travelled[begin])
     places = np.empty((len(leg), 4))
-    for k, (control, share) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
-        there = (1 - share) * travelled[:-1] + share * travelled[1:]
+    for k, (control, fraction) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
+        there = (1 - fraction) * travelled[:-1] + fraction * travelled[1:]
         x = (there - travelled[begin][leg]) * per_length[leg]
         for _ in range(NEAREST_STEPS):
             miss, along = control - run.points(leg, x), run.tangents(leg, x)

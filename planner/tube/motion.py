@@ -13,10 +13,10 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.tube.guess import Guess
-from planner.tube.nlp import TubeSolution
+from planner.tube.outcome import TubeSolution
 from planner.tube.run import TubeRun
 
-# Places in every step at which the normal acceleration is measured [share of the step]; between them it is above by less than 1e-6.
+# Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.
 MEASURED_AT = np.linspace(0.0, 1.0, 257)
 
 
@@ -26,7 +26,7 @@ class Steps:
 
     h                                    : (N,) duration [s]
     position, velocity, acceleration     : (N, A) at the start of each
-    jerk                                 : (N, A)
+    jerk                                 : (N, A) on the step
     """
 
     h: FloatArray
@@ -37,7 +37,10 @@ class Steps:
 
 
 def steps_of(run: TubeRun, guess: Guess, solution: TubeSolution) -> Steps:
-    """The motion of a solution, on its end and within all limits."""
+    """The motion of a solution, from vertex to vertex and within all limits (module text).
+
+    solution : one that found steps; `guess` is what it began with
+    """
     assert solution.h is not None
     assert solution.jerk is not None
     h, jerk = solution.h, solution.jerk
@@ -53,7 +56,7 @@ def steps_of(run: TubeRun, guess: Guess, solution: TubeSolution) -> Steps:
 
 
 def integrated(run: TubeRun, h: FloatArray, jerk: FloatArray) -> Steps:
-    """The motion from rest at the first vertex with jerks (N, A) [mm/s3], constant over steps of h (N,) [s]."""
+    """The motion from rest at the first vertex with the jerk (N, A) [mm/s3], constant over steps of h (N,) [s]."""
     h = h[:, None]
     acceleration = _before(h * jerk)
     velocity = _before(h * (acceleration + h * jerk / 2))
@@ -67,14 +70,18 @@ def _before(change: FloatArray) -> FloatArray:
 
 
 def closing_jerks(run: TubeRun, h: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(N, A) the smallest part of the jerks that carries the motion beyond its end."""
+    """(N, A) the smallest change of jerk [mm/s3] without which the motion would not end at rest at the last vertex.
+
+    h    : (N,) durations [s]
+    jerk : (N, A) [mm/s3]
+    """
     rest = (h.sum() - np.cumsum(h)) / h.sum()  # after each step, in units of the whole time
     own = h / h.sum()
     to_end = np.stack(
         [own, own * (own / 2 + rest), own * (own**2 / 6 + rest * (own / 2 + rest / 2))]
     )  # of a, v, p, in those units
-    way = (run.vertex[-1] - run.vertex[0]) / h.sum() ** 3
-    missed = to_end @ jerk - np.stack([np.zeros_like(way), np.zeros_like(way), way])
+    apart = (run.vertex[-1] - run.vertex[0]) / h.sum() ** 3
+    missed = to_end @ jerk - np.stack([np.zeros_like(apart), np.zeros_like(apart), apart])
     closing: FloatArray = np.linalg.lstsq(to_end, missed, rcond=None)[0]
     return closing
 
@@ -92,8 +99,8 @@ def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
         np.sqrt((np.abs(a) / run.acceleration).max()),
         np.cbrt((np.abs(j) / run.jerk).max()),
     ]
-    for share in MEASURED_AT if np.isfinite(run.across_max).any() else ():
-        tau = share * h
+    for fraction in MEASURED_AT if np.isfinite(run.across_max).any() else ():
+        tau = fraction * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
         speed_sq = (along**2).sum(axis=1)
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2

@@ -38,11 +38,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.packages import import_needed
-from planner.feedrate.solution import Status
 from planner.tube.guess import Guess
 from planner.tube.numbers import acceleration_along, step_numbers
+from planner.tube.outcome import BROKE_DOWN, OUTCOMES, SOLVED, STUCK, TubeSolution
 from planner.tube.run import TubeRun
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
@@ -59,62 +58,23 @@ BARRIER = 0.1
 # Where normal acceleration is limited it is watched at these places of every step [-], and steps become no more than this much longer:
 # with the others' freedom one step reaches round the whole corner, with twice the limit between two places.
 WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
-# The search ends when the time changes by less than this share in each of so many iterations [-], with all rows kept.
+# The search ends when the time changes by less than this fraction in each of so many iterations [-], with all rows kept.
 SETTLED, SETTLED_ITERATIONS = 1e-5, 4
-# It may also come to rest far from any optimum: what is slower than the guess by more than this share [-] does not count.
+# It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-] does not count.
 NOT_SLOWER = 1e-4
 # Residual of the rows [-]: what is left is integrated away (tube/motion.py).
 FEASIBILITY = 1e-6
 # Complementarity at which the search may end [-]: the time is then good to 1e-4.
 COMPLEMENTARITY = 1e-4
 
-SOLVED = (Status.OPTIMAL, Status.ACCEPTABLE)
-OUTCOMES = {
-    "Solve_Succeeded": (Status.OPTIMAL, "the best motion near its start, geometry and feed together"),
-    "Solved_To_Acceptable_Level": (
-        Status.ACCEPTABLE,
-        "the best motion near its start, geometry and feed together, to about 1e-4 of its time",
-    ),
-    "Maximum_Iterations_Exceeded": (
-        Status.ITERATION_LIMIT,
-        "not converged within the iterations allowed; raise max_iterations, or plan with method optimal",
-    ),
-    "Infeasible_Problem_Detected": (
-        Status.INFEASIBLE,
-        "no motion inside the tolerance was found from its start; raise the tolerance, or plan with method optimal",
-    ),
-}
-BROKE_DOWN = (
-    Status.NUMERICAL_ERROR,
-    "the solver broke down; change the tolerance a little, or plan with method optimal",
-)
-STUCK = (
-    Status.ITERATION_LIMIT,
-    "the search came to rest at a motion slower than its start; change the tolerance a little, or plan with method optimal",
-)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TubeSolution:
-    """How the search ended, and N steps over A axes unless it failed (then None).
-
-    h        : (N,) durations [s]
-    jerk     : (N, A) [mm/s3]
-    place    : (N+1,) places of the nodes along the run [mm]
-    """
-
-    status: Status
-    sentence: str
-    iterations: int
-    solve_time: float
-    h: FloatArray | None = None
-    jerk: FloatArray | None = None
-    place: FloatArray | None = None
-
 
 @dataclass(frozen=True, kw_only=True)
 class TubeNLP:
-    """The free optimum by ipopt. tol: relative tolerance of optimality [-]; max_iterations: per run and start."""
+    """The free optimum by ipopt.
+
+    tol            : relative tolerance of optimality [-], > 0
+    max_iterations : per run and start
+    """
 
     tol: float = 1e-5
     max_iterations: int = 300
@@ -124,7 +84,10 @@ class TubeNLP:
             raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
-        """The best motion near the guess, never slower than it; a failure from every start is the status of the last."""
+        """The best motion near the guess, never slower than it; a failure from every start is the status of the last.
+
+        Raises InputError if casadi is missing.
+        """
         iterations, took = 0, 0.0
         for slower in SLOWER:
             found = self._solve(run, guess.slower(slower))
@@ -152,8 +115,8 @@ class TubeNLP:
 
         # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
-        part = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
-        unit = ca.DM(part / length).T
+        mean_step = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
+        unit = ca.DM(mean_step / length).T
         w_node, w_step = (
             ca.MX.sym("node", 3 * axes + 1, steps + 1),
             ca.MX.sym("step", axes + 3 + watched, steps),
@@ -186,14 +149,15 @@ class TubeNLP:
             "feed",
             "feed_end",
             "normal",
-            "part",
+            "mean_step",
             "pace",
         )
-        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace = map(
+        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace = map(
             ca.SX.sym, scalars
         )
 
         def apart(point: Any, place: Any) -> Any:
+            """Squared distance of a point from the place on its leg."""
             turned = rate * (place - begin)
             circle = ca.cos(turned) * e1 + ca.sin(turned) * e2
             return ca.sumsqr(point - base - drift * (place - begin) - radius * circle)
@@ -203,7 +167,7 @@ class TubeNLP:
             (gap, 0.0, 0.0),
             (ca.vertcat(apart(p + h * v / 3, s1), apart(p1 - h * v1 / 3, s2)) / room**2, -np.inf, 1.0),
             (apart(p1, s3) / room_end**2, -np.inf, 1.0),
-            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_part, 0.0, np.inf),
+            (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_mean, 0.0, np.inf),
         ]
         if (run.feed > run.velocity.min()).any():
             rows.append((ordinate / v_max, -1.0, 1.0))
@@ -223,10 +187,10 @@ class TubeNLP:
         states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2, along)]
         numbers = ca.vertcat(
             *(base, drift, e1, e2),
-            *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_part, pace),
+            *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace),
         )
         of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
-        data = ca.DM(step_numbers(run, guess, part[:-1], length, speed, acc).T)
+        data = ca.DM(step_numbers(run, guess, mean_step[:-1], length, speed, acc).T)
         constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
         row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
         row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
@@ -234,10 +198,10 @@ class TubeNLP:
         # ---- limits and boundary ----------------------------------------------------------------------------------------------
         node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
         node_min = -node_max
-        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (run.offset[leg] / part[:-1])[at_vertex]
+        node_min[at_vertex, -1] = node_max[at_vertex, -1] = (run.offset[leg] / mean_step[:-1])[at_vertex]
         for end in (0, -1):
             rest = np.concatenate(
-                [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / part[end]]]
+                [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / mean_step[end]]]
             )
             node_min[end] = node_max[end] = rest
         longer = LONGER_WATCHED if watched else LONGER
@@ -250,13 +214,13 @@ class TubeNLP:
 
         # ---- initial guess ----------------------------------------------------------------------------------------------------
         p0, v0, a0 = guess.state[:, 0] / length, guess.state[:, 1] / speed, guess.state[:, 2] / acc
-        place = np.append(guess.place[:, 0], run.offset[-1]) / part
+        place = np.append(guess.place[:, 0], run.offset[-1]) / mean_step
         node_start = np.column_stack([p0, v0, a0, place])
         step_start = np.column_stack(
             [
                 np.diff(a0, axis=0) / h_guess[:, None],
                 h_guess,
-                guess.place[:, 1:3] / part[:-1, None],
+                guess.place[:, 1:3] / mean_step[:-1, None],
                 np.tile(acceleration_along(guess)[:, None] / acc, (1, watched)),
             ]
         )
@@ -286,11 +250,12 @@ class TubeNLP:
             solve_time=took,
             h=found[:, axes] * second,
             jerk=found[:, :axes] * jerk,
-            place=nodes[:, -1] * part,
+            place=nodes[:, -1] * mean_step,
         )
 
 
 def _options(settings: TubeNLP) -> dict[str, Any]:
+    """What ipopt is asked for."""
     return {
         "print_time": False,
         "ipopt.print_level": 0,

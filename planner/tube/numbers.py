@@ -8,14 +8,18 @@ from planner.base.arrays import FloatArray
 from planner.tube.guess import Guess
 from planner.tube.run import TubeRun
 
-# The tolerance is narrowed by this share [-], so that rounding stays inside it.
+# The tolerance is narrowed by this fraction [-], so that rounding stays inside it.
 ROUNDING = 1e-4
 
 
 def step_numbers(
-    run: TubeRun, guess: Guess, part: FloatArray, length: float, speed: float, acc: float
+    run: TubeRun, guess: Guess, mean_step: FloatArray, length: float, speed: float, acc: float
 ) -> FloatArray:
-    """(N, 4 A + 11) what a step needs to know: its leg, how far it may be from it inside and at its end, its limits."""
+    """(N, 4 A + 11) what each of N steps needs to know: its leg, how far it may be from it inside and at its end, its limits.
+
+    mean_step          : (N,) mean length of a step on each step's leg [mm]
+    length, speed, acc : units that the numbers are in [mm], [mm/s], [mm/s2]
+    """
     leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
     room, feed = run.room[leg] * (1.0 - ROUNDING), run.feed[leg]
     room_end, feed_end = room.copy(), feed.copy()
@@ -39,7 +43,7 @@ def step_numbers(
             np.minimum(feed, fastest) / speed,
             np.minimum(feed_end, fastest) / speed,
             np.minimum(run.across_max[leg], strongest) / acc,
-            part / length,
+            mean_step / length,
             _pace(guess) / speed,
         ]
     )

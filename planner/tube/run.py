@@ -24,8 +24,8 @@ from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
-# Share of the budget that a step on an arc may use for bending away from its control points [-]: kappa dx^2/8 for a step over dx.
-ARC_SHARE = 0.1
+# Fraction of the budget that a step on an arc may use for bending away from its control points [-]: kappa dx^2/8 for a step over dx.
+ARC_FRACTION = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,14 +84,15 @@ class TubeRun:
 
     @property
     def step_max(self) -> FloatArray:
-        """(R,) largest part of a leg that one step may cover [mm]: where it bends away by `ARC_SHARE` of the budget; inf on lines."""
+        """(R,) largest length on a leg that one step may cover [mm]: where it bends away by `ARC_FRACTION` of the budget; inf on
+        lines."""
         with np.errstate(divide="ignore"):
-            return np.sqrt(8.0 * ARC_SHARE * self.budget / self.curvature)
+            return np.sqrt(8.0 * ARC_FRACTION * self.budget / self.curvature)
 
     @property
     def room(self) -> FloatArray:
         """(R,) how far control points of a step may be from their places on the leg [mm]."""
-        return np.where(self.curvature > 0, 1.0 - ARC_SHARE, 1.0) * self.budget
+        return np.where(self.curvature > 0, 1.0 - ARC_FRACTION, 1.0) * self.budget
 
     @property
     def offset(self) -> FloatArray:
@@ -99,13 +100,13 @@ class TubeRun:
         return np.append(0.0, np.cumsum(self.length))
 
     def points(self, leg: Array, x: FloatArray) -> FloatArray:
-        """(n, A) the path at the places x (n,) [mm] on the legs (n,)."""
+        """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
         circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
         return self.base[leg] + self.drift[leg] * x[:, None] + self.radius[leg, None] * circle
 
     def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
-        """(n, A) dP/dx there [-]."""
+        """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
         across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
         return self.drift[leg] + (self.radius * self.rate)[leg, None] * across

@@ -1,4 +1,4 @@
-"""Motions one after the other: each is a part of another motion, from rest to rest, so that nothing jumps where they meet."""
+"""Runs of several motions, one after the other: each goes from rest to rest, so that nothing jumps where they meet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAME_TIME = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Part:
+class SplicedRun:
     """What a motion does from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it."""
 
     motion: MotionInTime
@@ -28,54 +28,54 @@ class Part:
 
     @property
     def lasting(self) -> float:
-        """[s]"""
+        """How long it takes, with the standstill [s]."""
         return self.end - self.begin + self.hold
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spliced:
-    """Parts of motions, one after the other."""
+    """n runs of motions, one after the other."""
 
-    parts: tuple[Part, ...]
+    runs: tuple[SplicedRun, ...]
 
     @cached_property
     def begin(self) -> FloatArray:
-        """(n+1,) when the parts begin, and when the last one ends [s]."""
-        return np.append(0.0, np.cumsum([part.lasting for part in self.parts]))
+        """(n+1,) when the runs begin, and when the last one ends [s]."""
+        return np.append(0.0, np.cumsum([run.lasting for run in self.runs]))
 
     @property
     def end(self) -> float:
-        """End of the last part [s]."""
+        """End of the last run [s]."""
         return float(self.begin[-1])
 
     @cached_property
     def t(self) -> FloatArray:
         """(L,) start of each piece [s]."""
         edges = []
-        for part, begin in zip(self.parts, self.begin, strict=False):
-            inner = part.motion.t[(part.motion.t > part.begin) & (part.motion.t < part.end)]
-            stands = [begin + part.end - part.begin] if part.hold > 0 else []
-            edges.append(np.concatenate([[begin], begin + inner - part.begin, stands]))
+        for run, begin in zip(self.runs, self.begin, strict=False):
+            inner = run.motion.t[(run.motion.t > run.begin) & (run.motion.t < run.end)]
+            stands = [begin + run.end - run.begin] if run.hold > 0 else []
+            edges.append(np.concatenate([[begin], begin + inner - run.begin, stands]))
         return np.maximum.accumulate(np.concatenate(edges))
 
     @cached_property
-    def way(self) -> FloatArray:
-        """(n+1,) arc length at the start of each part, and at the end [mm]."""
-        ends = (part.motion.at(np.array([part.begin, part.end]), 1.0).s for part in self.parts)
+    def length(self) -> FloatArray:
+        """(n+1,) arc length at the start of each run, and at the end [mm]."""
+        ends = (run.motion.at(np.array([run.begin, run.end]), 1.0).s for run in self.runs)
         return np.append(0.0, np.cumsum([s[-1] - s[0] for s in ends]))
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
-        of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.parts) - 1)
+        of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
         chunks = []
         for k in np.unique(of):
-            part, asked = self.parts[k], times[of == k]
-            local = part.begin + (asked - self.begin[k])
-            single, which = np.unique(np.minimum(local, part.end), return_inverse=True)
-            seen = part.motion.at(single, dt)
+            run, asked = self.runs[k], times[of == k]
+            local = run.begin + (asked - self.begin[k])
+            single, which = np.unique(np.minimum(local, run.end), return_inverse=True)
+            seen = run.motion.at(single, dt)
             columns = {name: getattr(seen, name)[which] for name in ("position", "block", "line")}
-            columns["s"] = self.way[k] + seen.s[which] - part.motion.at(np.array([part.begin]), dt).s[0]
-            over = local >= part.end  # there another motion may begin
+            columns["s"] = self.length[k] + seen.s[which] - run.motion.at(np.array([run.begin]), dt).s[0]
+            over = local >= run.end  # there another motion may begin
             for name in ("velocity", "acceleration", "jerk", "feed"):
                 columns[name] = getattr(seen, name)[which]
                 columns[name][over] = 0.0
@@ -83,9 +83,9 @@ class Spliced:
         return joined(chunks)
 
     def whole(self) -> AxisMotion:
-        """As one motion; every part has to be all of a motion that is given axis by axis."""
-        motions = [part.motion for part in self.parts if isinstance(part.motion, AxisMotion)]
-        assert len(motions) == len(self.parts)
+        """As one motion; every run has to be all of a motion that is given axis by axis."""
+        motions = [run.motion for run in self.runs if isinstance(run.motion, AxisMotion)]
+        assert len(motions) == len(self.runs)
         names = ("position", "velocity", "acceleration", "jerk", "block", "line")
         return AxisMotion(
             axes=motions[0].axes,
@@ -96,14 +96,14 @@ class Spliced:
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Spliced:
         """The motion standing longer by `by` (n,) [s] where it comes to rest, at the times `at` (n,) [s]."""
-        parts = []
-        for k, part in enumerate(self.parts):
-            stand = self.begin[k] + part.end - part.begin
+        runs = []
+        for k, run in enumerate(self.runs):
+            stand = self.begin[k] + run.end - run.begin
             behind = np.abs(at - stand) <= SAME_TIME
             inside = (at > self.begin[k] + SAME_TIME) & (at < stand - SAME_TIME)
-            motion, more = part.motion, float(by[inside].sum())
+            motion, more = run.motion, float(by[inside].sum())
             if more > 0:
-                motion = motion.waiting(at[inside] - self.begin[k] + part.begin, by[inside])
-            hold = part.hold + float(by[behind].sum())
-            parts.append(Part(motion=motion, begin=part.begin, end=part.end + more, hold=hold))
-        return Spliced(parts=tuple(parts))
+                motion = motion.waiting(at[inside] - self.begin[k] + run.begin, by[inside])
+            hold = run.hold + float(by[behind].sum())
+            runs.append(SplicedRun(motion=motion, begin=run.begin, end=run.end + more, hold=hold))
+        return Spliced(runs=tuple(runs))

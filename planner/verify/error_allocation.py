@@ -55,6 +55,8 @@ from planner.verify.times import AnyMotion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
+# Corners looked at together: 50 MB.
+AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,14 +100,17 @@ def check_corners(
     vertex, eps = pieces.vertex[at], pieces.joint["budget"][at]
     near = [look.seen.match.passed[at] for look in looks]
     miss = near[0]["near"]
-    reading, period = _nearest_sample(trajectory, near[0]["near_time"], vertex, machine, limits)
+    parts = [slice(first, first + AT_ONCE) for first in range(0, max(len(corner), 1), AT_ONCE)]
+    found = [_nearest_sample(trajectory, near[0]["near_time"][n], vertex[n], machine, limits) for n in parts]
+    reading, period = _joined([one[0] for one in found]), np.concatenate([one[1] for one in found])
     chord, budget_ratio, speed_ratio = np.zeros(len(corner)), miss / eps, reading.speed_ratio
     looked = miss <= NEAR_MISS * eps
     if motion is None or not len(corner):
         looked &= _bow(machine, toolpath.axes, period) <= eps
     else:
         looked &= near[1]["near"] <= NEAR_MISS * eps
-        reading = _nearest_point(motion, near[1]["near_time"], trajectory.dt, vertex, machine)
+        when = near[1]["near_time"]
+        reading = _joined([_nearest_point(motion, when[n], trajectory.dt, vertex[n], machine) for n in parts])
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
         miss, chord = reading.distance, reading.normal * trajectory.dt**2 / 8.0
         budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
@@ -173,17 +178,17 @@ def _nearest_sample(
     Accelerations derived from the positions are means of the motion's, which keep its limits. What the positions' rounding r makes of
     them over the period h, at most 4 r / h^2, is taken off.
     """
-    after = np.clip(np.searchsorted(trajectory.t, near_time), 1, max(len(trajectory) - 1, 1))
+    after = np.clip(trajectory.first_not_before(near_time), 1, max(len(trajectory) - 1, 1))
     after = np.minimum(after, len(trajectory) - 1)  # a single sample is both
     before = np.maximum(after - 1, 0)
-    distance = [np.linalg.norm(trajectory.position[k] - vertex, axis=1) for k in (before, after)]
+    rows = np.unique(np.concatenate([before, after]))
+    near = trajectory.rows(rows)
+    before, after = np.searchsorted(rows, before), np.searchsorted(rows, after)
+    distance = [np.linalg.norm(near.position[k] - vertex, axis=1) for k in (before, after)]
     k = np.where(distance[0] < distance[1], before, after)
-    there, period = (
-        _read(trajectory, k, np.minimum(*distance), machine),
-        trajectory.t[after] - trajectory.t[before],
-    )
+    there, period = _read(near, k, np.minimum(*distance), machine), near.t[after] - near.t[before]
     if not limits.judged[ACCELERATION]:
-        ulp = ROUNDING_ULPS * 2.0**-52 * np.abs(trajectory.position[k]).max(axis=1, initial=0.0)
+        ulp = ROUNDING_ULPS * 2.0**-52 * np.abs(near.position[k]).max(axis=1, initial=0.0)
         rounding = np.linalg.norm(limits.rounding) + ulp + limits.time_rounding * there.feed
         there = replace(there, normal=np.maximum(there.normal - 4.0 * rounding / period**2, 0.0))
     return there, period
@@ -203,6 +208,12 @@ def _nearest_point(
         change = np.divide((off * velocity).sum(axis=1), slope, out=np.zeros_like(time), where=slope > 0)
         time = np.clip(time - change, start - period, start + period)
     return reduce(_nearer, readings)
+
+
+def _joined(readings: list[_Reading]) -> _Reading:
+    return _Reading(
+        **{name: np.concatenate([getattr(one, name) for one in readings]) for name in vars(readings[0])}
+    )
 
 
 def _nearer(a: _Reading, b: _Reading) -> _Reading:
@@ -229,7 +240,7 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
 
 
 def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
-    """A(n) (C,) [mm/s2] for vectors (C, L) along n, of any length; where that is 0, the least over all directions."""
+    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n, of any length; where that is 0, the least over all directions."""
     limits = machine.limits("acceleration", axes)[_linear(axes)]
     size = np.linalg.norm(direction, axis=1)
     given = np.abs(direction) @ limits

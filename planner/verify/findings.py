@@ -32,6 +32,7 @@ class Look:
     note: str
 
     def noted(self, text: str) -> str:
+        """A text with the note of this reading behind it."""
         return ", ".join(part for part in (text, self.note) if part)
 
 
@@ -178,7 +179,7 @@ def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tu
 
 
 def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple[Array, bool, list[str]]:
-    """Segments that are never visited, whether the rest is run in order, and what is wrong with it."""
+    """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it, in sentences."""
     lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
     in_order, said = True, []
     for look in looks:
@@ -251,4 +252,5 @@ def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
 
 
 def line_of(toolpath: Toolpath, pieces: ProgramPieces, piece: int) -> int:
+    """The source line of a piece of the program; for a negative one that of the first piece."""
     return int(toolpath.line[pieces.piece["segment"][max(piece, 0)]])

@@ -12,15 +12,15 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
-from planner.verify.dense import Comparison
 from planner.verify.filtered import after_filters
-from planner.verify.findings import QUANTITIES, Look
+from planner.verify.findings import QUANTITIES
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.limits import NORMAL_NAME, normal_limit
-from planner.verify.pieces import ProgramPieces, program_pieces, widened
+from planner.verify.pieces import program_pieces, widened
+from planner.verify.reading import Reader
 from planner.verify.ringing import ringing_of
-from planner.verify.stream import Limits, watch
-from planner.verify.times import AnyMotion, cells_per_period, look
+from planner.verify.stream import Limits
+from planner.verify.times import AnyMotion, cells_per_period
 from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
@@ -59,32 +59,13 @@ def verify(
     limits = _limits(machine, trajectory, given, not_limited)
     if limits.rounding.any():
         pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
-    comparison, cells = None, 0
+    cells = 0
     if motion is not None:
-        comparison = Comparison(trajectory, motion.end)
         acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
         cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
-
-    def read(pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None) -> list[Look]:
-        share = 0.5 if motion is not None else 1.0
-        seen = watch(
-            [trajectory],
-            pieces,
-            limits,
-            middles=True,
-            progress=lambda count: progress(share * count / len(trajectory)),
-        )
-        looks = [Look(seen, "")]
-        if motion is not None and comparison is not None:
-            chunks = comparison.pass_on(
-                look(motion, machine.dt, seed, cells), lambda done: progress(share + (1.0 - share) * done)
-            )
-            between = watch(chunks, pieces, limits, middles=False, progress=lambda count: None)
-            looks += [Look(between, "between the samples")] if between.samples else []
-        return looks
-
-    looks = read(pieces, progress or (lambda done: None))
-    apart = contour.apart(looks, pieces, read)
+    reader = Reader(trajectory, motion, limits, given, dt=machine.dt, cells=cells, seed=seed)
+    looks = reader.read(pieces, progress or (lambda done: None))
+    apart = contour.apart(looks, pieces, reader.read)
     contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
     checks = findings.limit_checks(looks, toolpath, machine, pieces, not_limited)
     contour_check = apart.contour_check(toolpath)
@@ -95,11 +76,11 @@ def verify(
         seen = max(contour_error or 0.0, vertex_error or 0.0)
         sparse = samples.density(trajectory, machine, limits, float(toolpath.tolerance.min()), seen)
         coarse, notes = sparse[0] + coarse, sparse[1] + notes
-    faults = coarse + samples.period_faults(trajectory, given)
-    faults += comparison.faults(limits, looks) if comparison is not None else []
+    faults = coarse + reader.delivered.period_faults()
+    faults += reader.comparison.faults(limits, looks) if reader.comparison is not None else []
     faults += [check.sentence(toolpath.axes) for check in checks.values() if check.broken]
     faults += findings.column_faults(looks, limits, toolpath, pieces)
-    faults += end_faults + samples.rest_faults(trajectory, looks, limits, given)
+    faults += end_faults + samples.rest_faults(reader.delivered, looks, limits)
     faults += [contour_check.sentence(toolpath.axes)] if contour_check.broken else []
     faults += apart.vertex_faults(toolpath)
     faults += order_faults

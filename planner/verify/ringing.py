@@ -1,6 +1,6 @@
 """How much the machine's vibration modes ring: during the motion, and when it is over.
 
-Each axis carries an oscillator that is shaken by the set points p(t), at rest before. Its deflection y, its position less p, obeys
+Each axis carries an oscillator that is shaken by the setpoints p(t), at rest before. Its deflection y, its position less p, obeys
 
     y'' + 2 z w y' + w^2 y = -p''(t),        w = 2 pi frequency,  z = damping ratio, 0 <= z < 1.
 
@@ -29,6 +29,10 @@ from planner.motion.trajectory import Trajectory
 from planner.verify.pieces import kernel
 
 STEP = 0.2  # [rad] of the mode's phase between two looks: a peak is missed by less than 1 - cos(0.1) = 0.5 %
+DEFLECTION, SLOPE, MOST = range(
+    3
+)  # of an axis in a mode: where it is, how fast, and the largest deflection so far
+STATE = 3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,8 +41,8 @@ class Ringing:
 
     frequency, damping : the mode's [Hz], [-]
     axes               : their letters
-    during             : (A,) largest deflection while the set points move [mm], rotary axes [rad]
-    after              : (A,) amplitude with which it still rings at the end of the set points [mm], rotary axes [rad]
+    during             : (A,) largest deflection while the setpoints move [mm], rotary axes [rad]
+    after              : (A,) amplitude with which it still rings at the end of the setpoints [mm], rotary axes [rad]
     """
 
     frequency: float
@@ -63,23 +67,32 @@ class Ringing:
 
 def ringing_of(trajectory: Trajectory, machine: Machine) -> tuple[Ringing, ...]:
     """The ringing of every mode of the machine under a trajectory's positions and velocities."""
-    return tuple(_ringing(trajectory, mode) for mode in machine.modes)
-
-
-def _ringing(trajectory: Trajectory, mode: Mode) -> Ringing:
+    if not machine.modes:
+        return ()
     axes = len(trajectory.axes)
-    during, after = np.zeros(axes), np.zeros(axes)
-    _shake(
-        np.ascontiguousarray(trajectory.t),
-        np.ascontiguousarray(trajectory.position),
-        np.ascontiguousarray(trajectory.velocity),
-        2.0 * math.pi * mode.frequency,
-        mode.damping,
-        during,
-        after,
+    state = np.zeros((len(machine.modes), axes, STATE))
+    carried = [np.empty(0), np.empty((0, axes)), np.empty((0, axes))]
+    for chunk in trajectory.chunks():
+        columns = (chunk.t, chunk.position, chunk.velocity)
+        carried = [np.concatenate([old, new]) for old, new in zip(carried, columns, strict=True)]
+        for mode, of_mode in zip(machine.modes, state, strict=True):
+            _shake(carried[0], carried[1], carried[2], 2.0 * math.pi * mode.frequency, mode.damping, of_mode)
+        carried = [column[-1:].copy() for column in carried]
+    return tuple(
+        _ringing(mode, of_mode, trajectory.axes) for mode, of_mode in zip(machine.modes, state, strict=True)
     )
+
+
+def _ringing(mode: Mode, state: FloatArray, axes: tuple[str, ...]) -> Ringing:
+    w = 2.0 * math.pi * mode.frequency
+    turn, decay = w * math.sqrt(1.0 - mode.damping**2), -mode.damping * w
+    y, slope = state[:, DEFLECTION], state[:, SLOPE]
     return Ringing(
-        frequency=mode.frequency, damping=mode.damping, axes=trajectory.axes, during=during, after=after
+        frequency=mode.frequency,
+        damping=mode.damping,
+        axes=axes,
+        during=state[:, MOST],
+        after=np.hypot(y, (slope - decay * y) / turn),
     )
 
 
@@ -90,14 +103,13 @@ def _shake(
     velocity: FloatArray,
     w: float,
     damping: float,
-    during: FloatArray,
-    after: FloatArray,
+    state: FloatArray,
 ) -> None:
-    """Writes the largest deflection and the amplitude at the end per axis (A,)."""
+    """Go on from the first sample, where each axis is in its `state` (A, `STATE`), to the last."""
     turn = w * math.sqrt(1.0 - damping * damping)
     decay = -damping * w
     for axis in range(position.shape[1]):
-        y, slope, most = 0.0, 0.0, 0.0
+        y, slope, most = state[axis, DEFLECTION], state[axis, SLOPE], state[axis, MOST]
         for k in range(1, len(t)):
             h = t[k] - t[k - 1]
             v0, v1 = velocity[k - 1, axis], velocity[k, axis]
@@ -117,5 +129,4 @@ def _shake(
                 y = rest + drift * dx + free
                 slope = drift + decay * free + turn * quarter
                 most = max(most, abs(y))
-        during[axis] = most
-        after[axis] = math.hypot(y, (slope - decay * y) / turn)
+        state[axis, DEFLECTION], state[axis, SLOPE], state[axis, MOST] = y, slope, most

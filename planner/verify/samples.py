@@ -63,20 +63,56 @@ def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Mach
             )
 
 
-def period_faults(trajectory: Trajectory, given: Given) -> list[str]:
-    """Periods that are not dt."""
-    periods = np.diff(trajectory.t)
-    allowed = PERIOD_ROUNDING + 2.0 * given.time_rounding
-    wrong = np.abs(periods - trajectory.dt) > allowed
-    if len(wrong):
-        wrong[-1] = periods[-1] > trajectory.dt + allowed + given.end_rounding  # the last one may be shorter
-    if not wrong.any():
-        return []
-    k = int(wrong.argmax())
-    return [
-        f"period: {periods[k]:.9g} s between the samples at t = {trajectory.t[k]:.6g} s and the next, dt is "
-        f"{trajectory.dt:.9g} s ({int(wrong.sum())} such periods)"
-    ]
+class Delivered:
+    """What is kept of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run [mm].
+
+    ends : t, position, velocity and acceleration of the first two samples and the last two, of fewer than four all
+    """
+
+    def __init__(self, dt: float, given: Given):
+        self.dt, self.given = dt, given
+        self.ends: dict[str, FloatArray] = {}
+        self.run = 0.0
+        self._wrong, self._first = 0, (0.0, 0.0)  # how many periods, and the first: when, how long
+        self._last = np.empty(0), np.empty(0)  # the last period, which may be shorter: when, how long
+
+    def take(self, chunk: Trajectory) -> None:
+        """The next samples."""
+        columns = {name: getattr(chunk, name) for name in ("t", "position", "velocity", "acceleration")}
+        before = {name: column[-1:] for name, column in self.ends.items()} or {
+            name: column[:0] for name, column in columns.items()
+        }
+        t = np.concatenate([before["t"], columns["t"]])
+        self.run += float(
+            np.linalg.norm(
+                np.diff(np.concatenate([before["position"], columns["position"]]), axis=0), axis=1
+            ).sum()
+        )
+        when, periods = np.append(self._last[0], t[:-1]), np.append(self._last[1], np.diff(t))
+        self._last = when[-1:], periods[-1:]
+        self._judge(when[:-1], periods[:-1] - self.dt, periods[:-1])
+        for name, column in columns.items():
+            have = self.ends.get(name, column[:0])
+            seen = np.concatenate([have, column])
+            self.ends[name] = seen if len(seen) <= 4 else np.concatenate([seen[:2], seen[-2:]])
+
+    def _judge(self, when: FloatArray, off: FloatArray, periods: FloatArray, more: float = 0.0) -> None:
+        wrong = np.flatnonzero(np.abs(off) > PERIOD_ROUNDING + 2.0 * self.given.time_rounding + more)
+        if len(wrong) and not self._wrong:
+            self._first = float(when[wrong[0]]), float(periods[wrong[0]])
+        self._wrong += len(wrong)
+
+    def period_faults(self) -> list[str]:
+        """Periods that are not dt."""
+        when, periods = self._last
+        self._last = when[:0], periods[:0]
+        self._judge(when, np.maximum(periods - self.dt, 0.0), periods, self.given.end_rounding)
+        if not self._wrong:
+            return []
+        return [
+            f"period: {self._first[1]:.9g} s between the samples at t = {self._first[0]:.6g} s and the next, dt is "
+            f"{self.dt:.9g} s ({self._wrong} such periods)"
+        ]
 
 
 def density(
@@ -135,14 +171,13 @@ def digits(
     return faults, [f"{said}: their differences know {', '.join(shares)}"]
 
 
-def rest_faults(trajectory: Trajectory, looks: list[Look], limits: Limits, given: Given) -> list[str]:
+def rest_faults(delivered: Delivered, looks: list[Look], limits: Limits) -> list[str]:
     """A first or last sample that is not at rest."""
-    t, x = trajectory.t, trajectory.position
+    t, x, given, axes = delivered.ends["t"], delivered.ends["position"], delivered.given, limits.axes
     if len(t) < 2:
         return []
     acceleration = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION))
     jerk = limits.per_axis[2] * np.maximum(1.0, measured(looks, JERK))
-    run = float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum())
     said = []
     for name, at, beside, advice in (
         ("start", 0, 1, ""),
@@ -152,22 +187,22 @@ def rest_faults(trajectory: Trajectory, looks: list[Look], limits: Limits, given
         furthest = acceleration * h * h / 2.0
         if limits.jerk_limited:
             furthest = np.minimum(furthest, jerk * h**3 / 6.0)
-        rounding = ROUNDING_ULPS * 2.0**-52 * (np.abs(x[at]) + run + limits.per_axis[0] * t[at])
+        rounding = ROUNDING_ULPS * 2.0**-52 * (np.abs(x[at]) + delivered.run + limits.per_axis[0] * t[at])
         over = (
             np.abs(x[at] - x[beside]) - furthest * (1.0 + RATIO_ROUNDING) - 2.0 * (rounding + limits.rounding)
         )
         k = int(over.argmax())
         if over[k] > 0:
             said.append(
-                f"{name}: not at rest: {trajectory.axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
+                f"{name}: not at rest: {axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
                 f"next to it, {furthest[k]:.4g} mm are possible{advice}"
             )
         for quantity, row in (("velocity", 0), ("acceleration", 1)):
-            value: FloatArray = np.abs(getattr(trajectory, quantity)[at])
+            value: FloatArray = np.abs(delivered.ends[quantity][at])
             k = int((value / limits.per_axis[row]).argmax())
             judged = quantity in given.columns and (row == 0 or limits.jerk_limited)
             if judged and value[k] > RATIO_ROUNDING * limits.per_axis[row, k]:
                 said.append(
-                    f"{name}: not at rest: {quantity}.{trajectory.axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
+                    f"{name}: not at rest: {quantity}.{axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
                 )
     return said

@@ -6,7 +6,6 @@ samples are carried over from block to block, for the third differences.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -66,42 +65,41 @@ class Observed:
     gap_max: float = 0.0  # longest period [s]
 
 
-def watch(
-    chunks: Iterable[Trajectory],
-    pieces: ProgramPieces,
-    limits: Limits,
-    *,
-    middles: bool,
-    progress: Callable[[int], None],
-) -> Observed:
-    """Read all chunks, in order. Samples not later than those already read (overlap) are left out.
+class Watch:
+    """What a motion shows, chunk by chunk in order. Samples not later than those already read (overlap) are left out.
 
-    middles  : match the middle of every chord too
-    progress : called with the number of samples read so far
+    middles : match the middle of every chord too
+    seen    : what it has shown so far
     """
-    axes = pieces.vertex.shape[1]
-    rows = GROUPS * axes + ROWS_ALONE
-    seen = Observed(
-        worst=np.zeros((rows, 4)),
-        time=np.zeros(rows),
-        at=np.zeros((rows, axes)),
-        piece=np.zeros(rows, dtype=np.int64),
-        match=new_match(pieces),
-        own=OwnSeen(limits.own, limits.axes),
-    )
-    carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
-    feed_max = np.empty(0)
-    travelled = 0.0
-    for chunk in chunks:
-        begin = int(np.searchsorted(chunk.t, seen.t_last, side="right"))
+
+    def __init__(self, pieces: ProgramPieces, limits: Limits, *, middles: bool):
+        axes = pieces.vertex.shape[1]
+        rows = GROUPS * axes + ROWS_ALONE
+        self.seen = Observed(
+            worst=np.zeros((rows, 4)),
+            time=np.zeros(rows),
+            at=np.zeros((rows, axes)),
+            piece=np.zeros(rows, dtype=np.int64),
+            match=new_match(pieces),
+            own=OwnSeen(limits.own, limits.axes),
+        )
+        self._pieces, self._limits, self._middles = pieces, limits, middles
+        self._carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
+        self._feed_max, self._travelled = np.empty(0), 0.0
+
+    def take(self, chunk: Trajectory) -> None:
+        """The next samples."""
+        begin = int(np.searchsorted(chunk.t, self.seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
             new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
-            data = SampleColumns(*(np.concatenate(pair) for pair in zip(carried, new, strict=True)))
-            feed_max = np.concatenate([feed_max, np.full(len(new[0]), np.inf)])
-            travelled = _block(seen, data, feed_max, pieces, limits, middles, travelled)
-            carried, feed_max = [column[-CARRIED:] for column in data], feed_max[-CARRIED:]
-            progress(seen.samples)
-    return seen
+            data = SampleColumns(*(np.concatenate(pair) for pair in zip(self._carried, new, strict=True)))
+            feed_max = np.concatenate([self._feed_max, np.full(len(new[0]), np.inf)])
+            self._travelled = _block(
+                self.seen, data, feed_max, self._pieces, self._limits, self._middles, self._travelled
+            )
+            # copies: views would keep the whole block
+            self._carried = [column[-CARRIED:].copy() for column in data]
+            self._feed_max = feed_max[-CARRIED:].copy()
 
 
 def _block(

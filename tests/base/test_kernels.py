@@ -6,6 +6,7 @@ import importlib
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 SOURCE = """
@@ -25,6 +26,7 @@ def test_an_index_that_names_a_class_that_is_gone(tmp_path: Path, monkeypatch: p
     """numba reads all of a kernel's index, and fails, before it looks whether its source has changed."""
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")  # beside the source, whatever NUMBA_CACHE_DIR says
     for name in ("Before", "AfterTheUpdate"):
         (tmp_path / "kernel_of_record.py").write_text(SOURCE.format(name=name), encoding="utf-8")
         sys.modules.pop("kernel_of_record", None)

@@ -28,13 +28,6 @@ def run(*arguments: object) -> Result:
 
 
 @pytest.fixture
-def job(tmp_path: Path) -> Path:
-    path = tmp_path / "square.ngc"
-    path.write_text(SQUARE)
-    return path
-
-
-@pytest.fixture
 def answers(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
     """Let `plan` answer by method: with an exception, or with the settings of a plan made by hand."""
 

@@ -29,13 +29,6 @@ ENDED_BY_US, ENDED_BY_PYTHON = 130, -signal.SIGINT  # both are 130 to a shell
 unix = pytest.mark.skipif(sys.platform == "win32", reason="signals and descriptors of Unix")
 
 
-@pytest.fixture
-def job(tmp_path: Path) -> Path:
-    path = tmp_path / "square.ngc"
-    path.write_text(SQUARE)
-    return path
-
-
 def run(*arguments: object, **how: object) -> subprocess.CompletedProcess[str]:
     command = [*COMMAND, *(str(argument) for argument in arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, **how)  # type: ignore[call-overload]

@@ -23,13 +23,11 @@ from planner.nc.reader import parse_program
 MACHINE = problems.machine()
 
 
-def shape_values(
-    shape, params: FloatArray, w: FloatArray, stretch=(1.0, 1.0)
-) -> tuple[FloatArray, FloatArray]:
+def shape_values(shape, params: FloatArray, w: FloatArray, scale=(1.0, 1.0)) -> tuple[FloatArray, FloatArray]:
     from planner.corners.blend import CORNER_DTYPE
 
     record = np.zeros(1, CORNER_DTYPE)
-    record["shape"], record["params"], record["stretch"] = int(shape.shape), params, stretch
+    record["shape"], record["params"], record["scale"] = int(shape.shape), params, scale
     both = [shape_at(record[0], x, x) for x in w]
     return np.array([b[0][0] for b in both]), np.array([b[1][0] for b in both])
 
@@ -109,8 +107,8 @@ def test_a_corner_on_arcs_stays_within_its_bound_in_order(name, kind):
     legs = element_table(path).legs
     for k in np.flatnonzero(path.joint == Joint.CORNER):
         w = np.linspace(0, 1, 401)
-        found = evaluate_corner(path.toolpath, k, path.corner, path.params[k], w, stretch=path.stretch[k])
-        X, Y = shape_values(path.corner, path.params[k], w, path.stretch[k])
+        found = evaluate_corner(path.toolpath, k, path.corner, path.params[k], w, scale=path.scale[k])
+        X, Y = shape_values(path.corner, path.params[k], w, path.scale[k])
         along = Y - X
         assert (np.diff(along) >= -1e-12).all()  # the matching runs forward
         programmed = np.empty((len(w), 3))
@@ -165,8 +163,8 @@ def test_random_arc_corners_are_regular_and_within_tolerance(theta, radii, turns
     if path.joint[1] != Joint.CORNER:
         return
     w = np.linspace(0, 1, 201)
-    found = evaluate_corner(path.toolpath, 1, path.corner, path.params[1], w, stretch=path.stretch[1])
-    X, Y = shape_values(path.corner, path.params[1], w, path.stretch[1])
+    found = evaluate_corner(path.toolpath, 1, path.corner, path.params[1], w, scale=path.scale[1])
+    X, Y = shape_values(path.corner, path.params[1], w, path.scale[1])
     bound = path.d[1] * np.cos(
         BEND_MAX / 2
     )  # |B'| >= (|X'| + |Y'|) cos(bend/2), and |X'| + |Y'| >= 0.4 d on the pair

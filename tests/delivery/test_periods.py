@@ -17,9 +17,9 @@ from planner.job import method as job_method
 from planner.methods.fir import FirMethod
 from planner.methods.registry import plan
 from planner.motion.axis_motion import AxisMotion
-from planner.motion.passing import passing_times, standstills
 from planner.motion.timing import sample_motion
 from planner.motion.trajectory import joined
+from planner.motion.vertex_times import passing_times, passing_times_of, standstills
 from planner.nc.reader import parse_program
 
 LEG = 10.0  # [mm]
@@ -81,6 +81,11 @@ def test_vertices_are_passed_in_order_and_full_circles_are_not_skipped():
     made = plan(job, problems.machine(), method="stop").require()
     times = passing_times(made.trajectory, made.toolpath)
     assert (np.diff(times) > 0).all()
+    count = len(made.trajectory)
+    parts = (
+        made.trajectory.rows(np.arange(k, min(k + 8, count))) for k in range(0, count, 7)
+    )  # that share their ends
+    np.testing.assert_array_equal(passing_times_of(parts, made.toolpath), times)
     at = made.trajectory.position[np.searchsorted(made.trajectory.t, times)]
     np.testing.assert_allclose(at, [[0, 0, 0], [5, 0, 0], [5, 0, 0], [0, 0, 0]], atol=0.06)
     arrival, departure = standstills(made.trajectory, made.toolpath, times)

@@ -63,7 +63,7 @@ def test_the_grid_of_a_line_converges_to_the_closed_form():
     assert miss[2] < 0.15 * miss[0]  # second order, but for where the points happen to lie
 
 
-def test_points_on_straight_stretches_stay_few():
+def test_points_on_straight_elements_stay_few():
     assert len(line(0.2)) <= 35
     assert len(line(100.0)) <= 80
     assert len(line(1e4)) <= 120

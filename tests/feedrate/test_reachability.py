@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -130,10 +131,15 @@ def loosened(problem: FeedrateProblem) -> dict[str, FeedrateProblem]:
     }
 
 
+@cache
+def problem_of(job: str) -> FeedrateProblem:
+    return solve(JOBS[job], problems.machine()).problem
+
+
 @pytest.mark.parametrize("job", JOBS)
 def test_laws_on_adaptive_grids(job: str) -> None:
     """Looser limits are never slower; backwards takes as long. Greedy passes keep the second law to O(h) (reachability.py)."""
-    problem = solve(JOBS[job], problems.machine()).problem
+    problem = problem_of(job)
     cycle_time = plan(problem).cycle_time
     for name, other in loosened(problem).items():
         assert plan(other).cycle_time <= cycle_time * (1 + 1e-9), name
@@ -156,7 +162,7 @@ UNITS = {"metre": 1e-3, "inch": 1 / 25.4, "kilometre": 1e-6, "micrometre": 1e3}
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("job", JOBS)
 def test_units_do_not_matter(job: str, unit: str) -> None:
-    problem = solve(JOBS[job], problems.machine()).problem
+    problem = problem_of(job)
     cycle_time = plan(problem).cycle_time
     assert plan(in_units(problem, UNITS[unit])).cycle_time == pytest.approx(cycle_time, rel=1e-9)
     assert plan(in_units(problem, UNITS[unit], 60.0)).cycle_time == pytest.approx(60.0 * cycle_time, rel=1e-9)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles import needs_toppra
 from quick import slow_but
 from random_problems import circle, line, random_problem
 from whole_plans import solve
@@ -16,6 +17,8 @@ from planner.feedrate.reachability import Reachability, controllable_sets
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.nc.reader import read_program
+
+pytestmark = needs_toppra
 
 TIME = 1e-6  # difference of the cycle times [relative]; asked for: 1e-4. The passes are the same, so only rounding is left
 PROFILE = 1e-5  # difference of the feeds [share of the largest]; asked for: 1e-3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from courses import corner, course_through, machine_of, overlapping
+from guides import corner, guide_through, machine_of, overlapping
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -21,13 +21,13 @@ thetas = st.floats(1.0, 174.0).map(np.deg2rad)
 
 
 def corner_motion(theta, overlap, T1=T1, T2=T2, feed=V, length=50.0):
-    course = course_through(corner(theta, length, 3), MACHINE, feed)
-    return course, motion_of(course, make(overlapping(course, overlap, T1, T2), MACHINE).motion)
+    guide = guide_through(corner(theta, length, 3), MACHINE, feed)
+    return guide, motion_of(guide, make(overlapping(guide, overlap, T1, T2), MACHINE).motion)
 
 
-def around_corner(course, motion, overlap, feed=V, T1=T1, T2=T2, count=2001):
+def around_corner(guide, motion, overlap, feed=V, T1=T1, T2=T2, count=2001):
     """Times and trajectory while both pulses are active."""
-    start = course.length[0] / np.broadcast_to(feed, 2)[0] + T1 + T2 - overlap
+    start = guide.length[0] / np.broadcast_to(feed, 2)[0] + T1 + T2 - overlap
     return motion.at(np.linspace(start, start + overlap, count), 1.0)
 
 
@@ -37,15 +37,15 @@ def test_equation_14_is_how_far_the_motion_misses_the_vertex(theta, T1, ratio, s
     """docs/papers.md A3; the nearest point is the middle, and the deviation from the legs eps cos(theta/2)."""
     T2 = T1 * ratio
     Tk = share * (T1 + T2)
-    course, motion = corner_motion(theta, Tk, T1, T2)
-    near = around_corner(course, motion, Tk, T1=T1, T2=T2)
+    guide, motion = corner_motion(theta, Tk, T1, T2)
+    near = around_corner(guide, motion, Tk, T1=T1, T2=T2)
     eps = corner_error(np.array(Tk), V, np.sin(theta / 2), np.array(T1), np.array(T2))
-    apart = np.linalg.norm(near.position - course.point[1], axis=1)
+    apart = np.linalg.norm(near.position - guide.point[1], axis=1)
     assert apart.min() == pytest.approx(eps, rel=1e-6)
     assert apart[1000] == pytest.approx(eps, rel=1e-6)
     across = np.abs(near.position[:, 1])  # from the first leg; from the second by symmetry
-    u2 = course.direction[1]
-    other = np.abs((near.position - course.point[1]) @ np.array([u2[1], -u2[0], 0.0]))
+    u2 = guide.direction[1]
+    other = np.abs((near.position - guide.point[1]) @ np.array([u2[1], -u2[0], 0.0]))
     assert np.minimum(across, other).max() == pytest.approx(eps * np.cos(theta / 2), rel=1e-3, abs=1e-9)
 
 
@@ -53,10 +53,10 @@ def test_equation_14_is_how_far_the_motion_misses_the_vertex(theta, T1, ratio, s
 @settings(max_examples=40)
 def test_equation_15_uses_the_whole_tolerance(theta, eps):
     Tk = float(overlap_time(np.array(eps), V, np.sin(theta / 2), T1, T2))
-    course, motion = corner_motion(theta, Tk)
-    near = around_corner(course, motion, Tk)
+    guide, motion = corner_motion(theta, Tk)
+    near = around_corner(guide, motion, Tk)
     most = V * np.sin(theta / 2) * (3 * T1**2 + T2**2) / (12 * T1)
-    assert np.linalg.norm(near.position - course.point[1], axis=1).min() == pytest.approx(
+    assert np.linalg.norm(near.position - guide.point[1], axis=1).min() == pytest.approx(
         min(eps, most), rel=1e-5
     )
 
@@ -74,16 +74,16 @@ def test_misprint_the_branch_is_chosen_on_the_error():
 def test_misprint_the_interior_angle():
     """150 degrees of turn, read as the angle between the segments (30): a true error of 0.373 for 0.1 (docs/papers.md A.14)."""
     misread = float(overlap_time(np.array(0.1), V, np.sin(np.deg2rad(15)), T1, T2))
-    course, motion = corner_motion(np.deg2rad(150), misread)
-    apart = np.linalg.norm(around_corner(course, motion, misread).position - course.point[1], axis=1).min()
+    guide, motion = corner_motion(np.deg2rad(150), misread)
+    apart = np.linalg.norm(around_corner(guide, motion, misread).position - guide.point[1], axis=1).min()
     assert apart == pytest.approx(0.373, abs=1e-3)
 
 
 def test_misprint_no_overlap_is_a_full_stop():
     """The text has "Tk = 0: the overlap is the delay"; it is the standstill that is. Tk = 0 stops, Tk = Td does not wait."""
     for Tk, waits in ((0.0, Td), (0.02, Td - 0.02), (Td, 0.0)):
-        course, motion = corner_motion(np.pi / 2, Tk)
-        assert motion.end == pytest.approx(course.length.sum() / V + waits + Td)
+        guide, motion = corner_motion(np.pi / 2, Tk)
+        assert motion.end == pytest.approx(guide.length.sum() / V + waits + Td)
         slowest = motion.at(np.linspace(0.3, 0.9, 20_001), 1.0).feed.min()
         expected = {
             0.0: 0.0,
@@ -134,16 +134,16 @@ def test_different_speeds_share_the_geometric_mean(theta, V1, V2, eps):
     """docs/papers.md, different programmed speeds: the vertex is missed by at most the tolerance, in the cubic zone too."""
     Tk = float(overlap_time(np.array(eps), np.sqrt(V1 * V2), np.sin(theta / 2), T1, T2))
     feed = np.array([V1, V2])
-    course, motion = corner_motion(theta, Tk, feed=feed, length=100.0)
-    near = around_corner(course, motion, Tk, feed=feed)
-    missed = np.linalg.norm(near.position - course.point[1], axis=1).min()
+    guide, motion = corner_motion(theta, Tk, feed=feed, length=100.0)
+    near = around_corner(guide, motion, Tk, feed=feed)
+    missed = np.linalg.norm(near.position - guide.point[1], axis=1).min()
     if Tk <= T2:
         assert missed <= eps * (1 + 1e-3)  # the nearest of 2001 samples
         # the exact closed form D sin(theta) of the deviation from the legs
-        u2 = course.direction[1]
+        u2 = guide.direction[1]
         off = np.minimum(
             np.abs(near.position[:, 1]),
-            np.abs((near.position - course.point[1]) @ np.array([u2[1], -u2[0], 0.0])),
+            np.abs((near.position - guide.point[1]) @ np.array([u2[1], -u2[0], 0.0])),
         )
         D = Tk**3 / (6 * T1 * T2) * V1 * V2 / (np.cbrt(V1) + np.cbrt(V2)) ** 3
         assume(Tk / (1 + min(np.cbrt(V2 / V1), np.cbrt(V1 / V2))) <= T2)
@@ -154,9 +154,9 @@ def test_the_smaller_speed_would_be_unsafe():
     """100 and 10 mm/s at 90 degrees: 0.0031 promised with min(V1, V2), 0.0075 true (docs/papers.md A5)."""
     Tk = 0.025
     feed = np.array([100.0, 10.0])
-    course, motion = corner_motion(np.pi / 2, Tk, feed=feed)
+    guide, motion = corner_motion(np.pi / 2, Tk, feed=feed)
     missed = np.linalg.norm(
-        around_corner(course, motion, Tk, feed=feed).position - course.point[1], axis=1
+        around_corner(guide, motion, Tk, feed=feed).position - guide.point[1], axis=1
     ).min()
     s = np.sin(np.pi / 4)
     by = {
@@ -182,14 +182,14 @@ def test_overlaps_within_limits_keep_them(theta, turn, T1, ratio, share):
     c, s = np.cos(turn), np.sin(turn)
     points = corner(theta, 50.0, 3) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     machine = machine_of(velocity=1e4, acceleration=a, jerk=j)
-    course = course_through(points, machine)
-    w = course.direction * V
+    guide = guide_through(points, machine)
+    w = guide.direction * V
     ones = np.ones(1)
     Tk = overlap_within_limits(
         ones * share * (T1 + T2), w[:1], w[1:], ones * T1, ones * T2, np.full(3, a), np.full(3, j)
     )[0]
     assert 0 <= Tk <= share * (T1 + T2)
-    made = make(overlapping(course, Tk, T1, T2), machine)
+    made = make(overlapping(guide, Tk, T1, T2), machine)
     assert made.seen.acceleration.max() <= 1 + 1e-6
     assert made.seen.jerk.max() <= 1 + 1e-6
 

@@ -1,4 +1,4 @@
-"""What both papers share: stretches picked and put back, the measured deviation, slowing down, and the choice between plans."""
+"""What both papers share: runs picked and put back, the measured deviation, slowing down, and the choice between plans."""
 
 from __future__ import annotations
 
@@ -6,31 +6,31 @@ import dataclasses
 
 import numpy as np
 import pytest
-from courses import course_through, distance_to_polyline, machine_of
+from guides import distance_to_polyline, guide_through, machine_of
 
 from benchmarks import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.fir.chord_guide import guide_of_path
 from planner.fir.chord_speeds import promised
 from planner.fir.columns import per_leg
 from planner.fir.design import plan_for
-from planner.fir.guide import guide_of_path
 from planner.fir.slow_down import RATIO_ROUNDING, WORTH, SpeedPlan, make, settled_fastest, slow_down
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine
 from planner.path.samples import sample_path
 
 MACHINE = machine_of()
-# Three stretches: the path turns back twice.
+# Three runs: the path turns back twice.
 POINTS = np.array([[0, 0], [20, 0], [30, 10], [20, 0], [20, 15], [22, 18], [20, 15], [30, 8], [35, 8]], float)
 
 
 def plans_along(paper: str, machine: Machine = MACHINE) -> list[SpeedPlan]:
     """Plans that promise to be fast, not yet slowed down."""
     if paper == "000":
-        course = course_through(POINTS, machine)
-        ones = np.ones(course.stretches)
-        return [plan_for(course, machine, speed * ones, ones) for speed in (100.0, 60.0, 30.0)]
+        guide = guide_through(POINTS, machine)
+        ones = np.ones(guide.runs)
+        return [plan_for(guide, machine, speed * ones, ones) for speed in (100.0, 60.0, 30.0)]
     toolpath = toolpath_from_program(problems.polyline(POINTS), machine)
     path = round_corners(
         dataclasses.replace(toolpath, tolerance=0.1 * toolpath.tolerance), machine, BezierCorner()
@@ -44,12 +44,12 @@ def plans(request) -> list[SpeedPlan]:
     return plans_along(request.param)
 
 
-def test_stretches_picked_and_put_back_are_the_plan(plans):
+def test_runs_picked_and_put_back_are_the_plan(plans):
     one, other = plans[0], plans[-1]
-    assert one.course.stretches == 3
+    assert one.guide.runs == 3
     chosen = np.array([True, False, True])
     part = other.pick(chosen)
-    assert len(part.course) == np.diff(other.course.first)[chosen].sum()
+    assert len(part.guide) == np.diff(other.guide.first)[chosen].sum()
     np.testing.assert_allclose(part.time(), other.time()[chosen], rtol=1e-12)
     np.testing.assert_allclose(
         one.put(chosen, part).time(), np.where(chosen, other.time(), one.time()), rtol=1e-12
@@ -64,14 +64,14 @@ def test_the_measured_error_bounds_the_distance_from_the_path(plans):
     """By brute force at many times, for the motion of a plan that breaks the tolerance."""
     plan = plans[0]
     made = make(plan, MACHINE)
-    motion, course = made.motion, plan.course
+    motion, guide = made.motion, plan.guide
     t = np.linspace(0.0, motion.end[-1] - 1e-9, 4000)
     m = np.clip(np.searchsorted(motion.t, t, side="right") - 1, 0, len(motion) - 1)
     h = (t - motion.t[m])[:, None]
     p, v, a, j = motion.state[:, m, :-1]
-    apart = distance_to_polyline(p + h * (v + h * (a / 2 + h * j / 6)), course.point)
+    apart = distance_to_polyline(p + h * (v + h * (a / 2 + h * j / 6)), guide.point)
     assert apart.max() > 1e-3
-    assert apart.max() <= (made.seen.error.max() * course.budget.max()) * (1 + 1e-9)
+    assert apart.max() <= (made.seen.error.max() * guide.budget.max()) * (1 + 1e-9)
 
 
 def test_slowed_down_a_plan_keeps_everything(plans):
@@ -81,7 +81,7 @@ def test_slowed_down_a_plan_keeps_everything(plans):
         assert (slower.time() >= plan.time() * (1 - 1e-12)).all()
 
 
-def test_each_stretch_gets_the_plan_that_is_fastest_for_it(plans):
+def test_each_run_gets_the_plan_that_is_fastest_for_it(plans):
     times = np.array([plan.time() for plan in plans])
     alone = np.array([slow_down(plan, MACHINE).time() for plan in plans])
     best = settled_fastest(plans, times, MACHINE).time()

@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from courses import course_through, machine_of, overlapping
+from guides import guide_through, machine_of, overlapping
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.fir.command import Cells, command_of
-from planner.fir.course import course_of
+from planner.fir.command import VelocityPulses, command_of
 from planner.fir.filters import Filters
+from planner.fir.leg_guide import guide_of_legs
 from planner.fir.slow_down import make
 from planner.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program
@@ -22,10 +22,10 @@ from planner.nc.reader import parse_program
 MACHINE = machine_of(velocity=1e5)
 
 
-def by_superposition(command, stretch, t):
+def by_superposition(command, run, t):
     """Position, velocity, acceleration (3, n, A+1) at local times t, one edge after the other."""
-    low, high = command.first[stretch], command.first[stretch + 1]
-    filters = Filters((command.T1[stretch], command.T2[stretch]))
+    low, high = command.first[run], command.first[run + 1]
+    filters = Filters((command.T1[run], command.T2[run]))
     w = np.vstack([np.zeros(command.velocity.shape[1]), command.velocity[low:high]])
     out = np.zeros((3, len(t), w.shape[1]))
     out[0] = command.position[low]
@@ -48,13 +48,13 @@ def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):
     """Lengths, speeds, gaps and directions as they come: short pulses, long gaps, none."""
     length, speed, gap, turn = (np.array(column) for column in zip(*legs, strict=True))
     steps = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) * length[:, None]
-    course = course_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, speed)
-    cells = Cells(leg=np.arange(len(course)), length=course.length, speed=course.feed)
-    gaps = np.append(gap, 0.1)[: len(course) + 1] * course.inner
-    ones = np.ones(course.stretches)
-    command = command_of(course, cells, gaps, T1 * ones, T1 * ratio * ones)
+    guide = guide_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, speed)
+    pulses = VelocityPulses(leg=np.arange(len(guide)), length=guide.length, speed=guide.feed)
+    gaps = np.append(gap, 0.1)[: len(guide) + 1] * guide.inner
+    ones = np.ones(guide.runs)
+    command = command_of(guide, pulses, gaps, T1 * ones, T1 * ratio * ones)
     pieces = superpose(command)
-    for k in range(course.stretches):
+    for k in range(guide.runs):
         at = slice(pieces.first[k], pieces.first[k + 1])
         t = pieces.t[at] - command.begin[k]
         expected = by_superposition(command, k, t)
@@ -77,11 +77,11 @@ def test_the_universal_identity():
     for duration, quantity, peak in ((0.119, "acceleration", 2.0), (0.070, "jerk", 4.0)):
         up = np.arange(13) * duration * V * np.sin(1e-4)
         across = np.where(np.arange(13) % 2, duration * V, 0.0) * np.cos(1e-4)
-        course = course_through(np.stack([across, up, 0 * up], axis=1), machine)
-        assert not course.inner.any()  # reversals are full stops; here they are run through all the same
-        through = dataclasses.replace(course, first=np.array([0, 12]), dwell=np.zeros(2))
-        cells = Cells(leg=np.arange(12), length=course.length, speed=course.feed)
-        command = command_of(through, cells, np.zeros(13), np.array([T1]), np.array([T2]))
+        guide = guide_through(np.stack([across, up, 0 * up], axis=1), machine)
+        assert not guide.inner.any()  # reversals are full stops; here they are run through all the same
+        through = dataclasses.replace(guide, first=np.array([0, 12]), dwell=np.zeros(2))
+        pulses = VelocityPulses(leg=np.arange(12), length=guide.length, speed=guide.feed)
+        command = command_of(through, pulses, np.zeros(13), np.array([T1]), np.array([T2]))
         pieces = superpose(command)
         row = ("position", "velocity", "acceleration", "jerk").index(quantity)
         seen = np.abs(pieces.state[row, :, 0]).max() / (
@@ -96,12 +96,12 @@ def test_nothing_adds_up_over_a_long_program():
     length = np.where(np.arange(20_000) % 500 == 0, 5000.0, 0.05)
     turn = np.cumsum(rng.normal(0, 0.2, 20_000))
     steps = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) * length[:, None]
-    course = course_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, 20.0)
-    made = make(overlapping(course, 0.09, 0.06, 0.03), MACHINE)
-    motion = motion_of(course, made.motion)
+    guide = guide_through(np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), MACHINE, 20.0)
+    made = make(overlapping(guide, 0.09, 0.06, 0.03), MACHINE)
+    motion = motion_of(guide, made.motion)
     end = motion.at(np.array([motion.end]), 1.0)
     assert motion.end > 10_000
-    np.testing.assert_allclose(end.position[0], course.point[-1], atol=2e-9)
+    np.testing.assert_allclose(end.position[0], guide.point[-1], atol=2e-9)
     p, v, a, j = made.motion.state
     assert np.abs(v[-1]).max() < 20.0
     h = np.diff(made.motion.t)[:, None]
@@ -112,11 +112,11 @@ def test_nothing_adds_up_over_a_long_program():
 def test_dwells_and_full_stops():
     program = parse_program("G21 G64 P0.01 F6000\nG4 P0.5\nG1 X10\nG4 P1\nY10\nG61.1\nX20\nG4 P0.25\nM2\n")
     machine = machine_of()
-    course = course_of(toolpath_from_program(program, machine), machine)
-    np.testing.assert_allclose(course.dwell, [0.5, 1.0, 0.25])  # the exact stop comes after the corner at Y10
-    made = make(overlapping(course, 0.0, 0.05, 0.03), machine)
-    motion = motion_of(course, made.motion)
+    guide = guide_of_legs(toolpath_from_program(program, machine), machine)
+    np.testing.assert_allclose(guide.dwell, [0.5, 1.0, 0.25])  # the exact stop comes after the corner at Y10
+    made = make(overlapping(guide, 0.0, 0.05, 0.03), machine)
+    motion = motion_of(guide, made.motion)
     assert made.command.begin[0] == 0.5
-    assert motion.end == pytest.approx(1.75 + course.length.sum() / 100.0 + len(course) * 0.08)
+    assert motion.end == pytest.approx(1.75 + guide.length.sum() / 100.0 + len(guide) * 0.08)
     rest = made.motion.state[1, made.motion.t >= motion.end - 0.25 - 1e-9]
     assert not rest.any()

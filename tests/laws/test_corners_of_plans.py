@@ -10,7 +10,7 @@ from quick import slow_but
 
 import planner
 from benchmarks import problems
-from planner.constraints import bounds, normal_limit
+from planner.constraints import chord_error, normal_limit
 from planner.job import method as job_method
 from planner.machine import Machine
 from planner.methods.bezier import BezierMethod
@@ -135,7 +135,7 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
     kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert kept.verdict.passed, kept.verdict.faults
     assert 0.99 < kept.corners.worst_speed_ratio <= 1 + RATIO_ROUNDING
-    monkeypatch.setattr(normal_limit, "feed_sq_max", lambda kappa, machine: None)
+    monkeypatch.setattr(normal_limit, "feed_sq_within", lambda kappa, limit: np.full_like(kappa, np.inf))
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[0]
@@ -147,7 +147,7 @@ def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch)
     kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not any(laws_broken(kept.corners))
     assert kept.corners.worst_budget_ratio > 0.9
-    monkeypatch.setattr(bounds, "chord_error", lambda kappa, tol, dt: np.full(len(kappa), np.inf))
+    monkeypatch.setattr(chord_error, "feed_sq_max", lambda kappa, tol, dt: np.full(len(kappa), np.inf))
     repaired = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not any(
         laws_broken(repaired.corners)

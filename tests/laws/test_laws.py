@@ -7,13 +7,14 @@ hold to rounding. Laws that move grid points (reversal halves other intervals, s
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from quick import slow_but
-from whole_plans import CORNERS, solve
+from whole_plans import CORNERS, Solved, solve
 
 from benchmarks import problems
 from planner.base.arrays import FloatArray
@@ -76,6 +77,16 @@ def random_job(seed: int, blocks: int = 8) -> Program:
             return program
 
 
+@cache
+def as_it_is(job: str, kind: str) -> Solved:
+    return solve(JOBS[job], machine(), kind)
+
+
+@cache
+def on_equal_axes(job: str) -> Solved:
+    return solve(JOBS[job], equal_axes())
+
+
 # --- what must not change the time ----------------------------------------------------------------------------------------
 
 
@@ -83,7 +94,7 @@ def random_job(seed: int, blocks: int = 8) -> Program:
 @pytest.mark.parametrize("job", ["arcs", "five points", "zigzag"])
 @pytest.mark.parametrize("factor", [1e-2, 25.4, 1e3])
 def test_scaling_all_lengths_keeps_the_time(job, kind, factor):
-    one = solve(JOBS[job], machine(), kind)
+    one = as_it_is(job, kind)
     other = solve(scaled(JOBS[job], length=factor), machine(length=factor), kind)
     assert other.time == pytest.approx(one.time, rel=1e-6)
 
@@ -92,7 +103,7 @@ def test_scaling_all_lengths_keeps_the_time(job, kind, factor):
 @pytest.mark.parametrize("job", ["arcs", "five points", "zigzag"])
 @pytest.mark.parametrize("factor", [0.1, 3.7, 50.0])
 def test_scaling_time_scales_the_time(job, kind, factor):
-    one = solve(JOBS[job], machine(), kind)
+    one = as_it_is(job, kind)
     other = solve(scaled(JOBS[job], time=factor), machine(time=factor), kind)
     assert other.time == pytest.approx(factor * one.time, rel=1e-6)
 
@@ -129,7 +140,7 @@ CYCLE = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 )
 @pytest.mark.parametrize("job", ["arcs", "pentagon", "five points", "spiral"])
 def test_turning_and_mirroring_the_job_keeps_the_time(job, matrix):
-    one = solve(JOBS[job], equal_axes())
+    one = on_equal_axes(job)
     other = solve(moved(JOBS[job], matrix), equal_axes())
     assert other.time == pytest.approx(one.time, rel=1e-6)
     assert len(other.samples) == len(one.samples)

@@ -6,13 +6,14 @@ import itertools
 
 import numpy as np
 import pytest
-import ruckig
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import needs_ruckig
 
 from planner.base.arrays import FloatArray
 from planner.corners import kinematic
-from planner.lookahead.look_ahead import LegLimits, Passage, capped, look_ahead, moves, needed, swept
+from planner.lookahead.look_ahead import capped, look_ahead, moves, needed, swept
+from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind, gain_max
 
 seeds = st.integers(0, 2**32 - 1)
@@ -24,6 +25,8 @@ def ruckig_time(distance, V1, A1, V2, A2, v, a, j) -> float:
     The leg is a millionth longer and the limits a billionth higher: legs that a sweep left just long enough would otherwise be too
     short by rounding, and ruckig would go back and forth.
     """
+    import ruckig
+
     distance, v, a = distance * (1 + 1e-6), v * (1 + 1e-9), a * (1 + 1e-9)
     unit = (distance / j) ** (1 / 3)
     move, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
@@ -115,6 +118,7 @@ def test_reach_from_where_a_ramp_would_have_begun_backwards(share, gain, a, j):
     assert gain_max(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-9)
 
 
+@needs_ruckig
 @given(seeds)
 @settings(max_examples=30)
 def test_a_leg_takes_the_time_that_ruckig_finds(seed):
@@ -176,6 +180,7 @@ def total_time(legs: LegLimits, passage: Passage) -> float:
 
 
 @pytest.mark.slow
+@needs_ruckig
 @given(seeds)
 @settings(max_examples=12)
 def test_no_other_choice_of_corners_and_stops_is_faster(seed):
@@ -220,6 +225,7 @@ def two_legs(
     return legs, [candidate(*ways[name]) for name in kinds]
 
 
+@needs_ruckig
 def test_the_fastest_corner_is_not_the_fastest_motion():
     """docs/papers.md: 90 degrees, eps 0.1, V 100: stop 0.56000 s, kinematic corner (22.9 mm/s) 0.56144 s; so the stop is chosen."""
     legs, (zero,) = two_legs(np.pi / 2, 100.0, 0.1, kinds=("zero",))
@@ -230,6 +236,7 @@ def test_the_fastest_corner_is_not_the_fastest_motion():
     assert time[-1] == pytest.approx(0.56, abs=2e-5)
 
 
+@needs_ruckig
 @pytest.mark.parametrize(
     ("theta", "zero_ms", "entry_ms"), [(90, 81.4, 48.7), (30, 40.3, 43.8), (150, 96.4, 49.4)]
 )

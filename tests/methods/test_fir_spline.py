@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.fir.guide import ChordGuide, guide_of_curve
+from planner.fir.chord_guide import ChordGuide, guide_of_curve
 from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
-from planner.methods.fir_spline import CHORD_SHARE, FirSplineMethod
+from planner.methods.fir_spline import CHORD_FRACTION, FirSplineMethod
 
 MACHINE = problems.machine()
 T1, T2 = 0.05, 0.03  # the papers' filters
@@ -179,7 +179,7 @@ def test_the_plain_motion_on_a_circle_runs_on_the_one_further_inside(rho):
     """In the steady part the radius is rho less the exact error, at the speed v_eps in time, within what the chords leave."""
     machine = strong(dt=1e-4)
     made = GIVEN.plan_curve(circle(rho, turns=6), machine, 1e3)
-    tol = (1 - CHORD_SHARE) * machine.tolerance * 0.99
+    tol = (1 - CHORD_FRACTION) * machine.tolerance * 0.99
     v = np.sqrt(24 * rho * tol / (T1**2 + T2**2))
     t = made.trajectory
     steady = (t.t > T1 + T2) & (t.t < t.cycle_time - T1 - T2)

@@ -15,7 +15,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import arc_point, arc_sagitta, chorded
 from planner.geometry.toolpath import Joint
 from planner.machine import Axis
-from planner.methods.kinematic import CHORD_SHARE, KinematicMethod
+from planner.methods.kinematic import CHORD_FRACTION, KinematicMethod
 from planner.methods.registry import plan
 from planner.methods.stop import StopMethod
 from planner.nc.program import PathControl
@@ -138,8 +138,8 @@ def test_small_arcs_are_run_through_and_long_ones_whole():
 
 def test_chords_stay_within_their_share():
     path = toolpath_from_program(JOBS["arcs"], MACHINE)
-    count, sagitta = arc_sagitta(path, CHORD_SHARE)
-    lines = chorded(path, CHORD_SHARE, np.zeros(len(path), bool))
+    count, sagitta = arc_sagitta(path, CHORD_FRACTION)
+    lines = chorded(path, CHORD_FRACTION, np.zeros(len(path), bool))
     assert (lines.arc < 0).all()
     assert len(lines) == count.sum() > 40
     for i in np.flatnonzero(path.arc >= 0):
@@ -152,7 +152,7 @@ def test_chords_stay_within_their_share():
         away = on_arc - start
         off = np.linalg.norm(away - (away * u).sum(axis=1, keepdims=True) * u, axis=1)
         assert off.max() == pytest.approx(sagitta[i], rel=1e-3)
-        assert off.max() <= CHORD_SHARE * 0.05 * (1 + 1e-9)
+        assert off.max() <= CHORD_FRACTION * 0.05 * (1 + 1e-9)
         # what the chords use is not left to the corners between them
         np.testing.assert_allclose(lines.tolerance[k[1:]] + sagitta[i], 0.05, rtol=1e-12)
 

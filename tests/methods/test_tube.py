@@ -117,7 +117,7 @@ def test_more_tolerance_takes_less_time():
 
 @pytest.mark.slow
 def test_stops_and_dwells_add_up():
-    """Exact stops make courses of their own; a dwell stands between two of them."""
+    """Exact stops make runs of their own; a dwell stands between two of them."""
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nY0\nM2\n")
     made = verified(job)
     half = verified(corner(90)).trajectory.cycle_time
@@ -174,7 +174,7 @@ def test_a_job_that_is_too_long_is_refused_before_any_work():
     with pytest.raises(InputError, match=f"at most {LEGS_MAX}.*split the program"):
         TubeMethod(starts=(NeverAsked(),)).plan(problems.polyline(points), MACHINE)
     turns = parse_program(f"G21 G17 G90 F6000\nG2 X0 Y0 I50 P{LEGS_MAX}\nM2\n")
-    with pytest.raises(InputError, match="parts of arcs"):
+    with pytest.raises(InputError, match="steps on arcs"):
         TubeMethod(starts=(NeverAsked(),)).plan(turns, MACHINE)
 
 
@@ -194,10 +194,10 @@ def test_where_nothing_converges_the_start_stays_and_says_why():
 
 
 class SecondFails(TubeNLP):
-    """Finds nothing on courses of one leg."""
+    """Finds nothing on runs of one leg."""
 
-    def solve(self, course, guess):
-        return TubeNLP(max_iterations=2 if len(course) == 1 else 300).solve(course, guess)
+    def solve(self, run, guess):
+        return TubeNLP(max_iterations=2 if len(run) == 1 else 300).solve(run, guess)
 
 
 @pytest.mark.slow
@@ -217,9 +217,9 @@ def test_the_next_start_is_tried_where_the_first_leads_to_nothing():
     asked = []
 
     class Counted(TubeNLP):
-        def solve(self, course, guess):
+        def solve(self, run, guess):
             asked.append(guess.h.sum())
-            return TubeNLP(max_iterations=2 if len(asked) == 1 else 300).solve(course, guess)
+            return TubeNLP(max_iterations=2 if len(asked) == 1 else 300).solve(run, guess)
 
     made = TubeMethod(starts=(SHORT[0], OptimalMethod(corner="fir")), solver=Counted()).plan(
         corner(90), MACHINE

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 import pytest
-import ruckig
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import needs_ruckig
 from whole_plans import CORNERS, Solved, smooth_path, solve
 
 from benchmarks import problems
@@ -23,6 +26,11 @@ from planner.path.samples import sample_path
 
 MACHINE = problems.machine()
 JOBS = problems.all_jobs()
+
+
+@cache
+def solved_job(job: str, kind: str = "bezier") -> Solved:
+    return solve(JOBS[job], MACHINE, kind)
 
 
 def sampled(solved: Solved, dt: float = 1e-3) -> Trajectory:
@@ -73,7 +81,7 @@ def test_the_last_partial_period_is_included(end, dt, count):
 @pytest.mark.parametrize("job", list(JOBS))
 @pytest.mark.parametrize("kind", CORNERS)
 def test_it_starts_and_ends_at_rest_on_the_programmed_points(job, kind):
-    solved = solve(JOBS[job], MACHINE, kind)
+    solved = solved_job(job, kind)
     got = sampled(solved)
     assert got.t[0] == 0.0
     assert got.t[-1] == solved.time
@@ -96,7 +104,7 @@ def test_it_starts_and_ends_at_rest_on_the_programmed_points(job, kind):
 def test_columns_are_derivatives_of_each_other(job, kind):
     """On samples dt apart: the position changes by the mean velocity to dt^2 jerk/12, the velocity by the mean acceleration
     where the acceleration does not step in between."""
-    solved = solve(JOBS[job], MACHINE, kind)
+    solved = solved_job(job, kind)
     got = sampled(solved, 5e-5)
     dt = np.diff(got.t)[:, None]
     by_position = np.diff(got.position, axis=0) / dt
@@ -113,14 +121,14 @@ def test_columns_are_derivatives_of_each_other(job, kind):
 @pytest.mark.parametrize("job", ["pentagon", "spiral", "arcs"])
 def test_the_speed_is_that_of_the_positions(job):
     """Chords over one period are never longer than the arc length that is claimed, and shorter by the sagitta only."""
-    got = sampled(solve(JOBS[job], MACHINE))
+    got = sampled(solved_job(job))
     chord, claimed = np.linalg.norm(np.diff(got.position, axis=0), axis=1), np.diff(got.s)
     assert (chord <= claimed + 1e-8).all()
     assert (np.linalg.norm(got.velocity, axis=1) == pytest.approx(got.feed, abs=1e-9)) is True
 
 
 def test_dense_motion_is_the_same_motion():
-    solved = solve(JOBS["pentagon"], MACHINE)
+    solved = solved_job("pentagon")
     fine = list(dense_motion(solved.motion, MACHINE.dt))
     t = np.concatenate([c.t for c in fine])
     assert t[0] == 0.0
@@ -169,8 +177,10 @@ def test_a_dwell_at_the_start_has_no_acceleration():
 decades = st.floats(-2.0, 2.0).map(lambda e: 10.0**e)
 
 
-def ruckigs(length: float, v: float, a: float, j: float) -> ruckig.Trajectory:
+def ruckigs(length: float, v: float, a: float, j: float) -> Any:
     """The same move by ruckig, in units in which length and jerk are 1: its own epsilons are absolute."""
+    import ruckig
+
     unit = (length / j) ** (1 / 3)
     move, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
     move.target_position, move.max_jerk = [1.0], [1.0]
@@ -179,6 +189,7 @@ def ruckigs(length: float, v: float, a: float, j: float) -> ruckig.Trajectory:
     return found
 
 
+@needs_ruckig
 @given(length=st.floats(-4.0, 3.0).map(lambda e: 10.0**e), v=decades, a=decades, j=decades)
 @settings(max_examples=150)
 def test_closed_forms_are_ruckigs(length, v, a, j):
@@ -216,9 +227,12 @@ def test_known_times():
     )  # along an axis; see methods/test_methods
 
 
+@needs_ruckig
 @pytest.mark.parametrize("length", [1e-3, 0.2, 5.0, 80.0])
 def test_the_stop_law_is_ruckigs_own_motion(length):
     """Position, velocity and acceleration at every sample against ruckig's at_time."""
+    import ruckig
+
     program = problems.polyline([[0, 0], [length, 0]])
     samples = sample_path(smooth_path(program, MACHINE), MACHINE)
     limits = [np.array([x]) for x in (length, 100.0, 2000.0, 2e5)]

@@ -121,7 +121,7 @@ def test_the_coarse_time_is_less_than_what_corners_take(program):
     assert 0.5 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
 
 
-def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_are():
+def test_corners_that_win_are_planned_once_on_each_grid_however_many_straight_pieces_there_are():
     points = np.array([[k, 0.6 * (k % 2)] for k in range(8)] + [[7.0, 20.0], [7.0, 5.0]])
     rounded, shape = shaped(problems.polyline(points))
     splines = planned_on(with_spline(rounded, shape), shape=shape)
@@ -132,9 +132,9 @@ def test_corners_that_win_are_planned_once_however_many_straight_pieces_there_ar
     pieces = len(splines.samples.piece) - 1
     assert pieces == 2
     corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
-    best, left = with_corners(rounded, slow, corners, QUIET, order, RESOLUTION)
+    best, left = with_corners(rounded, slow, slow, corners, QUIET, order, RESOLUTION)
     assert not len(left)
-    assert len(order.paths) == 1
+    assert len(order.paths) == 2
     assert not best.shape.laid.fits.any()
     assert best.solution.cycle_time < slow.solution.cycle_time
 
@@ -145,7 +145,7 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     splines = planned_on(with_spline(rounded, shape), shape=shape)
     corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
     order = Recorded()
-    best, left = with_corners(rounded, splines, corners, QUIET, order, RESOLUTION)
+    best, left = with_corners(rounded, splines, splines, corners, QUIET, order, RESOLUTION)
     assert not order.paths
     assert list(left) == [0]
     assert best is splines

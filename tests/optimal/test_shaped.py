@@ -1,4 +1,4 @@
-"""Shaped set points: nothing rings on, limits and tolerance hold, and it costs less time than filters that do the same."""
+"""Shaped setpoints: nothing rings on, limits and tolerance hold, and it costs less time than filters that do the same."""
 
 from __future__ import annotations
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
 from quick import slow_but
 from scipy.special import ellipe, ellipk
-from whole_plans import CORNERS, smooth_path, solve
+from whole_plans import CORNERS, Solved, smooth_path, solve
 
 from benchmarks import problems
 from planner.base.arrays import FloatArray
@@ -41,6 +42,16 @@ NASTY = {
 EVERY = JOBS | NASTY
 
 
+@cache
+def sampled(job: str, kind: str = "bezier") -> PathSamples:
+    return sample_path(smooth_path(EVERY[job], MACHINE, kind), MACHINE)
+
+
+@cache
+def solved_path(job: str, kind: str = "bezier") -> Solved:
+    return solve(EVERY[job], MACHINE, kind)
+
+
 def evaluate(samples: PathSamples, i: int, share: float) -> tuple[FloatArray, float]:
     """Arc-length derivatives (4, A) and speed |dr/dw| inside interval i."""
     out, work = np.empty((4, 3)), np.empty((2, 4, 3))
@@ -71,7 +82,7 @@ def quadrature(samples: PathSamples, i: int) -> float:
 @pytest.mark.parametrize("kind", CORNERS)
 @pytest.mark.parametrize("job", list(JOBS))
 def test_tangents_are_unit_and_curvature_is_normal(job, kind):
-    samples = sample_path(smooth_path(JOBS[job], MACHINE, kind), MACHINE)
+    samples = sampled(job, kind)
     np.testing.assert_allclose(np.linalg.norm(samples.d1, axis=1), 1.0, rtol=1e-13)
     for d2 in (samples.d2_left, samples.d2_right):
         size = np.maximum(np.linalg.norm(d2, axis=1), 1.0)
@@ -88,7 +99,7 @@ def test_tangents_are_unit_and_curvature_is_normal(job, kind):
 @pytest.mark.parametrize("kind", CORNERS)
 def test_derivatives_against_differences(job, kind):
     """r'' and r''' inside the intervals are what central differences of r' and r'' say."""
-    samples = sample_path(smooth_path(JOBS[job], MACHINE, kind), MACHINE)
+    samples = sampled(job, kind)
     for i in samples.intervals[::3]:
         here, speed = evaluate(samples, i, 0.5)
         step = 1e-4
@@ -104,7 +115,7 @@ def test_derivatives_against_differences(job, kind):
 @pytest.mark.parametrize("job", list(JOBS))
 @pytest.mark.parametrize("kind", slow_but("bezier", CORNERS))
 def test_arc_length_against_quadrature(job, kind):
-    samples = sample_path(smooth_path(JOBS[job], MACHINE, kind), MACHINE)
+    samples = sampled(job, kind)
     inner = samples.intervals[:: max(1, len(samples) // 300)]
     ds = samples.s[inner + 1] - samples.s[inner]
     exact = np.array([quadrature(samples, i) for i in inner])
@@ -150,7 +161,7 @@ def test_curvature_jumps_where_a_line_meets_an_arc():
 @pytest.mark.parametrize("job", list(EVERY))
 @pytest.mark.parametrize("kind", slow_but("bezier", CORNERS))
 def test_the_path_is_continuous_and_in_order(job, kind):
-    samples = sample_path(smooth_path(EVERY[job], MACHINE, kind), MACHINE)
+    samples = sampled(job, kind)
     inner = samples.intervals
     assert (samples.s[inner + 1] > samples.s[inner]).all()
     assert (np.diff(samples.segment) >= 0).all()
@@ -169,9 +180,7 @@ def test_the_path_is_continuous_and_in_order(job, kind):
 @pytest.mark.parametrize("kind", slow_but("bezier", CORNERS))
 def test_limits_hold_between_grid_points(job, kind):
     """The solved profile evaluated densely: axis velocity and acceleration, and feed."""
-    machine = MACHINE
-    solved = solve(EVERY[job], machine, kind)
-    for chunk in dense_motion(solved.motion, machine.dt):
+    for chunk in dense_motion(solved_path(job, kind).motion, MACHINE.dt):
         assert np.abs(chunk.velocity).max() <= 100.0 * (1 + 1e-6)
         assert np.abs(chunk.acceleration).max() <= 2000.0 * (1 + 1e-6)
         assert chunk.feed.max() <= 100.0 * (1 + 1e-9)
@@ -200,7 +209,7 @@ def test_normal_acceleration_between_grid_points(job):
 def test_axis_accelerations_hold_anywhere_in_an_interval(job):
     """The same at its very ends and at random places, from r', r'', x and u alone."""
     rng = np.random.default_rng(1)
-    solved = solve(EVERY[job], MACHINE)
+    solved = solved_path(job)
     samples, x, u = solved.samples, solved.solution.feed_sq, solved.solution.acc_s
     legs, corners, spans, scratch = (
         samples.table.legs,
@@ -221,7 +230,7 @@ def test_axis_accelerations_hold_anywhere_in_an_interval(job):
 
 
 def test_inserted_points_lie_on_the_line():
-    samples = sample_path(smooth_path(JOBS["pentagon"], MACHINE), MACHINE)
+    samples = sampled("pentagon")
     straight = samples.intervals[samples.element[samples.intervals] >= 0]
     chosen = np.repeat(straight[:2], 2)
     s = samples.s[chosen] + np.tile([0.25, 0.75], 2) * (samples.s[chosen + 1] - samples.s[chosen])
@@ -239,7 +248,7 @@ def test_inserted_points_lie_on_the_line():
 
 
 def test_points_cannot_be_inserted_on_curves():
-    samples = sample_path(smooth_path(JOBS["arcs"], MACHINE), MACHINE)
+    samples = sampled("arcs")
     corner = samples.intervals[samples.element[samples.intervals] < 0][:1]
     with pytest.raises(ValueError, match="straight"):
         insert_points(samples, corner, samples.s[corner] + 1e-9)
@@ -295,7 +304,7 @@ def test_joined_lines_stay_within_the_tolerance():
 
 
 def test_records_are_frozen():
-    samples = sample_path(smooth_path(JOBS["pentagon"], MACHINE), MACHINE)
+    samples = sampled("pentagon")
     with pytest.raises(ValueError, match="read-only"):
         samples.s[0] = 1.0
     with pytest.raises(dataclasses.FrozenInstanceError):

@@ -186,6 +186,6 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
         inside = np.searchsorted(piece, part[0], side="right") - 1
         assert part[-1] < piece[inside + 1]
         whole = part[0] == piece[inside] and part[-1] + 1 == piece[inside + 1]
-        assert whole or len(part) > savings.CELLS_MIN
+        assert whole or len(part) > savings.INTERVALS_MIN
     assert (points < 4000).any()
     assert savings.windows_of_grid(piece, kept, 9_000)[2] is False

@@ -46,15 +46,15 @@ def test_a_run_is_the_programmed_path():
 
 @given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
 @settings(max_examples=200, deadline=None)
-def test_a_step_on_an_arc_bends_away_by_no_more_than_its_share(places, t):
-    """The mean of points on the arc with Bernstein weights is within ARC_SHARE of the budget of the point at the mean place."""
+def test_a_step_on_an_arc_bends_away_by_no_more_than_its_fraction(places, t):
+    """The mean of points on the arc with Bernstein weights is within ARC_FRACTION of the budget of the point at the mean place."""
     run = only_run(ARCS)
     for leg in (1, 2):
         s = np.sort(places) * run.step_max[leg]
         weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
         rows = np.full(4, leg)
         off = weights @ run.points(rows, s) - run.points(rows[:1], (weights @ s)[None])[0]
-        assert np.linalg.norm(off) <= run_module.ARC_SHARE * run.budget[leg] * (1 + 1e-9)
+        assert np.linalg.norm(off) <= run_module.ARC_FRACTION * run.budget[leg] * (1 + 1e-9)
 
 
 def test_the_closing_jerks_are_what_the_motion_runs_too_far():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rest_motion import along_x
 
-from planner.tube.splice import Part, Spliced
+from planner.tube.splice import Spliced, SplicedRun
 
 JERK = 1e4
 FIRST, SECOND = along_x(1.0, JERK), along_x(2.0, JERK, start=1.0, slower=1.3)
@@ -15,16 +15,16 @@ HOLD = 0.05
 
 def spliced(hold: float = HOLD) -> Spliced:
     return Spliced(
-        parts=(
-            Part(motion=FIRST, begin=0.0, end=FIRST.end, hold=hold),
-            Part(motion=SECOND, begin=0.0, end=SECOND.end),
+        runs=(
+            SplicedRun(motion=FIRST, begin=0.0, end=FIRST.end, hold=hold),
+            SplicedRun(motion=SECOND, begin=0.0, end=SECOND.end),
         )
     )
 
 
-def test_it_lasts_as_long_as_its_parts():
+def test_it_lasts_as_long_as_its_runs():
     assert spliced().end == pytest.approx(FIRST.end + HOLD + SECOND.end, rel=1e-12)
-    np.testing.assert_allclose(spliced().way, [0.0, 1.0, 3.0], atol=1e-9)
+    np.testing.assert_allclose(spliced().length, [0.0, 1.0, 3.0], atol=1e-9)
 
 
 def test_every_part_is_where_it_was():
@@ -37,7 +37,7 @@ def test_every_part_is_where_it_was():
         assert (np.diff(there.s) > 0).all()
 
 
-def test_it_stands_between_its_parts():
+def test_it_stands_between_its_runs():
     still = spliced().at(FIRST.end + np.linspace(0.0, HOLD, 11)[1:-1], 1e-3)
     np.testing.assert_allclose(still.position[:, 0], 1.0, atol=1e-12)
     for name in ("velocity", "acceleration", "jerk", "feed"):

@@ -17,114 +17,68 @@ the time is convex, and only the jerk rows and that term are curved. Inequalitie
 
 With multipliers lam of the rows, sum lam g = lam_j p/h + (terms of single points) + ..., so that the second derivatives of the
 Lagrangian need one sum over the axes, lam_j = sum lam r'_k/j_k, and those of h(vm, p).
+
+All is written for a block of up to `LANES` intervals (layout.py). The rows of an axis are, in this order, acceleration at the start,
+jerk at the start, jerk at the end, and where r'' jumps acceleration at the end; after those of all axes come the two of the feed.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
+from planner.feedrate.jerk.layout import (
+    A_U,
+    A_X,
+    AXIS,
+    B_J,
+    B_U,
+    B_X,
+    BY_P,
+    BY_U,
+    BY_X,
+    C_J,
+    C_U,
+    C_X,
+    CONVEX,
+    COSTATE,
+    CURVED,
+    D_U,
+    D_X,
+    DS,
+    DYN,
+    EDGE,
+    FIXED,
+    GRADIENT,
+    INNER_END,
+    LAM_LOW,
+    LAM_UP,
+    LANE_MATH,
+    LANES,
+    PER_MIDDLE,
+    PER_X,
+    PI,
+    REST,
+    ROW,
+    VALUE,
+    X_END,
+    H,
+    P,
+    U,
+    X,
+)
 
 DOMAIN = 0.95  # share of the kinematics' domain p ds <= 3 vm^2 that an interval may use [-]; a start with constant jerk uses 8/9
 SLOPE_MIN = 1e-3  # of the mean feed: floor of vm - p h/6, which is 0 at the domain's edge [-]
 
-
-class Grid(NamedTuple):
-    """A window's grid in scaled units: N intervals, N+1 points, A axes."""
-
-    ds: FloatArray  # (N,)
-    x_max: FloatArray  # (N+1,)
-    d1: FloatArray  # (N+1, A), like the next five
-    d2_left: FloatArray
-    d2_right: FloatArray
-    d3_left: FloatArray
-    d3_right: FloatArray
-    per_acceleration: FloatArray  # one over the limits, like the next
-    per_jerk: FloatArray
-
-
-class Profile(NamedTuple):
-    """A motion over a window, in scaled units: x, u (N+1,) and p (N,) of the module text."""
-
-    x: FloatArray
-    u: FloatArray
-    p: FloatArray
-
-    def slower(self, factor: float) -> Profile:
-        """The motion slowed down as a whole."""
-        return Profile(self.x / factor**2, self.u / factor**2, self.p / factor**2)
-
-
-class Iterate(NamedTuple):
-    """A profile with slacks and multipliers: M row sides, the R upper ones first, then the lower ones of all but the last two.
-
-    x, u, p : of `Profile`
-    slack   : (N, M), positive
-    lam     : (N, M) multipliers of the rows, positive
-    pi      : (N,) multipliers of the dynamics
-    """
-
-    x: FloatArray
-    u: FloatArray
-    p: FloatArray
-    slack: FloatArray
-    lam: FloatArray
-    pi: FloatArray
-
-
-class Model(NamedTuple):
-    """The problem at a profile, to second order: N intervals, R rows, in terms of steps (dx, du, dp)_i.
-
-    dynamics : (N, 4) dx_{i+1} = D0 dx + D1 du + D2 dp + D3
-    gradient : (N, 3) of the total time
-    rows     : (N, 3, R) gradients of the rows
-    values   : (N, R) the rows, the effect of the dynamics' defect included
-    convex   : (N, 6) Hessian of the time, as (xx, xu, xp, uu, up, pp)
-    curved   : (N, 6) Hessian of rows and dynamics, weighed by their multipliers
-    costate  : (N, 2) what turns the derivative of the cost to go into the multiplier of the dynamics: pi = C0 (dV/dx + C1)
-    duration : (N,) of the intervals
-    """
-
-    dynamics: FloatArray
-    gradient: FloatArray
-    rows: FloatArray
-    values: FloatArray
-    convex: FloatArray
-    curved: FloatArray
-    costate: FloatArray
-    duration: FloatArray
-
-
-@njit(cache=True, error_model="numpy")
-def empty_model(n, count):
-    """Room for a model of n intervals and `count` rows, all zero."""
-    return Model(
-        np.zeros((n, 4)),
-        np.zeros((n, 3)),
-        np.zeros((n, 3, count)),
-        np.zeros((n, count)),
-        np.zeros((n, 6)),
-        np.zeros((n, 6)),
-        np.zeros((n, 2)),
-        np.zeros(n),
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def at_profile(profile, sides):
-    """An iterate at a copy of the profile, with slacks and multipliers of no rows or `sides` row sides, all zero."""
-    n = len(profile.p)
-    return Iterate(
-        profile.x.copy(),
-        profile.u.copy(),
-        profile.p.copy(),
-        np.zeros((n, sides)),
-        np.zeros((n, sides)),
-        np.zeros(n),
-    )
+# What the steps of `linearise` hand on, in the array `passing`: the mean of the end speeds; d mean/dx_i and d mean/dx_{i+1}; dh/dmean,
+# dh/dp, and with the dynamics put in dh/dx, dh/du, dh/dp and its defect; vm - p h/6; the end speed where it is free, else 0
+MEAN, M0, M1, H_V, H_P, HX, HU, HP, H0, SLOPE, FREE = range(0, 11 * LANES, LANES)
+# ... both end speeds, one over h;
+V0, V1, PER_H = range(11 * LANES, 14 * LANES, LANES)
+# ... the multipliers' sums: of j; of v u and v x at the start and at the end; of x before a jump at the end
+LAM_J, BEND0, TWIST0, BEND1, TWIST1, JUMP = range(14 * LANES, 20 * LANES, LANES)
+PASSING = 20 * LANES
 
 
 @njit(cache=True, error_model="numpy")
@@ -134,190 +88,190 @@ def duration(v0, v1, p, ds):
     return 2.0 * ds / (vm + np.sqrt(max(vm * vm - p * ds / 3.0, 0.0)))
 
 
-@njit(cache=True, error_model="numpy")
-def kinematics(x0, x1, u, p, ds, last):
-    """One interval to first order: D0..D3 with dx_{i+1} = D0 dx + D1 du + D2 dp + D3, and what else its derivatives are made of.
-
-    Returns D0, D1, D2, D3; the duration h; dh/dmean, dh/dp; the slope mean - p h/6; d mean/dx_i, d mean/dx_{i+1}; the factor f of
-    the implicit dependence on x_{i+1}; and the defect of the dynamics as a speed.
-    """
-    v0, v1 = np.sqrt(x0), np.sqrt(x1)
-    mean = 0.5 * (v0 + v1)
-    t = duration(v0, v1, p, ds)
-    slope = max(mean - p * t / 6.0, SLOPE_MIN * mean)
-    h_v, h_p = -t / slope, t * t / (12.0 * slope)
-    m0 = 0.25 / v0 if v0 > 0.0 else 0.0
-    m1 = 0.25 / v1 if v1 > 0.0 and not last else 0.0
-    q = p * (2.0 * u + p)
-    bend = q * t / 6.0
-    e0, e1 = 1.0 + bend * h_v * m0, 2.0 * ds + p * t * t / 6.0
-    e2 = ds + (u + p) * t * t / 6.0 + bend * h_p
-    e3 = x0 + (2.0 * u + p) * ds + q * t * t / 12.0 - x1
-    defect = abs(e3) / (v0 + v1)
-    f = 1.0 if last else 1.0 / (1.0 - bend * h_v * m1)
-    return e0 * f, e1 * f, e2 * f, e3 * f, t, h_v, h_p, slope, m0, m1, f, defect
-
-
-@njit(cache=True, error_model="numpy")
-def _put(rows, values, i, r, slope, value, scale):
-    """Enter row r of interval i with its derivatives in x, u, p and its value, all times `scale`."""
-    cx, cu, cp = slope
-    rows[i, 0, r], rows[i, 1, r], rows[i, 2, r] = cx * scale, cu * scale, cp * scale
-    values[i, r] = value * scale
-
-
-@njit(cache=True, error_model="numpy")
-def _reduce(out, i, q, e0, e1, e2):
-    """Hessian in (x_i, u_i, p_i) from that in (x_i, u_i, p_i, x_{i+1}), q = (00, 01, 02, 12, 22, 03, 13, 23, 33)."""
-    q00, q01, q02, q12, q22, q03, q13, q23, q33 = q
-    out[i, 0] = q00 + e0 * (2.0 * q03 + q33 * e0)
-    out[i, 1] = q01 + q03 * e1 + q13 * e0 + q33 * e0 * e1
-    out[i, 2] = q02 + q03 * e2 + q23 * e0 + q33 * e0 * e2
-    out[i, 3] = e1 * (2.0 * q13 + q33 * e1)
-    out[i, 4] = q12 + q13 * e2 + q23 * e1 + q33 * e1 * e2
-    out[i, 5] = q22 + e2 * (2.0 * q23 + q33 * e2)
-
-
-@njit(cache=True, error_model="numpy")
-def linearise(grid, at, model, jumps):
-    """Fill the model at an iterate's profile and multipliers.
-
-    jumps    : 1 if r'' jumps anywhere: a row for the acceleration left of each point
-
-    Returns the total time and the largest defect of the dynamics, as a speed.
-    """
-    ds, x_max, d1, d2_left, d2_right, d3_left, d3_right, per_acceleration, per_jerk = grid
-    dynamics, gradient, rows, values, convex, curved, costate, h = model
-    x, u, p, lam, pi = at.x, at.u, at.p, at.lam, at.pi
-    n, axes, below = len(h), d1.shape[1], values.shape[1]
-    total, worst = 0.0, 0.0
-    for i in range(n):
-        step, last = ds[i], i == n - 1
-        v0, v1 = np.sqrt(x[i]), np.sqrt(x[i + 1])
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
+def kinematics(g, w, t, worst, m):
+    """The first m intervals of a block to first order: durations and dynamics into `w`, what else its derivatives are made of into `t`.
+    `worst` (LANES,) grows to the defect of the dynamics, as a speed."""
+    for i in range(m):
+        x0, x1, u, p, ds = w[X + i], w[X_END + i], w[U + i], w[P + i], g[DS + i]
+        v0, v1 = np.sqrt(x0), np.sqrt(x1)
         mean = 0.5 * (v0 + v1)
-        e0, e1, e2, e3, t, h_v, h_p, slope, m0, m1, f, defect = kinematics(
-            x[i], x[i + 1], u[i], p[i], step, last
-        )
-        h[i] = t
-        total += t
-        worst = max(worst, defect)
-        slope_v, slope_p = 1.0 - p[i] * h_v / 6.0, -(t + p[i] * h_p) / 6.0  # second derivatives of h(mean, p)
-        h_vv = (t * slope_v / slope - h_v) / slope
-        h_vp = (t * slope_p / slope - h_p) / slope
-        h_pp = t * (2.0 * h_p - t * slope_p / slope) / (12.0 * slope)
-        q = p[i] * (2.0 * u[i] + p[i])
+        h = 2.0 * ds / (mean + np.sqrt(max(mean * mean - p * ds / 3.0, 0.0)))
+        slope = max(mean - p * h / 6.0, SLOPE_MIN * mean)
+        h_v, h_p = -h / slope, h * h / (12.0 * slope)
+        m0 = 0.25 / v0 if v0 > 0.0 else 0.0
+        m1 = 0.25 * g[INNER_END + i] / v1 if v1 > 0.0 else 0.0
+        bend = p * (2.0 * u + p) * h / 6.0
+        f = 1.0 / (1.0 - bend * h_v * m1)  # of the implicit dependence on x_{i+1}
+        e3 = x0 + (2.0 * u + p) * ds + 0.5 * bend * h - x1
+        worst[i] = max(worst[i], 0.5 * abs(e3) / mean)
+        e0, e1 = (1.0 + bend * h_v * m0) * f, (2.0 * ds + p * h * h / 6.0) * f
+        e2, e3 = (ds + (u + p) * h * h / 6.0 + bend * h_p) * f, e3 * f
+        w[H + i], w[COSTATE + i] = h, f
+        w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i] = e0, e1, e2, e3
+        t[MEAN + i], t[M0 + i], t[M1 + i] = mean, m0, m1
+        t[V0 + i], t[V1 + i], t[PER_H + i] = v0, v1, 1.0 / h
+        t[H_V + i], t[H_P + i], t[SLOPE + i], t[FREE + i] = h_v, h_p, slope, v1 * g[INNER_END + i]
         left, right = h_v * m0, h_v * m1  # dh/dx_i, dh/dx_{i+1}
-        dynamics[i, 0], dynamics[i, 1], dynamics[i, 2], dynamics[i, 3] = e0, e1, e2, e3
-        hx, hu, hp, h0 = left + right * e0, right * e1, h_p + right * e2, right * e3
-        gradient[i, 0], gradient[i, 1], gradient[i, 2] = hx, hu, hp
+        t[HX + i], t[HU + i] = left + right * e0, right * e1
+        t[HP + i], t[H0 + i] = h_p + right * e2, right * e3
 
-        per_t = 1.0 / t
-        j, u1 = p[i] * per_t, u[i] + p[i]
-        per_v0, per_v1 = 4.0 * m0, 4.0 * m1
-        j_t = -j * per_t
-        inner = 1.0 if i > 0 else 0.0  # the first point is given: its own rows have no step to limit
-        end = 0.0 if last else 1.0
-        r = 0
-        lam_j = 0.0  # sum of lam r'/j_k over both ends, and per end those of 3 r'' and r'''
-        bend0, twist0, bend1, twist1, jump = 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(axes):
-            a = per_acceleration[i, k]
-            value = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) * inner
-            _put(rows, values, i, r, (d2_right[i, k] * inner, d1[i, k] * inner, 0.0), value, a)
-            b, b1 = per_jerk[i, k], per_jerk[i + 1, k]
-            turn = 3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i]
-            by_h = d1[i, k] * j_t
-            cx = v0 * d3_right[i, k] + 0.5 * turn * per_v0
-            value = d1[i, k] * j + v0 * turn + by_h * h0
-            cu = 3.0 * v0 * d2_right[i, k] + by_h * hu
-            _put(rows, values, i, r + 1, (cx + by_h * hx, cu, d1[i, k] * per_t + by_h * hp), value, b)
-            turn = 3.0 * d2_left[i + 1, k] * u1 + d3_left[i + 1, k] * x[i + 1]
-            by_h = d1[i + 1, k] * j_t
-            cx = (v1 * d3_left[i + 1, k] + 0.5 * turn * per_v1) * end
-            cu = 3.0 * v1 * d2_left[i + 1, k]
-            value = d1[i + 1, k] * j + v1 * turn + by_h * h0 + cx * e3 * end
-            cp = d1[i + 1, k] * per_t + by_h * hp + cx * e2 + cu
-            _put(rows, values, i, r + 2, (cx * e0 + by_h * hx, cx * e1 + cu + by_h * hu, cp), value, b1)
-            lam0 = (lam[i, r + 1] - lam[i, below + r + 1]) * b
-            lam1 = (lam[i, r + 2] - lam[i, below + r + 2]) * b1
-            lam_j += lam0 * d1[i, k] + lam1 * d1[i + 1, k]
-            bend0 += lam0 * 3.0 * d2_right[i, k]
-            twist0 += lam0 * d3_right[i, k]
-            bend1 += lam1 * 3.0 * d2_left[i + 1, k]
-            twist1 += lam1 * d3_left[i + 1, k]
-            r += 3
-            if jumps:
-                a = per_acceleration[i + 1, k]
-                cx, cu = d2_left[i + 1, k] * end, d1[i + 1, k] * end
-                value = cu * u1 + cx * (x[i + 1] + e3)
-                _put(rows, values, i, r, (cx * e0, cx * e1 + cu, cx * e2 + cu), value, a)
-                jump += (lam[i, r] - lam[i, below + r]) * a * cx
-                r += 1
-        _put(rows, values, i, r, (inner, 0.0, 0.0), inner * x[i], 1.0 / x_max[i])
 
-        # Lagrangian of the interval: h + lam_j p/h + pi q h^2/12 + the last row's, as a function L(mean, p, u, h).
-        w = pi[i]
-        l_v, l_vv, l_vp, l_vh = 0.0, 0.0, 0.0, 0.0
-        l_h, l_hh = 1.0 - lam_j * j / t, 2.0 * lam_j * j / (t * t)
-        l_hp, l_pp = -lam_j / (t * t), 0.0
-        if i == 0 or last:  # at rest: stay where the kinematics have a solution
-            c = step / (3.0 * DOMAIN * mean * mean)
-            by_v = -2.0 * c * p[i] / mean
-            cx, cu, cp = by_v * (m0 + m1 * e0), by_v * m1 * e1, c + by_v * m1 * e2
-            _put(rows, values, i, r + 1, (cx, cu, cp), c * p[i] + by_v * m1 * e3, 1.0)
-            weight = lam[i, r + 1]
-            l_v += weight * by_v
-            l_vv += -3.0 * weight * by_v / mean
-            l_vp += -2.0 * weight * c / mean
-        else:
-            middle = mean - 0.125 * p[i] * t
-            scale = 2.0 / (0.5 * (x_max[i] + x_max[i + 1]))
-            c = -0.125 * p[i]
-            cx, cu, cp = m0 + m1 * e0 + c * hx, m1 * e1 + c * hu, m1 * e2 + c * hp - 0.125 * t
-            value = 0.5 * middle + m1 * e3 + c * h0
-            _put(rows, values, i, r + 1, (cx, cu, cp), value, scale * middle)
-            weight = lam[i, r + 1] * scale
-            l_v += weight * middle
-            l_vv += weight
-            l_vp -= 0.125 * weight * t
-            l_vh += weight * c
-            l_h += weight * middle * c
-            l_hh += weight * c * c
-            l_hp -= 0.125 * weight * (middle + c * t)
-            l_pp += weight * t * t / 64.0
-        # Multiplier of the dynamics: stationarity with respect to x_{i+1} (without the dynamics' own term).
-        rest = m1 * (l_h * h_v + l_v) + jump
-        if not last and v1 > 0.0:
-            rest += 0.5 * bend1 * u1 / v1 + 1.5 * twist1 * v1
-        costate[i, 0], costate[i, 1] = f, rest
-        l_h += w * q * t / 6.0
-        l_hh += w * q / 6.0
-        l_hp += w * (u[i] + p[i]) * t / 3.0
-        l_hu, l_pu = w * p[i] * t / 3.0, w * t * t / 6.0
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
+def _axis_rows(g, w, t, rows, m):
+    """The rows of an axis without that before a jump, and what their multipliers add to the sums. `g` and `rows` begin with the
+    axis."""
+    for i in range(m):
+        x0, x1, u, p, per_h = w[X + i], w[X_END + i], w[U + i], w[P + i], t[PER_H + i]
+        e0, e1, e2, e3 = w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i]
+        hx, hu, hp, h0 = t[HX + i], t[HU + i], t[HP + i], t[H0 + i]
+        m0, m1, v0, v1 = t[M0 + i], t[M1 + i], t[V0 + i], t[V1 + i]
+        u1, j = u + p, p * per_h
+        j_h = -j * per_h
+
+        rows[VALUE + i] = g[A_U + i] * u + g[A_X + i] * x0
+        rows[BY_X + i], rows[BY_U + i], rows[BY_P + i] = g[A_X + i], g[A_U + i], 0.0
+
+        b_j, b_u, b_x = g[B_J + i], g[B_U + i], g[B_X + i]
+        turn, by_h = b_u * u + b_x * x0, b_j * j_h
+        rows[ROW + VALUE + i] = b_j * j + v0 * turn + by_h * h0
+        rows[ROW + BY_X + i] = v0 * b_x + 2.0 * m0 * turn + by_h * hx
+        rows[ROW + BY_U + i] = v0 * b_u + by_h * hu
+        rows[ROW + BY_P + i] = b_j * per_h + by_h * hp
+
+        c_j, c_u, c_x = g[C_J + i], g[C_U + i], g[C_X + i]
+        turn, by_h = c_u * u1 + c_x * x1, c_j * j_h
+        cx, cu = t[FREE + i] * c_x + 2.0 * m1 * turn, v1 * c_u
+        rows[2 * ROW + VALUE + i] = c_j * j + v1 * turn + by_h * h0 + cx * e3
+        rows[2 * ROW + BY_X + i] = cx * e0 + by_h * hx
+        rows[2 * ROW + BY_U + i] = cx * e1 + cu + by_h * hu
+        rows[2 * ROW + BY_P + i] = c_j * per_h + by_h * hp + cx * e2 + cu
+
+        start = rows[ROW + LAM_UP + i] - rows[ROW + LAM_LOW + i]
+        end = rows[2 * ROW + LAM_UP + i] - rows[2 * ROW + LAM_LOW + i]
+        t[LAM_J + i] += start * b_j + end * c_j
+        t[BEND0 + i] += start * b_u
+        t[TWIST0 + i] += start * b_x
+        t[BEND1 + i] += end * c_u
+        t[TWIST1 + i] += end * c_x
+
+
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
+def _jump_row(g, w, t, rows, m):
+    """The row of an axis before a jump, as `_axis_rows`."""
+    for i in range(m):
+        cx, cu, u1 = g[D_X + i], g[D_U + i], w[U + i] + w[P + i]
+        rows[VALUE + i] = cu * u1 + cx * (w[X_END + i] + w[DYN + 3 * LANES + i])
+        rows[BY_X + i] = cx * w[DYN + i]
+        rows[BY_U + i] = cx * w[DYN + LANES + i] + cu
+        rows[BY_P + i] = cx * w[DYN + 2 * LANES + i] + cu
+        t[JUMP + i] += (rows[LAM_UP + i] - rows[LAM_LOW + i]) * cx
+
+
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
+def _curvature(g, w, t, rows, m):
+    """The rows of the feed, with which `rows` begin, and the cost: gradient, Hessian, and what its derivative by x_{i+1} is.
+
+    The Lagrangian of the interval is h + lam_j p/h + pi q h^2/12 + the last row's, as a function L(mean, p, u, h), q = p (2u + p).
+    """
+    for i in range(m):
+        x0, u, p, w_pi, h = w[X + i], w[U + i], w[P + i], w[PI + i], w[H + i]
+        e0, e1, e2, e3 = w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i]
+        mean, m0, m1, slope = t[MEAN + i], t[M0 + i], t[M1 + i], t[SLOPE + i]
+        h_v, h_p, hx, hu, hp, h0 = t[H_V + i], t[H_P + i], t[HX + i], t[HU + i], t[HP + i], t[H0 + i]
+        lam_j, bend0, twist0 = t[LAM_J + i], t[BEND0 + i], t[TWIST0 + i]
+        bend1, twist1, free = t[BEND1 + i], t[TWIST1 + i], t[FREE + i]
+        per_h, per_mean, per_slope = t[PER_H + i], 1.0 / mean, 1.0 / slope
+        u1, q = u + p, p * (2.0 * u + p)
+
+        slope_v, slope_p = 1.0 - p * h_v / 6.0, -(h + p * h_p) / 6.0  # second derivatives of h(mean, p)
+        h_vv = (h * slope_v * per_slope - h_v) * per_slope
+        h_vp = (h * slope_p * per_slope - h_p) * per_slope
+        h_pp = h * (2.0 * h_p - h * slope_p * per_slope) * per_slope / 12.0
+
+        rows[VALUE + i] = g[PER_X + i] * x0
+        rows[BY_X + i], rows[BY_U + i], rows[BY_P + i] = g[PER_X + i], 0.0, 0.0
+        # In the middle of the interval. At rest: stay where the kinematics have a solution.
+        edge = g[EDGE + i] > 0.0
+        c = g[DS + i] * per_mean * per_mean / (3.0 * DOMAIN)
+        v = -2.0 * c * p * per_mean
+        middle, by_h, scale = mean - 0.125 * p * h, -0.125 * p, g[PER_MIDDLE + i]
+        s = scale * middle
+        cx = v * (m0 + m1 * e0) if edge else s * (m0 + m1 * e0 + by_h * hx)
+        cu = v * m1 * e1 if edge else s * (m1 * e1 + by_h * hu)
+        cp = c + v * m1 * e2 if edge else s * (m1 * e2 + by_h * hp - 0.125 * h)
+        value = c * p + v * m1 * e3 if edge else s * (0.5 * middle + m1 * e3 + by_h * h0)
+        rows[ROW + VALUE + i] = value
+        rows[ROW + BY_X + i], rows[ROW + BY_U + i], rows[ROW + BY_P + i] = cx, cu, cp
+        lam = rows[ROW + LAM_UP + i] - rows[ROW + LAM_LOW + i]
+        scaled = lam * scale
+        l_v = lam * v if edge else scaled * middle
+        l_vv = -3.0 * lam * v * per_mean if edge else scaled
+        l_vp = -2.0 * lam * c * per_mean if edge else -0.125 * scaled * h
+        l_vh = 0.0 if edge else scaled * by_h
+        l_pp = 0.0 if edge else scaled * h * h / 64.0
+        l_h = 0.0 if edge else scaled * middle * by_h
+        l_hh = 0.0 if edge else scaled * by_h * by_h
+        l_hp = 0.0 if edge else -0.125 * scaled * (middle + by_h * h)
+
+        l_h += 1.0 - lam_j * p * per_h * per_h
+        l_hh += 2.0 * lam_j * p * per_h * per_h * per_h
+        l_hp -= lam_j * per_h * per_h
+        # Stationarity by x_{i+1}, without the dynamics' own term.
+        at_end = m1 * (l_h * h_v + l_v) + t[JUMP + i]
+        w[REST + i] = at_end + 2.0 * m1 * bend1 * u1 + 1.5 * twist1 * free
+        l_h += w_pi * q * h / 6.0
+        l_hh += w_pi * q / 6.0
+        l_hp += w_pi * u1 * h / 3.0
+        l_hu, l_pu = w_pi * p * h / 3.0, w_pi * h * h / 6.0
         l_pp += l_pu
-        # Less the time's own second derivatives, which are kept apart.
+        # Hessian of all, less the time's own second derivatives, which are kept apart.
         s_v = l_h * h_v + l_v - h_v
         s_vv = l_hh * h_v * h_v + (l_h - 1.0) * h_vv + 2.0 * l_vh * h_v + l_vv
         s_vp = l_hh * h_v * h_p + (l_h - 1.0) * h_vp + l_hp * h_v + l_vh * h_p + l_vp
         s_pp = l_hh * h_p * h_p + (l_h - 1.0) * h_pp + 2.0 * l_hp * h_p + l_pp
         s_vu, s_pu = l_hu * h_v, l_hu * h_p + l_pu
-        q00, q01 = s_vv * m0 * m0 - 8.0 * m0 * m0 * m0 * s_v, s_vu * m0
-        q33, q13, q23 = s_vv * m1 * m1 - 8.0 * m1 * m1 * m1 * s_v, s_vu * m1, s_vp * m1
-        if m0 > 0.0:
-            q00 += (0.75 * twist0 - 0.25 * bend0 * u[i] / x[i]) / v0
-            q01 += 0.5 * bend0 / v0
-        if m1 > 0.0:
-            q33 += (0.75 * twist1 - 0.25 * bend1 * u1 / x[i + 1]) / v1
-            q13 += 0.5 * bend1 / v1
-            q23 += 0.5 * bend1 / v1
-        q03 = s_vv * m0 * m1
-        _reduce(curved, i, (q00, q01, s_vp * m0, s_pu, s_pp, q03, q13, q23, q33), e0, e1, e2)
-        # d2/du1 dx1 with u1 = u + p is in q13 and q23; the cross terms with the defect move the gradient
-        o00, o33 = h_vv * m0 * m0 - 8.0 * m0 * m0 * m0 * h_v, h_vv * m1 * m1 - 8.0 * m1 * m1 * m1 * h_v
+        sq0, sq1 = m0 * m0, m1 * m1
+        q00 = s_vv * sq0 - 8.0 * m0 * sq0 * s_v + 4.0 * m0 * (0.75 * twist0 - 4.0 * sq0 * bend0 * u)
+        q01 = s_vu * m0 + 2.0 * m0 * bend0
+        q02, q03 = s_vp * m0, s_vv * m0 * m1
+        q13, q23 = s_vu * m1 + 2.0 * m1 * bend1, s_vp * m1 + 2.0 * m1 * bend1
+        q33 = s_vv * sq1 - 8.0 * m1 * sq1 * s_v + 4.0 * m1 * (0.75 * twist1 - 4.0 * sq1 * bend1 * u1)
+        # d2/du1 dx1 with u1 = u + p is in q13 and q23
+        w[CURVED + i] = q00 + e0 * (2.0 * q03 + q33 * e0)
+        w[CURVED + LANES + i] = q01 + q03 * e1 + q13 * e0 + q33 * e0 * e1
+        w[CURVED + 2 * LANES + i] = q02 + q03 * e2 + q23 * e0 + q33 * e0 * e2
+        w[CURVED + 3 * LANES + i] = e1 * (2.0 * q13 + q33 * e1)
+        w[CURVED + 4 * LANES + i] = s_pu + q13 * e2 + q23 * e1 + q33 * e1 * e2
+        w[CURVED + 5 * LANES + i] = s_pp + e2 * (2.0 * q23 + q33 * e2)
+        o00, o33 = h_vv * sq0 - 8.0 * m0 * sq0 * h_v, h_vv * sq1 - 8.0 * m1 * sq1 * h_v
         o03, o02, o23 = h_vv * m0 * m1, h_vp * m0, h_vp * m1
-        _reduce(convex, i, (o00, 0.0, o02, 0.0, h_pp, o03, 0.0, o23, o33), e0, e1, e2)
+        w[CONVEX + i] = o00 + e0 * (2.0 * o03 + o33 * e0)
+        w[CONVEX + LANES + i] = e1 * (o03 + o33 * e0)
+        w[CONVEX + 2 * LANES + i] = o02 + o03 * e2 + o23 * e0 + o33 * e0 * e2
+        w[CONVEX + 3 * LANES + i] = o33 * e1 * e1
+        w[CONVEX + 4 * LANES + i] = e1 * (o23 + o33 * e2)
+        w[CONVEX + 5 * LANES + i] = h_pp + e2 * (2.0 * o23 + o33 * e2)
+        # the cross terms with the defect move the gradient
         q33 += o33
-        gradient[i, 0] += e3 * (q03 + o03 + q33 * e0)
-        gradient[i, 1] += e3 * (q13 + q33 * e1)
-        gradient[i, 2] += e3 * (q23 + o23 + q33 * e2)
-    return total, worst
+        w[GRADIENT + i] = hx + e3 * (q03 + o03 + q33 * e0)
+        w[GRADIENT + LANES + i] = hu + e3 * (q13 + q33 * e1)
+        w[GRADIENT + 2 * LANES + i] = hp + e3 * (q23 + o23 + q33 * e2)
+
+
+@njit(cache=True, error_model="numpy")
+def linearise(model, b, t, worst):
+    """Fill block b of the model at its profile and multipliers; `t` is room for `PASSING`, `worst` (LANES,) grows to the defect of the
+    dynamics, as a speed."""
+    g, w, rows = model.grid[b], model.work[b], model.rows[b]
+    m, axes, of_axis = min(LANES, model.n - b * LANES), model.axes, 3 + model.jumps
+    kinematics(g, w, t, worst, m)
+    t[LAM_J:PASSING] = 0.0
+    for k in range(axes):
+        of_grid, r = g[FIXED + k * AXIS :], k * of_axis
+        _axis_rows(of_grid, w, t, rows[r * ROW :], m)
+        if model.jumps:
+            r += 3
+            _jump_row(of_grid, w, t, rows[r * ROW :], m)
+    r = axes * of_axis
+    _curvature(g, w, t, rows[r * ROW :], m)

@@ -12,8 +12,12 @@ multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever 
 **Windows.** A long piece is solved in windows of about `window` intervals, or more if the braking distance is long beside that. Each
 window ends in a full stop, which is only there to end it. The part of the window that the stop cannot influence is kept, up to three
 braking distances before it, and the next window starts from the state reached there, at a point where the costate of the kinematics
-says that more speed would help. A start during hard braking into a bend would leave a problem with hardly any feasible points, and
-multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window.
+says that more speed would help (chain.py). A start during hard braking into a bend would leave a problem with hardly any feasible
+points, and multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window
+per thread.
+
+**Threads.** Pieces are independent, and a long one is solved from both of its ends (piece.py). What can be done side by side is, on as
+many cores as planner/base/threads.py says; the kernels let go of Python's lock. The solution is the same, byte by byte, on any number.
 
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into smaller ones if it starts
 at rest; else, or where even that fails, the profile stops: at the end of the window before, if the motion comes from there, or after
@@ -28,40 +32,26 @@ satisfies every row the profile is feasible, always. Its cost, lam - 1, is in th
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from planner.base.threads import side_by_side, threads
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.chain import INTERVALS_MIN
+from planner.feedrate.jerk.layout import Room
+from planner.feedrate.jerk.piece import Piece
+from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
-from planner.feedrate.jerk.window import ScaledWindow, Window
-from planner.feedrate.lagrangian import acceleration_limits, lagrangian
+from planner.feedrate.jerk.window import columns_of
+from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
-# Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4 of some profiles' time, 5
-# gains nothing.
-BRAKING_WAYS = 3.0
-# At most this fraction of a window is kept [-]: the rest is the way ahead that the next window starts with.
-KEPT_SHARE_MAX = 0.95
-# ... and at least this fraction of what can be [-]. In between, the point where more speed would help most: to keep all, whatever
-# the state there, costs up to 0.8 % of a profile's time.
-JOIN_SHARE = 0.85
-# Where less than this fraction of a window can be kept [-], windows become twice as large (never: a sixth more windows), ...
-KEPT_SHARE_MIN = 0.5
-# ... up to so many times the usual one, for the memory's sake, ...
-LARGEST = 32
-# ... and where more is kept, half as large again, down to the usual one: for the memory's sake too, the time is the same.
-KEPT_SHARE_HIGH = 0.8
-# A window ends where the grid is finest in this last part of it [-]: a stop needs points.
-END_SHARE = 0.25
-# Intervals: a smaller window that does not converge is not divided any further: from rest the plain start does for so few.
-SMALLEST_WINDOW = 100
-# Into so many smaller windows one that does not converge is divided.
-DIVISION = 5
-INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 PLACES_NAMED = 3  # in a sentence
+POINTS_SHARED = 3_000  # fewer are solved by one thread: threads take 1 ms to begin, a point some us
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +66,7 @@ class JerkLimited:
 
     tol: float = 1e-4
     iterations: int = 100
-    window: int = 1_000
+    window: int = 2_000
     settings: InteriorPointSettings = field(default=SETTINGS, repr=False)
 
     def solve(
@@ -94,20 +84,20 @@ class JerkLimited:
             at = problem.s[problem.piece[short[0]]]
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
-        profile = _Profile(problem, self, progress)
-        for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True):
-            profile.solve_piece(int(first), int(beyond) - 1)
-        slower = profile.slow_down()
+        profile = Profile.at_rest(*problem.d1.shape)
+        pieces, slower = self._solve_pieces(problem, profile, progress)
+        stops = [stop for piece in pieces for stop in piece.stops]
+        chains = [chain for piece in pieces for chain in piece.chains]
         sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk"
-        if profile.stops:
-            places = ", ".join(f"{problem.s[k]:.6g}" for k in profile.stops[:PLACES_NAMED])
-            more = ", ..." if len(profile.stops) > PLACES_NAMED else ""
+        if stops:
+            places = ", ".join(f"{problem.s[k]:.6g}" for k in stops[:PLACES_NAMED])
+            more = ", ..." if len(stops) > PLACES_NAMED else ""
             sentence += (
-                f", except {len(profile.stops)} full stops where the method did not converge, at s = {places}{more} mm: "
+                f", except {len(stops)} full stops where the method did not converge, at s = {places}{more} mm: "
                 "coarsen the path where points nearly coincide, refine it where the feed changes much between points"
             )
         solution = FeedrateSolution(
-            status=Status.ACCEPTABLE if profile.stops else Status.OPTIMAL,
+            status=Status.ACCEPTABLE if stops else Status.OPTIMAL,
             sentence=sentence,
             solver=repr(self),
             feed_sq=profile.x,
@@ -115,164 +105,80 @@ class JerkLimited:
             jerk_s=profile.jerk,
             duration=profile.duration,
             solve_time=0.0,
-            iterations=profile.iterations,
+            iterations=max(
+                done for piece in pieces for done in (*piece.joined, *(c.iterations for c in piece.chains))
+            ),
             jerk_limited=True,
-            multipliers=profile.multipliers(),
+            multipliers=Multipliers(rows=profile.rows, feed=profile.feed, dynamics=profile.dynamics),
             effort={
-                "windows": profile.windows,
-                "other starts": profile.other_starts,
-                "other ends": profile.other_ends,
-                "divided": profile.divided,
-                "standstills": len(profile.stops),
+                "windows": sum(chain.windows for chain in chains)
+                + sum(len(piece.joined) for piece in pieces),
+                "other starts": sum(chain.other_starts for chain in chains),
+                "other ends": sum(chain.other_ends for chain in chains),
+                "joined": sum(piece.met for piece in pieces),
+                "divided": sum(chain.divided for chain in chains),
+                "standstills": len(stops),
             },
         )
         found = lagrangian(problem, solution)
         prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
         return replace(solution, prices=prices, solve_time=time.perf_counter() - began)
 
+    def _solve_pieces(
+        self, problem: FeedrateProblem, profile: Profile, progress: Callable[[float], None] | None
+    ) -> tuple[list[Piece], float]:
+        """Solve all pieces into `profile`, on several cores if it is worth it; returns them and by what factor one is slowed down
+        most."""
+        columns, counted = columns_of(problem), _Counted(len(problem), progress)
+        pieces = [
+            Piece(self, columns, profile, int(first), int(beyond) - 1, counted.add)
+            for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True)
+        ]
+        # The longest first, so that none is left to one core at the end.
+        order = sorted(pieces, key=lambda piece: piece.first - piece.last)
+        work = [task for piece in order for task in piece.work]
+        if threads() == 1 or len(work) == 1 or len(problem) < POINTS_SHARED:
+            room = Room()
+            for task in work:
+                task(room)
+            return pieces, max(piece.finish(room) for piece in pieces)
+        rooms = threading.local()
 
-class _Profile:
-    """The profile of all points as it grows, window by window."""
+        def room_here() -> Room:
+            if not hasattr(rooms, "room"):
+                rooms.room = Room()
+            return rooms.room
 
-    def __init__(
-        self, problem: FeedrateProblem, solver: JerkLimited, progress: Callable[[float], None] | None
-    ):
-        self.problem = problem
-        self.solver = solver
-        self._progress = progress
-        points, axes = problem.d1.shape
-        self.x, self.u = np.zeros(points), np.zeros(points)
-        self.jerk, self.duration = np.zeros(points), np.zeros(points)
-        self.rows, self.feed, self.dynamics = (
-            np.zeros((points, axes, 4)),
-            np.zeros((points, 2)),
-            np.zeros(points),
-        )
-        self.iterations = 0
-        # windows solved; how often not from the first start, not with the first end, and divided into smaller ones
-        self.windows = self.other_starts = self.other_ends = self.divided = 0
-        self.stops: list[int] = []  # points where the profile rests because nothing better was found
-        self._rest: Window | None = None  # what the window before knew of the way ahead, down to its stop
-        self.acceleration = acceleration_limits(problem)
+        def run(task: Callable[[Room], None]) -> Callable[[], None]:
+            return lambda: task(room_here())
 
-    def solve_piece(self, first: int, last: int) -> None:
-        """Solve the points first..last in windows."""
-        begin, size, divided = first, self.solver.window, False
-        while begin < last:
-            end = self._window_end(begin, size, last)
-            found = self._solve_window(begin, end)
-            if found is None:
-                if end - begin > SMALLEST_WINDOW and self.x[begin] == 0.0:
-                    size, divided = max((end - begin) // DIVISION, SMALLEST_WINDOW), True
-                    self.divided += 1
-                else:
-                    begin = self._stop(begin, end)
-                    size, divided = self.solver.window, False
-                continue
-            keep = end if end == last else self._unfelt(begin, end, found)
-            share = (keep - begin) / (end - begin)
-            if not divided and (
-                share == 0.0 or (share < KEPT_SHARE_MIN and size < LARGEST * self.solver.window)
-            ):
-                size *= 2  # beside this window the way to brake is long
-                continue
-            if keep == begin:
-                keep = end
-                self.stops.append(end)
-            self._keep(begin, keep, found)
-            begin = keep
-            if divided:
-                size, divided = self.solver.window, False
-            elif share > KEPT_SHARE_HIGH and size > self.solver.window:
-                size //= 2
+        side_by_side([run(task) for task in work], counted.stop, counted.show)
+        return pieces, max(piece.finish(room_here()) for piece in pieces)
 
-    def _window_end(self, begin: int, size: int, last: int) -> int:
-        """The last point of a window: where the grid is finest near its end; no sooner than the stop that the way ahead knows."""
-        if last - begin <= size + INTERVALS_MIN:
-            return last
-        earliest = begin + size - int(END_SHARE * size)
-        s = self.problem.s
-        spread = s[earliest + 1 : begin + size + 2] - s[earliest - 1 : begin + size]
-        end = earliest + int(np.argmin(spread))
-        if self._rest is not None and self.x[begin] > 0.0:
-            end = max(end, begin + len(self._rest.x) - 1)
-        return end
 
-    def _stop(self, begin: int, end: int) -> int:
-        """Where no window converges: down to the last window's stop, or from rest with the plain start; returns where it ends."""
-        if self._rest is not None and self.x[begin] > 0.0:
-            end = begin + len(self._rest.x) - 1
-            self._keep(begin, end, self._rest)
-        else:
-            self._keep(begin, end, self._scaled(begin, end).plain())
-        self.stops.append(end)
-        return end
+class _Stopped(Exception):
+    """Raised where work goes on of which nobody wants the result."""
 
-    def _scaled(self, begin: int, end: int) -> ScaledWindow:
-        return ScaledWindow.of(self.problem, self.acceleration, begin, end, self.solver.settings)
 
-    def _solve_window(self, begin: int, end: int) -> Window | None:
-        """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not converge."""
-        behind = self._rest if self.x[begin] > 0.0 else None
-        found, done, starts = self._scaled(begin, end).solve(behind, self.solver.tol, self.solver.iterations)
-        self.iterations = max(self.iterations, done)
-        self.windows += 1
-        self.other_starts += starts - 1
-        return found
+class _Counted:
+    """How many points are done, by any thread."""
 
-    def _unfelt(self, begin: int, end: int, found: Window) -> int:
-        """Where to go on from: a point from which the window's end is far beyond the way to brake, one of the last such points.
+    def __init__(self, points: int, progress: Callable[[float], None] | None):
+        self._points, self._progress = points, progress
+        self._lock, self._done, self._stopped = threading.Lock(), 0, False
+        self._here = threading.get_ident()
 
-        Of these the one where more speed would help most (costate times feed^2). Where less would help, while the motion brakes into a
-        bend with all its jerk, its state is at the edge of what can still be continued: a problem that starts there has hardly any
-        room, and its multipliers say nothing.
-        """
-        problem = self.problem
-        own = slice(begin, end + 1)
-        a, j = problem.acceleration_limit[own].min(), problem.jerk_limit[own].min()
-        brake = found.x / (2.0 * a) + np.sqrt(found.x) * a / (2.0 * j)
-        free = np.flatnonzero(problem.s[end] - problem.s[begin : end + 1] >= BRAKING_WAYS * brake)
-        free = free[free <= KEPT_SHARE_MAX * (end - begin)]
-        if not len(free):
-            return begin
-        last = free[free >= JOIN_SHARE * free[-1]]
-        return begin + int(last[np.argmin(found.dynamics[last] * found.x[last])])
+    def add(self, count: int) -> None:
+        if self._stopped:
+            raise _Stopped
+        with self._lock:
+            self._done += count
+        if threading.get_ident() == self._here:
+            self.show()
 
-    def _keep(self, begin: int, end: int, found: Window) -> None:
-        """Take over the intervals begin..end of a window and the state at `end`."""
-        count = end - begin
-        self.x[begin : end + 1], self.u[begin : end + 1] = found.x[: count + 1], found.u[: count + 1]
-        self.jerk[begin:end], self.duration[begin:end] = found.jerk[:count], found.duration[:count]
-        self.rows[begin:end], self.feed[begin:end] = found.rows[:count], found.feed[:count]
-        self.dynamics[begin:end] = found.dynamics[:count]
+    def stop(self) -> None:
+        self._stopped = True
+
+    def show(self) -> None:
         if self._progress is not None:
-            self._progress(end / len(self.problem))
-        self._rest = found.after(count)
-
-    def slow_down(self) -> float:
-        """Slow every piece until all rows hold at its grid points; returns the largest factor."""
-        problem, axes = self.problem, len(self.problem.axes)
-        inner = np.flatnonzero(problem.interval)
-        factor = np.ones(len(problem))
-        v, u, j = np.sqrt(self.x), self.u, self.jerk
-        factor = np.maximum(factor, np.sqrt(self.x / problem.feed_sq_limit))
-        for points, d2, d3 in (
-            (inner, problem.d2_right, problem.d3_right),
-            (inner + 1, problem.d2_left, problem.d3_left),
-        ):
-            d1, d2, d3 = problem.d1[points], d2[points], d3[points]
-            x_here, v_here, u_here = self.x[points, None], v[points, None], u[points, None]
-            acceleration = np.abs(d1 * u_here + d2 * x_here) / self.acceleration[points]
-            jerk = np.abs(d1 * j[inner, None] + v_here * (3.0 * d2 * u_here + d3 * x_here))
-            jerk = jerk / problem.jerk_limit[points]
-            worst = np.maximum(np.sqrt(acceleration), np.cbrt(jerk)).reshape(-1, axes).max(axis=1)
-            factor[inner] = np.maximum(factor[inner], worst)
-        largest = np.maximum.reduceat(factor, problem.piece[:-1])
-        by = np.repeat(largest, np.diff(problem.piece))
-        self.x, self.u, self.jerk = self.x / by**2, self.u / by**2, self.jerk / by**3
-        self.duration = self.duration * by
-        return float(largest.max())
-
-    def multipliers(self) -> Multipliers:
-        """Of all intervals."""
-        return Multipliers(rows=self.rows, feed=self.feed, dynamics=self.dynamics)
+            self._progress(min(self._done / self._points, 1.0))

@@ -1,6 +1,6 @@
 """Profiles to start the jerk-limited solver from.
 
-`envelope` is what the solver starts from, turned into a motion where that is found (interior_point.track):
+`envelope` is what the solver starts from, turned into a motion where that is found (track.py):
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.
@@ -18,7 +18,6 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.constraints.problem import FeedrateProblem
 
 # Fractions of the limits, so that a start lies inside them and yet is fast [-]: half or nearly twice of any of these five changes the
 # iterations by no more than 4 % (settings.py: on which problems).
@@ -33,38 +32,50 @@ NEWTON_STEPS = (
 FEED_SQ_MIN = 1e-12  # of the largest feed^2: the start stays above it between the ends [-]
 
 
-def envelope(problem: FeedrateProblem, begin: int, end: int) -> FloatArray:
+@njit(cache=True, error_model="numpy", nogil=True)
+def envelope(columns, begin, end):
     """Feed^2 [mm2/s2] at the points begin..end, from rest to rest."""
-    own = slice(begin, end + 1)
-    acceleration, jerk_limit = problem.acceleration_limit[own], problem.jerk_limit[own]
-    curve = np.maximum(np.abs(problem.d2_left[own]), np.abs(problem.d2_right[own])) / acceleration
-    slope = np.maximum(np.abs(problem.d3_left[own]), np.abs(problem.d3_right[own])) / jerk_limit
-    with np.errstate(divide="ignore"):
-        by_acceleration = NORMAL_SHARE / curve.max(axis=1)
-        by_jerk = (JERK_SHARE / slope.max(axis=1)) ** (2 / 3)
-        rate = ACCELERATION_SHARE / (np.abs(problem.d1[own]) / acceleration).max(axis=1)
-        jerk = JERK_SHARE / (np.abs(problem.d1[own]) / jerk_limit).max(axis=1)
-    caps = np.minimum(CAP_SHARE * problem.feed_sq_limit[own], np.minimum(by_acceleration, by_jerk))
-    caps[0] = caps[-1] = 0.0
-    x = _growing(
-        _growing(caps, rate, jerk, np.diff(problem.s[own]), 1), rate, jerk, np.diff(problem.s[own]), -1
-    )
-    x = np.maximum(x, FEED_SQ_MIN * x.max())
-    x[0] = x[-1] = 0.0
+    n = end - begin
+    caps, rate, jerk = np.zeros(n + 1), np.empty(n + 1), np.empty(n + 1)
+    for i in range(n + 1):
+        a = begin + i
+        by_acceleration, by_jerk, slowest, slowest_jerk = 0.0, 0.0, 0.0, 0.0
+        for k in range(columns.d1.shape[1]):
+            bend = max(abs(columns.d2_left[a, k]), abs(columns.d2_right[a, k]))
+            twist = max(abs(columns.d3_left[a, k]), abs(columns.d3_right[a, k]))
+            by_acceleration = max(by_acceleration, bend / columns.acceleration[a, k])
+            by_jerk = max(by_jerk, twist / columns.jerk[a, k])
+            slowest = max(slowest, abs(columns.d1[a, k]) / columns.acceleration[a, k])
+            slowest_jerk = max(slowest_jerk, abs(columns.d1[a, k]) / columns.jerk[a, k])
+        rate[i], jerk[i] = ACCELERATION_SHARE / slowest, JERK_SHARE / slowest_jerk
+        if 0 < i < n:
+            cap = min(CAP_SHARE * columns.x_max[a], NORMAL_SHARE / by_acceleration)
+            caps[i] = min(cap, np.cbrt(JERK_SHARE / by_jerk) ** 2)
+    s = columns.s[begin : end + 1]
+    x = _growing(_growing(caps, rate, jerk, s, 1), rate, jerk, s, -1)
+    least = FEED_SQ_MIN * x.max()
+    for i in range(1, n):
+        x[i] = max(x[i], least)
     return x
 
 
-def envelope_profile(x: FloatArray, ds: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over n >= 4 intervals ds, in any units: harmonic means of
-    the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals grow), and constant
-    jerk on the first and the last interval, with no more of it than the next interval can take back."""
-    x, u = x.copy(), np.zeros(len(x))
-    for at, beside, first, second in ((1, 2, ds[0], ds[1]), (-2, -3, ds[-1], ds[-2])):
-        x[at] = min(x[at], x[beside] * 1.5 * first / (1.5 * first + second))
-    rate = np.diff(x) / (2.0 * ds)
-    before, after = rate[:-1], rate[1:]
-    u[1:-1] = np.divide(2.0 * before * after, before + after, out=u[1:-1], where=before * after > 0.0)
-    u[1], u[-2] = x[1] / (1.5 * ds[0]), -x[-2] / (1.5 * ds[-1])
+@njit(cache=True, error_model="numpy", nogil=True)
+def envelope_profile(x, s):
+    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over the points s of n >= 4 intervals, in any units:
+    harmonic means of the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals
+    grow), and constant jerk on the first and the last interval, with no more of it than the next interval can take back."""
+    n = len(x) - 1
+    x, u = x.copy(), np.zeros(n + 1)
+    first, last = s[1] - s[0], s[n] - s[n - 1]
+    x[1] = min(x[1], x[2] * 1.5 * first / (1.5 * first + s[2] - s[1]))
+    x[n - 1] = min(x[n - 1], x[n - 2] * 1.5 * last / (1.5 * last + s[n - 1] - s[n - 2]))
+    before = 0.0
+    for i in range(n):
+        after = (x[i + 1] - x[i]) / (2.0 * (s[i + 1] - s[i]))
+        if before * after > 0.0:
+            u[i] = 2.0 * before * after / (before + after)
+        before = after
+    u[1], u[n - 1] = x[1] / (1.5 * first), -x[n - 1] / (1.5 * last)
     return x, u
 
 
@@ -92,14 +103,14 @@ def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @njit(cache=True, error_model="numpy")
-def _growing(caps, rate, jerk, ds, way):
+def _growing(caps, rate, jerk, s, way):
     """The largest x (N+1,) below the caps that grows, forward (way 1) or backward (-1), with no more than a jerk from u = 0 up to an
     acceleration: from every dip like a motion that starts there."""
-    n = len(ds)
+    n = len(s) - 1
     x = caps.copy()
     i, u = (0, 0.0) if way > 0 else (n, 0.0)
     for _ in range(n):
-        step = ds[i] if way > 0 else ds[i - 1]
+        step = abs(s[i + way] - s[i])
         j, a = min(jerk[i], jerk[i + way]), min(rate[i], rate[i + way])
         v = np.sqrt(x[i])
         # v h + u h^2/2 + j h^3/6 = step; each term alone bounds h, Newton's steps go down from there

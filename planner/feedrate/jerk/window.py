@@ -13,11 +13,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
-from planner.feedrate.jerk.rows import Grid, Profile, at_profile, empty_model, linearise
+from planner.feedrate.jerk.layout import (
+    DS,
+    LAM_LOW,
+    LAM_UP,
+    LANES,
+    PI,
+    ROW,
+    X_END,
+    Blocks,
+    Columns,
+    P,
+    Room,
+    X,
+    profile,
+    put,
+    rows_of,
+)
+from planner.feedrate.jerk.rows import duration
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
+from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
+from planner.feedrate.jerk.track import track
+from planner.feedrate.lagrangian import acceleration_limits
 
 # A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
 START_ROOM = 0.9
@@ -31,7 +52,25 @@ POLISHED = 1e-14  # defect, share of the largest feed [-]
 GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
 RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
 DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
-JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
+
+
+Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
+
+
+def columns_of(problem: FeedrateProblem) -> Columns:
+    """What the kernel needs to know of a problem."""
+    return Columns(
+        unit=float(problem.acceleration[: problem.machine_axes].max()),
+        s=problem.s,
+        x_max=problem.feed_sq_limit,
+        d1=problem.d1,
+        d2_left=problem.d2_left,
+        d2_right=problem.d2_right,
+        d3_left=problem.d3_left,
+        d3_right=problem.d3_right,
+        acceleration=acceleration_limits(problem),
+        jerk=problem.jerk_limit,
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,15 +104,21 @@ class Window:
 class ScaledWindow:
     """A window's problem in units of its own: fastest feed 1, largest acceleration 1.
 
-    jumps : 1 if r'' jumps at an inner point, else 0
-    asked : (N+1,) its envelope (start.py)
-    feed  : unit of speed [mm/s]
-    time  : unit of time [s]
+    columns, begin : the problem, and where in it the window begins
+    blocks : the scaled problem, with room for profile and multipliers, which are worked on in place
+    s      : (N+1,) arc length [mm]
+    asked  : (N+1,) feed^2 of the envelope (start.py) [mm2/s2]
+    jerk   : of the slowest axis, scaled
+    feed   : unit of speed [mm/s]
+    time   : unit of time [s]
     """
 
-    grid: Grid
-    jumps: int
+    columns: Columns
+    begin: int
+    blocks: Blocks
+    s: FloatArray
     asked: FloatArray
+    jerk: float
     feed: float
     time: float
     settings: InteriorPointSettings = SETTINGS
@@ -81,32 +126,23 @@ class ScaledWindow:
     @classmethod
     def of(
         cls,
-        problem: FeedrateProblem,
-        acceleration: FloatArray,
+        columns: Columns,
         begin: int,
         end: int,
+        room: Room,
         settings: InteriorPointSettings = SETTINGS,
     ) -> ScaledWindow:
-        """The points begin..end of a problem with the acceleration limits (P, A) [mm/s2]."""
+        """The points begin..end of a problem, until `room` is used for another window."""
         own = slice(begin, end + 1)
-        feed = float(np.sqrt(problem.feed_sq_limit[own].max()))
-        t = float(feed / problem.acceleration[: problem.machine_axes].max())
-        length = feed * t
-        grid = Grid(
-            ds=np.diff(problem.s[own]) / length,
-            x_max=problem.feed_sq_limit[own] / feed**2,
-            d1=problem.d1[own],
-            d2_left=problem.d2_left[own] * length,
-            d2_right=problem.d2_right[own] * length,
-            d3_left=problem.d3_left[own] * length**2,
-            d3_right=problem.d3_right[own] * length**2,
-            per_acceleration=feed / t / acceleration[own],
-            per_jerk=feed / (t * t) / problem.jerk_limit[own],
-        )
+        feed = float(np.sqrt(columns.x_max[own].max()))
+        t = feed / columns.unit
         return cls(
-            grid=grid,
-            jumps=_jumps(grid),
-            asked=envelope(problem, begin, end) / feed**2,
+            columns=columns,
+            begin=begin,
+            blocks=room.blocks(columns, begin, end, feed, t),
+            s=columns.s[own],
+            asked=envelope(columns, begin, end),
+            jerk=float(columns.jerk[own].min()) * t * t / feed,
             feed=feed,
             time=t,
             settings=settings,
@@ -115,116 +151,118 @@ class ScaledWindow:
     def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
         Also the iterations of the longest try, and from how many starts it was tried."""
+        return self._from(self._starts(None if behind is None else (behind.x, behind.u)), tol, iterations)
+
+    def between(self, left: Way, right: Way, tol: float, iterations: int) -> tuple[Window | None, int, int]:
+        """The fastest profile between two ways to rest, `left` from the window's first point on and `right` from its last point on,
+        backward; as `solve`."""
+        return self._from(self._starts(left, right), tol, iterations)
+
+    def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
+        """What the first of these starts that converges leads to, as `solve`."""
         most = starts = 0
-        for starts, start in enumerate(self._starts(behind), start=1):
-            found = kernel.minimise_time(self.grid, start, self.jumps, tol, iterations, self.settings)
+        for starts, (x, u) in enumerate(profiles, start=1):
+            put(self.blocks, x, u)
+            found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
             if _accepted(found):
-                profile, _ = self._track(found.profile, 0.0, POLISHING_ROUNDS, POLISHED)
-                return self._window(profile, found.lam, found.pi), most, starts
+                self._track(0.0, POLISHING_ROUNDS, POLISHED)
+                return self._window(), most, starts
         return None, most, starts
 
     def plain(self) -> Window:
         """The plain start as a profile from rest: feasible, and slow."""
-        profile = self._slowed(self._plain(1.0))
-        n = len(profile.p)
-        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+        put(self.blocks, *self._slowed(*self._plain(1.0)))
+        return self._without_multipliers()
 
     def near(self, x: FloatArray, u: FloatArray) -> Window | None:
         """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
         none. It may exceed its limits a little, and has no multipliers."""
-        rate = u * self.time / self.feed
-        profile, defect = self._track(
-            Profile(x / self.feed**2, rate, np.diff(rate)), 0.0, TRACKING_ROUNDS, POLISHED
-        )
-        if defect > self.settings.defect:
+        put(self.blocks, x / self.feed**2, u * self.time / self.feed)
+        if self._track(0.0, TRACKING_ROUNDS, POLISHED) > self.settings.defect:
             return None
-        n = len(profile.p)
-        return self._window(profile, np.zeros((n, 2 * self._rows - 2)), np.zeros(n))
+        return self._without_multipliers()
 
-    def _starts(self, behind: Window | None) -> Iterator[Profile]:
-        """Profiles to start from, the best first."""
-        for start in self._from_rest():
-            if behind is None:
-                yield start
-            else:
-                joined = self._joined(behind, start)
-                yield self._tracked(joined) or joined
+    def _starts(self, left: Way | None, right: Way | None = None) -> Iterator[Way]:
+        """Profiles to start from, scaled, the best first.
 
-    def _from_rest(self) -> Iterator[Profile]:
+        left  : the way to rest from the first point on, in the problem's units; None from rest
+        right : the same from the last point on, backward
+        """
+        for x, u in self._from_rest():
+            if left is None:
+                yield x, u
+                continue
+            joined = self._joined(left, x, u)
+            if right is not None:
+                back, rate = self._joined(right, *_mirrored(x, u))
+                faster = back[::-1] > joined[0]
+                faster[0], faster[-1] = False, True  # these states are given
+                joined = np.where(faster, back[::-1], joined[0]), np.where(faster, -rate[::-1], joined[1])
+            yield self._tracked(*joined) or joined
+
+    def _from_rest(self) -> Iterator[Way]:
         """The same from rest."""
-        asked, rate = envelope_profile(self.asked, self.grid.ds)
-        near = Profile(asked, rate, np.diff(rate))
-        tracked = self._tracked(near)
+        x, u = envelope_profile(self.asked, self.s)
+        near = x / self.feed**2, u * self.time / self.feed
+        tracked = self._tracked(*near)
         if tracked is not None:
-            yield self._slowed(tracked, SLOWER_MAX)
-        yield self._slowed(near, SLOWER_MAX)
-        yield self._slowed(self._plain(asked.max()), SLOWER_MAX)
+            yield self._slowed(*tracked, SLOWER_MAX)
+        yield self._slowed(*near, SLOWER_MAX)
+        yield self._slowed(*self._plain(near[0].max()), SLOWER_MAX)
 
-    def _joined(self, behind: Window, start: Profile) -> Profile:
-        """A profile from rest put behind the window before: its way ahead, to the last point where that is faster."""
-        ahead, rate = behind.x / self.feed**2, behind.u * self.time / self.feed
-        beyond = 1 + int(np.flatnonzero(ahead > start.x[: len(ahead)])[-1])  # the first at least
-        x, u = np.append(ahead[:beyond], start.x[beyond:]), np.append(rate[:beyond], start.u[beyond:])
-        return Profile(x, u, np.diff(u))
+    def _joined(self, way: Way, x: FloatArray, u: FloatArray) -> Way:
+        """A profile from rest put behind a way in the problem's units, which leads to the last point where it is faster."""
+        ahead, rate = way[0][: len(x)] / self.feed**2, way[1] * self.time / self.feed
+        beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
+        return np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
 
-    def _track(
-        self, profile: Profile, smoothing: float, rounds: int, defect_max: float
-    ) -> tuple[Profile, float]:
-        """`interior_point.track` with the jerk of the slowest axis as the machine's."""
-        jerk = float(1.0 / self.grid.per_jerk.max())
-        tracked: tuple[Profile, float] = kernel.track(
-            self.grid, jerk, profile, smoothing, rounds, defect_max, self.settings
-        )
-        return tracked
+    def _track(self, smoothing: float, rounds: int, defect_max: float) -> float:
+        """`track` with the jerk of the slowest axis as the machine's."""
+        return float(track(self.blocks, self.jerk, smoothing, rounds, defect_max, self.settings))
 
-    def _tracked(self, profile: Profile) -> Profile | None:
+    def _tracked(self, x: FloatArray, u: FloatArray) -> Way | None:
         """A profile near to the given one with exact kinematics; None where that is not found."""
-        tracked, defect = self._track(profile, 1.0, TRACKING_ROUNDS, self.settings.defect)
-        return tracked if defect <= self.settings.defect else None
+        put(self.blocks, x, u)
+        defect = self._track(1.0, TRACKING_ROUNDS, self.settings.defect)
+        return profile(self.blocks) if defect <= self.settings.defect else None
 
-    def _plain(self, fastest: float) -> Profile:
+    def _plain(self, fastest: float) -> Way:
         """The plain start with a largest feed^2, whatever its limits."""
-        x, u = plain_start(np.concatenate([[0.0], np.cumsum(self.grid.ds)]))
-        return Profile(fastest * x, fastest * u, fastest * np.diff(u))
+        x, u = plain_start(self.s / (self.feed * self.time))
+        return fastest * x, fastest * u
 
-    @property
-    def _rows(self) -> int:
-        """Rows per interval."""
-        return (3 + self.jumps) * self.grid.d1.shape[1] + 2
-
-    def _slowed(self, profile: Profile, most: float = np.inf) -> Profile:
+    def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> Way:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
-        axes = self.grid.d1.shape[1]
-        model = empty_model(len(profile.p), self._rows)
-        linearise(self.grid, at_profile(profile, 2 * self._rows - 2), model, self.jumps)
-        worst = np.abs(model.values).max(axis=0)
-        jerk = worst[:-2].reshape(axes, -1)[:, 1:3].copy()
-        worst[:-2].reshape(axes, -1)[:, 1:3] = 0.0
-        slower = min(max(1.0, np.sqrt(worst.max() / START_ROOM), np.cbrt(jerk.max() / START_ROOM)), most)
-        return profile.slower(slower)
+        feed_sq, rate = x * self.feed**2, u * self.feed / self.time
+        jerk = jerk_of(self.s, feed_sq, rate)
+        slower = min(float(slower_by(self.columns, self.begin, feed_sq, rate, jerk, START_ROOM)), most)
+        return x / slower**2, u / slower**2
 
-    def _window(self, profile: Profile, lam: FloatArray, pi: FloatArray) -> Window:
-        """A profile in the problem's units, with the multipliers of its rows and dynamics."""
-        x, u, p = profile
-        vm = 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
-        h = 2.0 * self.grid.ds / (vm + np.sqrt(np.maximum(vm * vm - p * self.grid.ds / 3.0, 0.0)))
-        feed, t, lower = self.feed, self.time, self._rows - 2
-        rows = np.zeros((len(p), self.grid.d1.shape[1], 4))
-        rows[:, :, : 3 + self.jumps] = (lam[:, :lower] - lam[:, self._rows :]).reshape(
-            len(p), -1, 3 + self.jumps
-        )
-        of_feed = lam[:, lower : self._rows].copy()
-        of_feed[[0, -1], 1] = 0.0  # these limit the kinematics, not the feed
+    def _without_multipliers(self) -> Window:
+        self.blocks.rows[:] = 0.0
+        self.blocks.work[:, PI : PI + LANES] = 0.0
+        return self._window()
+
+    def _window(self) -> Window:
+        """Profile and multipliers in the problem's units."""
+        x, u = profile(self.blocks)
+        feed, t = self.feed, self.time
+        jerk, times, rows, of_feed, dynamics = _found(self.blocks)
         return Window(
             x=x * feed**2,
             u=u * feed / t,
-            jerk=p / h * feed / t**2,
-            duration=h * t,
+            jerk=jerk * feed / t**2,
+            duration=times * t,
             rows=rows * t,
             feed=of_feed * t,
-            dynamics=pi * t / feed**2,
+            dynamics=dynamics * t / feed**2,
         )
+
+
+def _mirrored(x: FloatArray, u: FloatArray) -> Way:
+    """A profile passed backward."""
+    return x[::-1].copy(), -u[::-1].copy()
 
 
 def _accepted(found: kernel.Minimum) -> bool:
@@ -237,7 +275,21 @@ def _accepted(found: kernel.Minimum) -> bool:
     )
 
 
-def _jumps(grid: Grid) -> int:
-    """1 if r'' jumps by more than rounding at an inner point."""
-    left, right = grid.d2_left[1:-1], grid.d2_right[1:-1]
-    return int((np.abs(left - right).max(axis=1) > JUMP_ROUNDING * np.abs(right).max(axis=1)).any())
+@njit(cache=True, error_model="numpy", nogil=True)
+def _found(blocks):
+    """Jerk and duration (N,) of the intervals, and the multipliers of rows (N, A, 4), feed (N, 2) and dynamics (N,), scaled."""
+    n, of_axis = blocks.n, 3 + blocks.jumps
+    count = rows_of(blocks.axes, blocks.jumps)
+    jerk, times, dynamics = np.empty(n), np.empty(n), np.empty(n)
+    rows, feed = np.zeros((n, blocks.axes, 4)), np.zeros((n, 2))
+    for i in range(n):
+        b, o = i // LANES, i % LANES
+        w, row = blocks.work[b], blocks.rows[b]
+        h = duration(np.sqrt(w[X + o]), np.sqrt(w[X_END + o]), w[P + o], blocks.grid[b, DS + o])
+        jerk[i], times[i], dynamics[i] = w[P + o] / h, h, w[PI + o]
+        for r in range(count - 2):
+            rows[i, r // of_axis, r % of_axis] = row[r * ROW + LAM_UP + o] - row[r * ROW + LAM_LOW + o]
+        feed[i, 0] = row[(count - 2) * ROW + LAM_UP + o]
+        if 0 < i < n - 1:  # these limit the kinematics, not the feed
+            feed[i, 1] = row[(count - 1) * ROW + LAM_UP + o]
+    return jerk, times, rows, feed, dynamics

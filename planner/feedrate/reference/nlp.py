@@ -51,6 +51,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.packages import import_needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
+from planner.feedrate.reference.exact_motion import polished
 from planner.feedrate.reference.piecewise import (
     INTERVALS_MIN,
     Found,
@@ -116,7 +117,8 @@ class JerkLimitedNLP:
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Time-optimal jerk-limited profile with multipliers and prices; a failure of any piece is the status of the whole."""
+        """Time-optimal jerk-limited profile with multipliers and prices; a failure of any piece is the status of the whole. From rest
+        to rest its kinematics are exact."""
         began = time.perf_counter()
         most = POINTS_MAX[self.solver] if self.points_max is None else self.points_max
         if len(problem) > most:
@@ -126,7 +128,9 @@ class JerkLimitedNLP:
             took = time.perf_counter() - began
             return FeedrateSolution.failed(problem, guess.status, guess.sentence, repr(self), took)
         found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self), progress)
-        return solution_of(problem, found, repr(self), began, priced=True)
+        solution = solution_of(problem, found, repr(self), began, priced=True)
+        at_rest = not (problem.feed_sq_start.any() or problem.feed_sq_end.any())
+        return polished(problem, solution) if solution.solved and at_rest else solution
 
 
 def _solve_piece(

@@ -34,6 +34,7 @@ class Drawing:
         self.events: list[tuple[int, int, str, float]] = []
 
     def add(self, kind: Kind, end: Point, at: int, *, feed: float = math.inf, dwell: float = 0.0) -> None:
+        """Append a block that ends at `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source [bytes]."""
         self.kind.append(kind)
         self.end.append(end)
         self.feed.append(feed)

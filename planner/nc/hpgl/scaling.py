@@ -41,6 +41,7 @@ class Scaling:
     user: tuple[float, ...] = ()  # numbers of the SC in force
 
     def place(self, x: float, y: float) -> Point:
+        """A point in user units, in plotter units."""
         return self.origin[0] + self.factor[0] * x, self.origin[1] + self.factor[1] * y
 
     def handedness(self) -> float:

@@ -21,7 +21,7 @@ def check_profile_filters(times: tuple[float, float] | None) -> None:
 
 
 def reached(motion: Filtered) -> FloatArray:
-    """(P,) how far the middle of each piece has come along the course, which is the last column of the pieces [mm]."""
+    """(P,) how far the middle of each piece has come along the guide, which is the last column of the pieces [mm]."""
     middle = (motion.ends + motion.t) / 2 - motion.t
     s, v, a, j = motion.state[:, :, -1]
     along: FloatArray = s + middle * (v + middle * (a / 2 + middle * j / 6))
@@ -31,7 +31,7 @@ def reached(motion: Filtered) -> FloatArray:
 def axes_of(
     motion: Filtered, segment: Array, first: int, toolpath: Toolpath, start: FloatArray
 ) -> AxisMotion:
-    """The axes of the filtered motion.
+    """The axes of a filtered motion of P pieces, a standstill before the first move included.
 
     segment : (P,) of the toolpath, that each piece belongs to
     first   : the segment that a standstill before the first move belongs to

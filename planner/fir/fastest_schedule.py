@@ -15,8 +15,8 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.fir.course import StraightCourse
 from planner.fir.design import plan_for
+from planner.fir.leg_guide import LegGuide
 from planner.fir.schedule import Schedule
 from planner.fir.slow_down import WORTH, settled_fastest
 from planner.lookahead.rest_to_rest import rest_to_rest_times
@@ -37,92 +37,92 @@ STOPS = (1.0, 0.0)
 WAIT_ROUNDING = 1e-9  # of that fraction
 
 
-def fastest_schedule(course: StraightCourse, machine: Machine) -> Schedule:
-    """The fastest schedule found that keeps tolerance and limits, along the course with the full stops that it has."""
-    plan = _settled(course, machine)
+def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
+    """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops than the given one."""
+    plan = _settled(guide, machine)
     for fraction in STOPS:
         plan = _stopping_at_waits(plan, machine, fraction)
     return plan
 
 
 def _stopping_at_waits(plan: Schedule, machine: Machine, fraction: float) -> Schedule:
-    """Full stops instead of waits, in the stretches that gain by it."""
-    course, gap, (T1, T2) = plan.course, plan.gap(), plan.at_joints()
+    """Full stops instead of waits, in the runs that gain by it."""
+    guide, gap, (T1, T2) = plan.guide, plan.gap(), plan.at_joints()
     waits = (gap > 0) & (gap >= fraction * (T1 + T2) * (1 - WAIT_ROUNDING))
     time = plan.time()
-    tried = np.logical_or.reduceat(waits[:-1], course.first[:-1]) & (
-        _least_time(course, waits) < time * (1 - WORTH)
+    tried = np.logical_or.reduceat(waits[:-1], guide.first[:-1]) & (
+        _least_time(guide, waits) < time * (1 - WORTH)
     )
     if not tried.any():
         return plan
-    legs = np.flatnonzero(tried[course.stretch])
-    part = course.pick(tried).stopping(np.flatnonzero(waits[legs]))
-    other = _settled(part, machine)
-    home = course.stretch[legs[part.first[:-1]]]  # the stretch that each of the part's was cut from
-    new_time = np.bincount(home, other.time(), course.stretches)
+    legs = np.flatnonzero(tried[guide.run])
+    stopping = guide.pick(tried).stopping(np.flatnonzero(waits[legs]))
+    other = _settled(stopping, machine)
+    home = guide.run[legs[stopping.first[:-1]]]  # the run that each of these was cut from
+    new_time = np.bincount(home, other.time(), guide.runs)
     better = tried & (new_time < time * (1 - WORTH))
     if not better.any():
         return plan
-    cut = course.stopping(np.flatnonzero(waits & np.append(better[course.stretch], False)))
-    home_of_cut = course.stretch[cut.first[:-1]]
-    kept = dataclasses.replace(plan, course=cut, T1=plan.T1[home_of_cut], T2=plan.T2[home_of_cut])
+    cut = guide.stopping(np.flatnonzero(waits & np.append(better[guide.run], False)))
+    home_of_cut = guide.run[cut.first[:-1]]
+    kept = dataclasses.replace(plan, guide=cut, T1=plan.T1[home_of_cut], T2=plan.T2[home_of_cut])
     return kept.put(better[home_of_cut], other.pick(better[home]))
 
 
-def _least_time(course: StraightCourse, stops: Array) -> FloatArray:
-    """A time (S,) [s] that each stretch cannot beat with full stops at the joints `stops` (R+1,): straight from stop to stop."""
-    part = course.stopping(np.flatnonzero(stops))
-    limits = (part.largest(value) for value in (part.feed, part.a_max, part.j_max))
-    times = rest_to_rest_times(part.total(part.length), *limits)
-    return np.asarray(np.bincount(course.stretch[part.first[:-1]], times, course.stretches), dtype=np.float64)
+def _least_time(guide: LegGuide, stops: Array) -> FloatArray:
+    """A time (S,) [s] that each run cannot beat with full stops at the joints `stops` (R+1,): straight from stop to stop."""
+    stopping = guide.stopping(np.flatnonzero(stops))
+    limits = (stopping.largest(value) for value in (stopping.feed, stopping.a_max, stopping.j_max))
+    times = rest_to_rest_times(stopping.total(stopping.length), *limits)
+    return np.asarray(np.bincount(guide.run[stopping.first[:-1]], times, guide.runs), dtype=np.float64)
 
 
-def _settled(course: StraightCourse, machine: Machine) -> Schedule:
-    """The fastest of the settled schedules, each stretch with the choices that are most promising for it."""
-    margins = MARGINS if course.own is None else MARGINS[:1]
-    speeds, times = _search(course, machine, margins)
+def _settled(guide: LegGuide, machine: Machine) -> Schedule:
+    """The fastest of the settled schedules, each run with the choices that are most promising for it."""
+    margins = MARGINS if guide.own is None else MARGINS[:1]
+    speeds, times = _search(guide, machine, margins)
     plans = [
-        plan_for(course, machine, speed, np.full(course.stretches, margin))
+        plan_for(guide, machine, speed, np.full(guide.runs, margin))
         for speed, margin in zip(speeds, margins, strict=True)
     ]
     return settled_fastest(plans, times, machine)
 
 
-def _search(course: StraightCourse, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """For each margin (K,) the best speed of each stretch [mm/s] and its time [s], both (K, S), by the times of schedules.
+def _search(guide: LegGuide, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """For each margin (K,) the best speed of each run [mm/s] and its time [s], both (K, S), by the times of schedules.
 
     Where nothing waits at the first margin, the others would make filters longer for nothing; and where the second, the largest, is
     slower, those between them are not tried.
     """
-    high = course.largest(course.feed)
-    low = -course.largest(-np.minimum(np.cbrt(course.j_max * course.length**2 / 4), course.feed))
+    high = guide.largest(guide.feed)
+    low = -guide.largest(-np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), guide.feed))
     step = np.log(high / low) / (SPEEDS - 1)
     tries = [np.exp(-k * step) * high for k in range(SPEEDS)]
-    speeds, times = (np.empty((len(margins), course.stretches)) for _ in range(2))
-    speeds[:], times[:] = _best_speeds(course, machine, margins[0], tries, step)
-    plan = plan_for(course, machine, speeds[0], np.full(course.stretches, margins[0]))
-    hopeful: Array = np.logical_or.reduceat((plan.gap() > 0)[:-1], course.first[:-1])
+    speeds, times = (np.empty((len(margins), guide.runs)) for _ in range(2))
+    speeds[:], times[:] = _best_speeds(guide, machine, margins[0], tries, step)
+    plan = plan_for(guide, machine, speeds[0], np.full(guide.runs, margins[0]))
+    hopeful: Array = np.logical_or.reduceat((plan.gap() > 0)[:-1], guide.first[:-1])
     for k in range(1, len(margins)):
         if k == 2:
             hopeful = hopeful & (times[1] <= times[0])
         if not hopeful.any():
             break
-        part = course.pick(hopeful)
+        picked = guide.pick(hopeful)
         tries = [np.minimum(speeds[k - 1, hopeful] * ratio, high[hopeful]) for ratio in NEARBY]
-        step = np.full(part.stretches, np.log(NEARBY[0] / NEARBY[1]))
-        speeds[k, hopeful], times[k, hopeful] = _best_speeds(part, machine, margins[k], tries, step)
+        step = np.full(picked.runs, np.log(NEARBY[0] / NEARBY[1]))
+        speeds[k, hopeful], times[k, hopeful] = _best_speeds(picked, machine, margins[k], tries, step)
     return speeds, times
 
 
 def _best_speeds(
-    course: StraightCourse, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
+    guide: LegGuide, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Best speed (S,) [mm/s] of each stretch and its time (S,) [s]: among `tries`, `step` (S,) apart in logarithm, and between them."""
-    margins, high = np.full(course.stretches, margin), course.largest(course.feed)
-    best, best_time = high, np.full(course.stretches, np.inf)
+    """Best speed (S,) [mm/s] of each run and its time (S,) [s]: among `tries`, `step` (S,) apart in logarithm, and between them."""
+    margins, high = np.full(guide.runs, margin), guide.largest(guide.feed)
+    best, best_time = high, np.full(guide.runs, np.inf)
     while tries:
         for speed in tries:
-            time = plan_for(course, machine, speed, margins).time()
+            time = plan_for(guide, machine, speed, margins).time()
             better = time < best_time
             best, best_time = np.where(better, speed, best), np.where(better, time, best_time)
         step = step / 2

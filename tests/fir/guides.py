@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks import problems
 from planner.base.arrays import FloatArray
-from planner.fir.course import StraightCourse, course_of
+from planner.fir.leg_guide import LegGuide, guide_of_legs
 from planner.fir.schedule import Schedule
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
@@ -24,15 +24,15 @@ def machine_of(axes: int = 3, **settings) -> Machine:
     return made.model_copy(update={"axes": made.axes | ({"a": a} if axes == 4 else {})})
 
 
-def course_through(points: FloatArray, machine: Machine, feed: float | FloatArray = 100.0) -> StraightCourse:
-    """The course of G1 moves through points (n+1, A), A up to 4."""
+def guide_through(points: FloatArray, machine: Machine, feed: float | FloatArray = 100.0) -> LegGuide:
+    """The guide of G1 moves through points (n+1, A), A up to 4."""
     points = np.asarray(points, float)
     program = problems.polyline(points[:, : min(3, points.shape[1])], feed=feed)
     if points.shape[1] == 4:
         program = dataclasses.replace(
             program, axes=("x", "y", "z", "a"), start=points[0], end=points[1:], arc_center=np.zeros((0, 4))
         )
-    return course_of(toolpath_from_program(program, machine), machine)
+    return guide_of_legs(toolpath_from_program(program, machine), machine)
 
 
 def corner(theta: float, length: float = 50.0, axes: int = 2) -> FloatArray:
@@ -42,17 +42,17 @@ def corner(theta: float, length: float = 50.0, axes: int = 2) -> FloatArray:
     return points
 
 
-def overlapping(course: StraightCourse, overlap: float | FloatArray, T1: float, T2: float) -> Schedule:
+def overlapping(guide: LegGuide, overlap: float | FloatArray, T1: float, T2: float) -> Schedule:
     """Every leg at its feed, every inner joint with the overlap [s]."""
-    inner = course.inner
+    inner = guide.inner
     return Schedule(
-        course=course,
-        T1=np.full(course.stretches, T1),
-        T2=np.full(course.stretches, T2),
-        speed=course.feed,
-        passing=np.full(len(course) + 1, np.inf),
+        guide=guide,
+        T1=np.full(guide.runs, T1),
+        T2=np.full(guide.runs, T2),
+        speed=guide.feed,
+        passing=np.full(len(guide) + 1, np.inf),
         overlap=np.where(inner, overlap, 0.0),
-        holding=np.zeros(len(course), bool),
+        holding=np.zeros(len(guide), bool),
     )
 
 

@@ -1,4 +1,4 @@
-"""Paper 000's polyline: a program as straight legs between joints. Arcs become chords, collinear lines of one feed are one leg."""
+"""Paper 000's guide: a program as straight legs between joints. Arcs become chords, collinear lines of one feed are one leg."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.fir.columns import per_joint, per_leg
-from planner.fir.polyline import Polyline
+from planner.fir.guide import Guide
 from planner.geometry.chords import chorded, parted_by_feed
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
@@ -18,16 +18,16 @@ from planner.machine import Machine
 
 # Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with feed^2, so that this costs
 # half of it in feed; a fifth or four times of it cost 0.1 and 0.5 % of the time of ten jobs.
-CHORD_SHARE = 0.05
+CHORD_FRACTION = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StraightCourse(Polyline):
+class LegGuide(Guide):
     """The legs of a program, with what paper 000's rules need of them.
 
     lines     : the toolpath with its arcs as chords
     joint_at  : (R+1,) index of each joint among those of `lines`
-    slower    : (R,) True where the program asks for less than on another leg of the stretch
+    slower    : (R,) True where the program asks for less than on another leg of the run
     a_max     : (R,) acceleration along the leg that the axes allow [mm/s2]
     j_max     : (R,) jerk along the leg that the axes allow [mm/s3]
     tol       : (R+1,) contour error budget at the joint [mm]
@@ -48,7 +48,7 @@ class StraightCourse(Polyline):
         return np.stack([self.tol[:-1], self.tol[1:]], axis=1)
 
     def stopping(self, joints: Array) -> Self:
-        """The same with full stops at the joints (n,) too."""
+        """The same guide with full stops, without dwells, at the joints (n,) too."""
         first = np.union1d(self.first, joints)
         dwell = np.zeros(len(first))
         dwell[np.searchsorted(first, self.first)] = self.dwell
@@ -57,9 +57,12 @@ class StraightCourse(Polyline):
         return dataclasses.replace(self, first=first, dwell=dwell, sin_half=sin_half)
 
 
-def course_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None = None) -> StraightCourse:
-    """Lay out a toolpath as a course; `own`: lengths of the two filters [s], None to choose them."""
-    lines = chorded(toolpath, CHORD_SHARE, np.zeros(len(toolpath), bool))
+def guide_of_legs(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None = None) -> LegGuide:
+    """The legs of a toolpath.
+
+    own : lengths of the two filters of every run [s]; None to choose them
+    """
+    lines = chorded(toolpath, CHORD_FRACTION, np.zeros(len(toolpath), bool))
     legs = legs_of(parted_by_feed(lines))
     at = legs.first
     point = np.vstack([lines.start[at[:-1]], lines.end[-1:]])
@@ -76,7 +79,7 @@ def course_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | N
             (machine.limits(q, lines.axes) / np.abs(direction)).min(axis=1)
             for q in ("velocity", "acceleration", "jerk")
         )
-    return StraightCourse(
+    return LegGuide(
         axes=lines.axes,
         lines=lines,
         joint_at=at,

@@ -11,7 +11,7 @@ from quick import slow_but
 
 import planner
 from planner.geometry.build import toolpath_from_program
-from planner.geometry.passing import CHORD_SHARE, SAME_PLACE, segments_at
+from planner.geometry.point_matching import CHORD_FRACTION, SAME_PLACE, SegmentsInOrder, segments_at
 from planner.geometry.toolpath import Toolpath
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
@@ -25,16 +25,21 @@ def path_of(text: str, tolerance: float = EPS) -> Toolpath:
 
 
 def distance(toolpath: Toolpath, point: np.ndarray, segment: int) -> float:
-    """Distance of a point from a segment: arcs by their own formula at many places."""
+    """Distance of a point from a segment: arcs by their own formula at many places, and at many between those beside the nearest."""
     if toolpath.arc[segment] < 0:
         start, u = toolpath.start[segment], toolpath.end[segment] - toolpath.start[segment]
         share = min(max((point - start) @ u / (u @ u), 0.0), 1.0)
         return float(np.linalg.norm(point - start - share * u))
     arcs, row = toolpath.arcs, toolpath.arc[segment]
-    x = np.linspace(0.0, toolpath.length[segment], 20_001)[:, None]
-    c, s = np.cos(arcs.rate[row] * x), np.sin(arcs.rate[row] * x)
-    on = arcs.center[row] + arcs.radius[row] * (c * arcs.e1[row] + s * arcs.e2[row]) + arcs.drift[row] * x
-    return float(np.linalg.norm(on - point, axis=1).min())
+    low, high = 0.0, toolpath.length[segment]
+    for _ in range(2):
+        x = np.linspace(low, high, 201)[:, None]
+        c, s = np.cos(arcs.rate[row] * x), np.sin(arcs.rate[row] * x)
+        on = arcs.center[row] + arcs.radius[row] * (c * arcs.e1[row] + s * arcs.e2[row]) + arcs.drift[row] * x
+        away = np.linalg.norm(on - point, axis=1)
+        nearest = int(away.argmin())
+        low, high = x[max(nearest - 1, 0), 0], x[min(nearest + 1, 200), 0]
+    return float(away.min())
 
 
 def at(text: str, points: list[tuple[float, float]], feed: float = 1.0) -> list[int] | None:
@@ -111,9 +116,37 @@ def test_laws_on_random_paths(seed: int) -> None:
     assert segment is not None
     assert (np.diff(segment) >= 0).all()
     off = [distance(toolpath, p, i) for p, i in zip(point + offset, segment, strict=True)]
-    assert max(off) <= EPS * (1.0 + CHORD_SHARE) + 2.0 * SAME_PLACE
+    assert max(off) <= EPS * (1.0 + CHORD_FRACTION) + 2.0 * SAME_PLACE
     missing = np.setdiff1d(np.arange(len(toolpath)), segment)
     assert (toolpath.length[missing] <= 0.02 + 2.0 * EPS).all()
+    np.testing.assert_array_equal(in_parts(toolpath, point + offset, rng), segment)
+
+
+def in_parts(toolpath: Toolpath, point: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
+    """The segments of points that come in parts of one to nine."""
+    found, done = SegmentsInOrder(toolpath), 0
+    while done < len(point):
+        part = point[done : done + rng.integers(1, 10)]
+        found.take(part, np.ones(len(part)))
+        done += len(part)
+    runs = found.runs()
+    if runs is None:
+        return None
+    first, segment = runs
+    assert (np.diff(segment) != 0).all()
+    return np.repeat(segment, np.diff(np.append(first, len(point))))
+
+
+def test_what_later_points_decide_is_decided_in_parts_too() -> None:
+    """Two blocks on each other: only the end tells on which of them each point is."""
+    x = np.concatenate([np.linspace(0, 1, 40), np.full(30, 0.99), np.linspace(0.99, 0, 40)])
+    point = np.stack([x, 0.01 * np.sin(7 * x), 0 * x], axis=1)
+    point[[0, -1], 1] = 0.0
+    toolpath = path_of("G1 X1\nX0")
+    found = in_parts(toolpath, point, np.random.default_rng(0))
+    assert found is not None
+    np.testing.assert_array_equal(found, segments_at(toolpath, point, np.ones(len(x))))
+    assert in_parts(toolpath, point[:30], np.random.default_rng(0)) is None
 
 
 def mixed(blocks: int) -> str:
@@ -153,7 +186,7 @@ def test_every_method_names_the_block_it_is_at(method: str) -> None:
     assert (trajectory.line == toolpath.line[segment]).all()
     assert (np.diff(segment) >= 0).all()
     off = [distance(toolpath, p, i) for p, i in zip(trajectory.position, segment, strict=True)]
-    assert max(off) <= EPS * (1.0 + CHORD_SHARE) + 2.0 * SAME_PLACE
+    assert max(off) <= EPS * (1.0 + CHORD_FRACTION) + 2.0 * SAME_PLACE
     step = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     for missing in np.setdiff1d(np.arange(len(toolpath)), segment):
         before = int(np.searchsorted(segment, missing)) - 1

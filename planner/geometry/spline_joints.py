@@ -1,8 +1,8 @@
 """Where a spline passes the joints of the blocks that it stands for.
 
-A span stands for a stretch of the programmed path (geometry/spline.py), but only the run as a whole does so within the tolerance: its
-shape slides along the path, by several tolerances where that is faster. So the curve is matched with the path in order
-(geometry/passing.py), at points whose chords leave it by `CHORD_SHARE` of the tolerance at most.
+A span stands for what is programmed between two places (geometry/spline.py), but only the run as a whole does so within the tolerance:
+its shape slides along the path, by several tolerances where that is faster. So the curve is matched with the path in order
+(geometry/point_matching.py), at points whose chords leave it by `CHORD_FRACTION` of the tolerance at most.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.geometry.legs import Legs
-from planner.geometry.passing import CHORD_SHARE, Chain, chain_of, in_order
+from planner.geometry.point_matching import CHORD_FRACTION, PathChain, chain_of, in_order
 from planner.geometry.spline import Spline, span_point
 from planner.geometry.toolpath import Toolpath
 
@@ -20,8 +20,10 @@ LOOKED_AT = 5  # places on a span at which its bend is looked at
 
 
 def passed_places(toolpath: Toolpath, legs: Legs, spline: Spline) -> FloatArray:
-    """(M+1,) where the smooth path passes the start of each segment, counted like `Legs.place` [mm]: the same beside the runs; on a
-    run the place that its spans give the curve's point there."""
+    """(M+1,) where the smooth path passes the start of each of M segments, counted like `Legs.place` [mm].
+
+    Where a run of the spline replaces the legs it is the place that the spans give the curve's point there, elsewhere `Legs.place`.
+    """
     place = legs.place.copy()
     if not len(spline):
         return place
@@ -35,7 +37,7 @@ def passed_places(toolpath: Toolpath, legs: Legs, spline: Spline) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def _chords(spans, i, tolerance, out):
-    """How many chords of span i leave it by `CHORD_SHARE` of the tolerance: a chord over a share h of it by |r''| h^2/8."""
+    """How many chords of span i leave it by `CHORD_FRACTION` of the tolerance: a chord over a fraction h of it by |r''| h^2/8."""
     most_sq = 0.0
     for n in range(LOOKED_AT):
         span_point(spans, i, n / (LOOKED_AT - 1.0), out)
@@ -43,7 +45,7 @@ def _chords(spans, i, tolerance, out):
         for k in range(out.shape[1]):
             bend_sq += out[2, k] * out[2, k]
         most_sq = max(most_sq, bend_sq)
-    return max(int(np.ceil(np.sqrt(np.sqrt(most_sq) / (8.0 * CHORD_SHARE * tolerance)))), 2)
+    return max(int(np.ceil(np.sqrt(np.sqrt(most_sq) / (8.0 * CHORD_FRACTION * tolerance)))), 2)
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,13 +70,13 @@ def _pass_runs(spans, run_first, segments, chain, place):
         point, at = np.empty((count, axes)), np.empty(count)
         n = 0
         for i in range(run_first[q], run_first[q + 1]):
-            parts = _chords(spans, i, tolerance, out)
-            for part in range(parts + (i + 1 == run_first[q + 1])):
-                tau = part / parts
+            chords = _chords(spans, i, tolerance, out)
+            for m in range(chords + (i + 1 == run_first[q + 1])):
+                tau = m / chords
                 span_point(spans, i, tau, out)
                 point[n], at[n] = out[0], spans[i].begin + tau * spans[i].width
                 n += 1
-        part_of_chain = Chain(
+        links = PathChain(
             vertex[a : b + 1],
             at_vertex[a : b + 1],
             budget[a:b],
@@ -83,7 +85,7 @@ def _pass_runs(spans, run_first, segments, chain, place):
             segment_of[a:b],
             first,
         )
-        matched, _, crossed = in_order(part_of_chain, point, np.zeros(count))
+        matched, _, crossed = in_order(links, point, np.zeros(count))
         if not matched:
             continue
         for segment in range(low[q] + 1, high[q] + 1):

@@ -1,0 +1,53 @@
+"""How many threads the planner may use. What it finds does not depend on it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+
+_given: int | None = None
+
+
+def use_threads(count: int | None) -> None:
+    """Use so many threads from now on; None for one per core that this process may run on."""
+    global _given
+    if count is not None and count < 1:
+        raise ValueError(f"{count} threads; there must be at least one")
+    _given = count
+
+
+def threads() -> int:
+    """How many threads to use."""
+    if _given is not None:
+        return _given
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def side_by_side(
+    work: Sequence[Callable[[], None]],
+    stop: Callable[[], None],
+    waiting: Callable[[], None],
+    period: float = 0.1,
+) -> None:
+    """Run all of `work` in as many threads as there may be, in this order; returns when all is done.
+
+    stop    : called after an error or an interrupt, which is then raised: makes what is still running end soon
+    waiting : called in this thread, about once a period [s]
+    """
+    with ThreadPoolExecutor(max_workers=min(threads(), len(work))) as pool:
+        running = [pool.submit(task) for task in work]
+        try:
+            pending = set(running)
+            while pending:
+                done, pending = wait(pending, timeout=period, return_when=FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
+                waiting()
+        except BaseException:
+            stop()
+            for future in running:
+                future.cancel()
+            raise

@@ -1,0 +1,121 @@
+"""Trajectories of long motions: samples that are evaluated when they are asked for.
+
+A sample takes 132 bytes with three axes, an hour at 1 ms 475 MB, a motion by its grid a quarter of a kilobyte per point. What goes
+through all samples (the verifier, the files) takes them chunk by chunk (`Trajectory.chunks`); the same chunk gives the same bytes
+each time. Whoever asks for a whole column gets all of them, kept from then on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.motion.trajectory import COLUMNS, Trajectory, joined
+
+# Samples evaluated at a time: 9 MB with three axes.
+CHUNK = 65_536
+
+
+class _AnyMotion(Protocol):
+    """What motion/timing.py calls `MotionInTime`."""
+
+    @property
+    def end(self) -> float: ...
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory: ...
+
+
+class TrajectoryOnDemand(Trajectory):
+    """A `Trajectory` with the columns of a motion at 0, dt, 2 dt, ... and at its end, evaluated when they are asked for."""
+
+    def __new__(cls, *given: Any, **fields: Any) -> Any:
+        """With the fields of a `Trajectory`, as from `dataclasses.replace`, such a one."""
+        return Trajectory(**fields) if "position" in fields else super().__new__(cls)
+
+    def __init__(self, motion: _AnyMotion, dt: float, count: int, places: _Places | None = None):
+        values = {
+            "axes": motion.at(np.zeros(1), dt).axes,
+            "dt": dt,
+            "_motion": motion,
+            "_count": count,
+            "_places": places,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        count: int = self._count
+        return count
+
+    def __repr__(self) -> str:
+        return f"TrajectoryOnDemand({len(self)} samples, axes {self.axes}, dt {self.dt} s)"
+
+    @property
+    def cycle_time(self) -> float:
+        """Duration of the motion [s]."""
+        return float(self._motion.end)
+
+    def at_places(self, first: Array, block: Array, line: Array) -> TrajectoryOnDemand:
+        """The same with other blocks and lines: sample first[n] is the first of those at block[n], line[n] (R,)."""
+        return TrajectoryOnDemand(self._motion, self.dt, len(self), _Places(first, block, line))
+
+    def heard_by(self, take: Callable[[Trajectory], object]) -> TrajectoryOnDemand:
+        """The same; whoever first goes through its chunks lets `take` have them too, so that they are evaluated once for both."""
+        heard = TrajectoryOnDemand(self._motion, self.dt, len(self), self._places)
+        object.__setattr__(heard, "_take", take)
+        return heard
+
+    def chunks(self) -> Iterator[Trajectory]:
+        """All samples in order, `CHUNK` at a time."""
+        if "_whole" in vars(self):
+            yield self._whole
+            return
+        take = vars(self).pop("_take", None)
+        for first in range(0, len(self), CHUNK):
+            chunk = self.rows(np.arange(first, min(first + CHUNK, len(self))))
+            if take is not None:
+                take(chunk)
+            yield chunk
+
+    def rows(self, k: Array) -> Trajectory:
+        """The samples with the ascending indices k (n,)."""
+        found = self._motion.at(self._times(k), self.dt)
+        return found if self._places is None else self._places.put_on(found, k)
+
+    def first_not_before(self, times: FloatArray) -> Array:
+        """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
+        k = np.clip(np.ceil(np.asarray(times) / self.dt), 0, len(self) - 1).astype(np.int64)
+        k = np.where(
+            (k > 0) & (self._times(np.maximum(k - 1, 0)) >= times), k - 1, k
+        )  # the quotient is rounded
+        found: Array = np.where(self._times(k) < times, k + 1, k)
+        return found
+
+    def _times(self, k: Array) -> FloatArray:
+        times: FloatArray = k * self.dt
+        times[k == len(self) - 1] = self._motion.end
+        return times
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in COLUMNS:
+            raise AttributeError(name)
+        if "_whole" not in vars(self):
+            object.__setattr__(self, "_whole", joined(list(self.chunks())))
+        return getattr(self._whole, name)
+
+
+class _Places:
+    """Blocks and lines of samples: those from first[n] on, up to the next one, are at block[n] and line[n] (R,)."""
+
+    def __init__(self, first: Array, block: Array, line: Array):
+        self.first, self.block, self.line = first, block, line
+
+    def put_on(self, found: Trajectory, k: Array) -> Trajectory:
+        """The samples k (n,) with their blocks and lines."""
+        run = np.searchsorted(self.first, k, side="right") - 1
+        object.__setattr__(found, "block", self.block[run])
+        object.__setattr__(found, "line", self.line[run])
+        return found

@@ -1,0 +1,111 @@
+"""When a motion passes the vertices of the programmed path, in their order, by the length that it has run.
+
+From one vertex to the next the motion runs the length L of the block between them, give or take what it may cut or round: every
+point of it is within eps of the path, and a corner within eps of its vertex saves no more than 2 eps of the length on either side. So
+vertex i+1 is looked for where the length run since vertex i is within `SLACK` eps of L, never before vertex i, at the nearest point of
+the chords there. Order and length decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told
+apart. (Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
+from planner.base.search import nearest
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.motion.trajectory import Trajectory
+
+# By how much the length run between two vertices may differ from the block's [tolerances]: 2 on either side, and as much again
+# for where the vertex before was found.
+SLACK = 8.0
+# A motion rests where it is slower than this fraction of its fastest [-]: rounding.
+STANDING = 1e-9
+
+
+def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
+    """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
+
+    motion : sampled so often that between samples it runs straight to within the tolerance
+    """
+    return passing_times_of([motion], toolpath)
+
+
+def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
+    """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one before."""
+    vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
+    times = np.empty(len(vertex))
+    slack = SLACK * np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
+    seen: tuple[FloatArray, ...] | None = None  # position, s and t from the chord on that was reached
+    done, share = 1, 0.0
+    for chunk in chunks:
+        new = chunk.position, chunk.s, chunk.t
+        if seen is None:
+            seen, times[0] = new, chunk.t[0]
+        else:
+            fresh = int(np.searchsorted(chunk.t, seen[2][-1], side="right"))
+            seen = tuple(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True))
+        done, k, share = _pass(*seen, vertex, toolpath.length, slack, times, done, share, False)
+        seen = tuple(column[k:].copy() for column in seen)
+    assert seen is not None
+    _pass(*seen, vertex, toolpath.length, slack, times, done, share, True)
+    return times
+
+
+def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """When the motion comes to rest at the G full stops of a path (G,) [s], and when it leaves them (G,) [s].
+
+    motion : sampled at the ends of its pieces too
+    times  : (M+1,) when it passes the joints, from `passing_times`
+    """
+    still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
+    group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1
+    begin, end = (
+        still[np.searchsorted(group, group, side="left")],
+        still[np.searchsorted(group, group, side="right") - 1],
+    )
+    at = nearest(motion.t[still], times[toolpath.joint == Joint.STOP])
+    return motion.t[begin[at]], motion.t[end[at]]
+
+
+@njit(cache=True, error_model="numpy")
+def _pass(position, s, t, vertex, length, slack, times, i, share, last_part):
+    """Write when the polyline position (T, A) with way s and times t (T,) is nearest to each vertex (N+1, A) from vertex i on, as
+    far as it goes; of the last part to the end. The place reached is at the `share` of the first chord.
+
+    Returns the next vertex, and the place reached: chord and share of it.
+    """
+    last = len(t) - 2
+    k = 0
+    while i < len(vertex) and last >= 0:
+        here = s[k] + share * (s[k + 1] - s[k])
+        begin, end = here + length[i - 1] - slack[i - 1], here + length[i - 1] + slack[i - 1]
+        if s[last + 1] <= end and not last_part:
+            break
+        while k < last and s[k + 1] < begin:
+            k, share = k + 1, 0.0
+        nearest, best, best_share = np.inf, k, share
+        n = k
+        while n <= last and (n == k or s[n] <= end):
+            along, size = 0.0, 0.0
+            for axis in range(position.shape[1]):
+                step = position[n + 1, axis] - position[n, axis]
+                along += (vertex[i, axis] - position[n, axis]) * step
+                size += step * step
+            q = min(max(along / size, 0.0), 1.0) if size > 0.0 else 0.0
+            if n == k:
+                q = max(q, share)
+            apart = 0.0
+            for axis in range(position.shape[1]):
+                there = position[n, axis] + q * (position[n + 1, axis] - position[n, axis])
+                apart += (vertex[i, axis] - there) ** 2
+            if apart < nearest:
+                nearest, best, best_share = apart, n, q
+            n += 1
+        k, share = best, best_share
+        times[i] = t[k] + share * (t[k + 1] - t[k])
+        i += 1
+    return i, k, share

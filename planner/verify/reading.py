@@ -1,0 +1,86 @@
+"""One reading of a motion: its delivered samples and, in step with them, what lies between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from planner.motion.trajectory import Trajectory
+from planner.verify.dense import Comparison
+from planner.verify.findings import Look
+from planner.verify.given import Given
+from planner.verify.pieces import PERIOD_ROUNDING, ProgramPieces
+from planner.verify.samples import Delivered
+from planner.verify.stream import Limits, Watch
+from planner.verify.times import AnyMotion, look
+
+
+class Reader:
+    """Reads a trajectory, and the motion it was taken from, from start to end, as often as it is asked to.
+
+    trajectory : the delivered samples, which are looked at chunk by chunk
+    motion     : what they were taken from; None to read the samples alone
+    dt, cells  : the machine's period [s], and into how many cells it is divided (times.py)
+    delivered  : what is kept of the samples of the last reading
+    comparison : of samples and motion; None without a motion
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        motion: AnyMotion | None,
+        limits: Limits,
+        given: Given,
+        *,
+        dt: float,
+        cells: int,
+        seed: int,
+    ):
+        self.trajectory, self.motion, self.limits, self.given = trajectory, motion, limits, given
+        self._times = dt, seed, cells
+        self.delivered = Delivered(trajectory.dt, given)
+        self.comparison = None if motion is None else Comparison(trajectory.axes, motion.end)
+
+    def read(
+        self, pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None
+    ) -> list[Look]:
+        """What both show beside a path; `progress` is called with the fraction done."""
+        self.delivered = Delivered(self.trajectory.dt, self.given)
+        seen = Watch(pieces, self.limits, middles=True)
+        samples = self.trajectory.chunks()
+        between = None if self.motion is None else self._between(pieces, seen, samples, progress)
+        for chunk in samples:
+            self._take(seen, chunk)
+            progress(seen.seen.samples / len(self.trajectory))
+        looks = [Look(seen.seen, "")]
+        if between is not None and between.seen.samples:
+            looks.append(Look(between.seen, "between the samples"))
+        return looks
+
+    def _between(
+        self,
+        pieces: ProgramPieces,
+        seen: Watch,
+        samples: Iterator[Trajectory],
+        progress: Callable[[float], None],
+    ) -> Watch:
+        """Read the motion, and the samples as far as it goes."""
+        assert self.motion is not None
+        assert self.comparison is not None
+        between = Watch(pieces, self.limits, middles=False)
+        self.comparison.begin()
+        for part in look(self.motion, *self._times):
+            while seen.seen.t_last < part.t[-1]:
+                chunk = next(samples, None)
+                if chunk is None:
+                    break
+                self._take(seen, chunk)
+            self.comparison.compare(part)
+            between.take(part)
+            progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+        return between
+
+    def _take(self, seen: Watch, chunk: Trajectory) -> None:
+        seen.take(chunk)
+        self.delivered.take(chunk)
+        if self.comparison is not None:
+            self.comparison.deliver(chunk)

@@ -20,7 +20,9 @@ from planner.smoothing.knots import graded, spacing, spread
 from planner.smoothing.sites import Sites, sites_of_run, used_share
 from planner.smoothing.splines import Splines
 
-ROOM = 0.85  # of the tolerance that a first spline should use [-]
+# Of the tolerance that a first spline should use [-]. With 0.7 six random jobs end 8e-4 faster to 6e-3 slower after three rounds of
+# reshaping; with 0.95 the same.
+ROOM = 0.85
 DENSER = 0.75  # factor on the distance of knots where it uses more [-]
 DENSER_MAX = 16  # so many times at most: knots are 100 times as dense then
 INSIDE = 0.99  # of the tolerance that it may use in the end [-]: the relaxation starts strictly inside of its own corridor, relax.USED

@@ -43,7 +43,7 @@ def known_numba() -> bool:
 
 def root(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
     """The kernel of a function, with these settings of `numba.njit`."""
-    if not known_numba() or config.DISABLE_JIT:
+    if not known_numba() or getattr(config, "DISABLE_JIT", False):
         return numba.njit(**settings)(function)
     made = numba.njit(pipeline_class=_RootCompiler, **{"no_cfunc_wrapper": True, **settings})(function)
     made._compiler = _Compiler(made._compiler)

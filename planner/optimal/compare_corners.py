@@ -18,7 +18,7 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
 from planner.machine import Machine
-from planner.optimal.effort import COARSE
+from planner.optimal.effort import Grids
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, second_order
 from planner.path.samples import RESOLUTION, sample_path
@@ -60,15 +60,15 @@ def with_corners(
     corners: CornerBounds,
     job: Job,
     order: Order,
-    resolution: float,
+    grids: Grids,
 ) -> tuple[OnPath, Array]:
     """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which that was too much to find
     out.
 
     rounded : the path with the corners that the splines of `best` replace
-    coarse  : the motion on the splines of `best` on the coarse grid of optimal/effort.py, on which most corners are ruled out
+    coarse  : the motion on the same splines on the grid of the rounds, on which most corners are ruled out
     corners : bounds on the motion on them
-    resolution : of the grid of `best`, and of the motions that compete with it at last
+    grids   : of the rounds, and the final one, of `best`
     """
     none = np.zeros(0, dtype=np.int64)
     shape = best.shape
@@ -76,7 +76,7 @@ def with_corners(
     if not best.solution.solved:
         if corners.points.sum() > COMPARED_POINTS:
             return best, none
-        planned = order.solve(rounded, job, resolution)
+        planned = order.solve(rounded, job, grids.final)
         return dataclasses.replace(planned, shape=shape) if planned.solution.solved else best, none
     piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
     chosen = np.zeros(len(corners.time), dtype=bool)
@@ -88,12 +88,13 @@ def with_corners(
     chosen[left] = False
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
     # on the final grid the second time on those that turned out to be faster
-    for grid, splines, share in ((COARSE, coarse, CLOSE), (resolution, best, 1.0), (resolution, best, 1.0)):
+    tries = (grids.rounds, coarse, CLOSE), (grids.final, best, 1.0), (grids.final, best, 1.0)
+    for resolution, splines, fraction in tries:
         fits = shape.laid.fits & ~chosen[piece]
         if (fits == shape.laid.fits).all():
             break
         mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
-        planned = order.solve(with_spline(rounded, mixed), job, grid, [splines])
+        planned = order.solve(with_spline(rounded, mixed), job, resolution, [splines])
         if not planned.solution.solved:
             break
         job.tell(
@@ -103,8 +104,8 @@ def with_corners(
             kept=planned.faster_than(splines),
             runs=int(chosen.sum()),
         )
-        slower = chosen & (planned.stop_to_stop() >= share * splines.stop_to_stop())
-        if grid == resolution and not slower.any():
+        slower = chosen & (planned.stop_to_stop() >= fraction * splines.stop_to_stop())
+        if resolution == grids.final and not slower.any():
             faster = planned.faster_than(best)
             return dataclasses.replace(planned, shape=mixed) if faster else best, left
         chosen &= ~slower

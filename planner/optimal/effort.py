@@ -8,41 +8,55 @@ square of its intervals, and so do its points with the root of its resolution: 1
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from planner.base.names import BEST, NORMAL, QUICK
 
-# Interpolation error of the axis accelerations on the grid of the rounds [share of the limit] (path/samples.py). A quarter of it gives
-# the same shapes to 1e-4 of the time, and takes twice as long; four times it loses 1e-2 on the bracket.
+# Interpolation error of the axis accelerations on the coarsest grid [share of the limit] (path/samples.py). Rounds of reshaping on a
+# quarter of it end 2e-3 faster on the bracket and take twice as long.
 COARSE = 3.2e-2
+
+
+class Grids(NamedTuple):
+    """Resolutions for a job that has `points` points at most on a grid of the resolution `COARSE`."""
+
+    points: float
+    rounds: float  # of the grid on which splines are reshaped
+    final: float  # of the grid of the plan
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
     """What a plan is worth.
 
-    work        : grid points, counted over all rounds of reshaping
-    rounds      : of reshaping at most
-    resolutions : pairs of points on the coarse grid and the resolution of the final one for jobs of so many points at most, ascending
+    work   : grid points, counted over all rounds of reshaping
+    rounds : of reshaping at most
+    sizes  : grids by the size of the job, ascending
     """
 
     work: int
     rounds: int
-    resolutions: tuple[tuple[float, float], ...]
+    sizes: tuple[Grids, ...]
 
-    def resolution(self, points: int) -> float:
-        """The resolution of the final grid for a job that has so many points on the coarse one."""
-        return next(resolution for most, resolution in self.resolutions if points <= most)
+    def grids(self, points: int) -> Grids:
+        """The grids for a job that has so many points on a grid of the resolution `COARSE`."""
+        return next(size for size in self.sizes if points <= size.points)
 
 
 # Rounds: the first five gain 2e-2 of the time, the next five 2e-3, then ten 1e-3, and the last twenty 4e-4 (means over random jobs,
 # benchmarks/ablation.py). Final grids: 8e-3 is within 1e-3 of the time on an infinitely fine grid, 2e-3 within 4e-4, 5e-4 within 1e-4
-# (zig-zag, relief, bracket); the memory sets the limit.
+# (zig-zag, relief, bracket); the memory sets the limit. Rounds on the coarse grid leave small jobs 1e-3 slower.
+_LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
-    QUICK: Effort(work=25_000, rounds=5, resolutions=((float("inf"), 8e-3),)),
+    QUICK: Effort(work=25_000, rounds=5, sizes=(_LARGE,)),
     NORMAL: Effort(
-        work=150_000, rounds=40, resolutions=((4_000, 5e-4), (40_000, 2e-3), (float("inf"), 8e-3))
+        work=150_000,
+        rounds=40,
+        sizes=(Grids(1_500, 2e-3, 2e-4), Grids(4_000, 8e-3, 5e-4), Grids(40_000, COARSE, 2e-3), _LARGE),
     ),
     BEST: Effort(
-        work=5_000_000, rounds=100, resolutions=((40_000, 5e-4), (400_000, 2e-3), (float("inf"), 8e-3))
+        work=5_000_000,
+        rounds=100,
+        sizes=(Grids(4_000, 2e-3, 2e-4), Grids(40_000, 8e-3, 5e-4), Grids(400_000, COARSE, 2e-3), _LARGE),
     ),
 }

@@ -53,7 +53,7 @@ from planner.motion.timing import Motion
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
-from planner.optimal.effort import COARSE, EFFORTS, Effort
+from planner.optimal.effort import COARSE, EFFORTS, Effort, Grids
 from planner.optimal.geometry import corner_shape, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
@@ -149,18 +149,18 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         shape = corner_shape(settings.corner, machine, job.toolpath, settings.bezier)
         given = round_corners(job.toolpath, machine, shape, blend_tangents=order.jerk_limited)
     if settings.corner not in (AUTO, SPLINE):
-        return order.solve(given, job, final_resolution(given, job, settings))
+        return order.solve(given, job, grids_for(given, job, settings).final)
     with job.stage("geometry"):
         rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
     if not splines.laid.fits.any():
-        cornered = order.solve(given, job, final_resolution(given, job, settings))
+        cornered = order.solve(given, job, grids_for(given, job, settings).final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
     # Solve and reshape in turns, on a coarse grid; then once on the final one.
-    coarse = best = reshaped(rounded, splines, job, settings)
-    resolution = settings.effort.resolution(len(best.samples))
+    grids = grids_for(with_spline(rounded, splines), job, settings)
+    coarse = best = reshaped(rounded, splines, job, settings, grids.rounds)
     if best.solution.solved:
-        best = dataclasses.replace(order.solve(coarse.path, job, resolution), shape=coarse.shape)
+        best = dataclasses.replace(order.solve(coarse.path, job, grids.final), shape=coarse.shape)
         _tell_of(job, "final grid", best, coarse)
     notes: tuple[str, ...] = ()
 
@@ -169,11 +169,11 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         with job.stage("solve"):
             bounds = corner_bounds(rounded, machine)
             of_given = bounds if rounded is given else corner_bounds(given, machine)
-        best, left = with_corners(rounded, best, coarse, bounds, job, order, resolution)
+        best, left = with_corners(rounded, best, coarse, bounds, job, order, grids)
         notes = not_compared_note(rounded, left, bounds.points)
         small = of_given.points.sum() <= COMPARED_POINTS
         if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
-            without = order.solve(given, job, resolution, [best])
+            without = order.solve(given, job, grids.final, [best])
             _tell_of(job, "no added stops", without, best)
             if without.faster_than(best):
                 return without
@@ -181,14 +181,17 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     return dataclasses.replace(best, notes=notes)
 
 
-def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> OnPath:
+def reshaped(
+    rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settings, resolution: float
+) -> OnPath:
     """The motion on splines after the best of some rounds of reshaping (reshape.py).
 
-    rounded : the path with the corners that the splines replace
+    rounded    : the path with the corners that the splines replace
+    resolution : of the grid
     """
 
     def solve(shape: SplineShape, *known: OnPath) -> OnPath:
-        planned = settings.order.solve(with_spline(rounded, shape), job, COARSE, known)
+        planned = settings.order.solve(with_spline(rounded, shape), job, resolution, known)
         return dataclasses.replace(planned, shape=shape)
 
     best = solve(shape)
@@ -227,11 +230,11 @@ def reshaped(rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settin
     return best
 
 
-def final_resolution(path: SmoothPath, job: Job, settings: Settings) -> float:
-    """The resolution of the final grid for a path without splines."""
+def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
+    """The grids that a path of this size is worth."""
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
-    return settings.effort.resolution(len(coarse))
+    return settings.effort.grids(len(coarse))
 
 
 def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> None:

@@ -17,7 +17,7 @@ MACHINE = load_machine("mill")
 def test_every_name_has_an_effort_and_more_points_a_coarser_grid():
     assert tuple(EFFORTS) == NAMES
     for effort in EFFORTS.values():
-        grids = [effort.resolution(points) for points in (1, 10**4, 10**5, 10**6, 10**8)]
+        grids = [effort.grids(points).final for points in (1, 10**4, 10**5, 10**6, 10**8)]
         assert grids == sorted(grids)
 
 

@@ -20,6 +20,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.job.trace import tell_nobody
 from planner.methods.optimal import OptimalMethod
 from planner.optimal.compare_corners import COMPARED_POINTS, CornerBounds, corner_bounds, with_corners
+from planner.optimal.effort import COARSE, Grids
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import second_order
 from planner.optimal.reshape import price_bands
@@ -36,6 +37,9 @@ def planned_on(path, grid=None, shape=None):
     samples = grid or refine_for_jerk(sample_path(path, MACHINE, third_order=True), MACHINE)
     problem = feedrate_problem(samples, MACHINE)
     return OnPath(path=path, samples=samples, problem=problem, solution=SOLVER.solve(problem), shape=shape)
+
+
+GRIDS = Grids(np.inf, COARSE, RESOLUTION)
 
 
 class Recorded:
@@ -132,7 +136,7 @@ def test_corners_that_win_are_planned_once_on_each_grid_however_many_straight_pi
     pieces = len(splines.samples.piece) - 1
     assert pieces == 2
     corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
-    best, left = with_corners(rounded, slow, slow, corners, QUIET, order, RESOLUTION)
+    best, left = with_corners(rounded, slow, slow, corners, QUIET, order, GRIDS)
     assert not len(left)
     assert len(order.paths) == 2
     assert not best.shape.laid.fits.any()
@@ -145,7 +149,7 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     splines = planned_on(with_spline(rounded, shape), shape=shape)
     corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
     order = Recorded()
-    best, left = with_corners(rounded, splines, splines, corners, QUIET, order, RESOLUTION)
+    best, left = with_corners(rounded, splines, splines, corners, QUIET, order, GRIDS)
     assert not order.paths
     assert list(left) == [0]
     assert best is splines

@@ -68,7 +68,7 @@ def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
     }
 
 
-def put(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
+def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
     """All columns of a record, by name, with some rows taken from another; the joint at the end of a run belongs to the next one.
 
     rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)

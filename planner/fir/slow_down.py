@@ -17,7 +17,7 @@ from typing import Self, TypeVar
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.fir.columns import chosen_rows, freeze_columns, per_run, picked, put
+from planner.fir.columns import chosen_rows, freeze_columns, per_run, picked, put_back
 from planner.fir.command import Command
 from planner.fir.guide import Guide
 from planner.fir.measure import Measured, measure
@@ -74,7 +74,7 @@ class SpeedPlan(ABC):
 
     def put(self, chosen: Array, plan: Self) -> Self:
         """This plan with `plan`, of these runs alone, for the runs `chosen` (S,)."""
-        return dataclasses.replace(self, **put(self, chosen_rows(self.guide.first, chosen), plan))
+        return dataclasses.replace(self, **put_back(self, chosen_rows(self.guide.first, chosen), plan))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

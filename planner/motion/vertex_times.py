@@ -10,6 +10,7 @@ apart. (Which block each point of a motion is at, by distances and budgets, is i
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,22 @@ SLACK = 8.0
 STANDING = 1e-9
 
 
+class _Seen(NamedTuple):
+    """Samples of a motion from the chord on that was reached."""
+
+    position: FloatArray  # (T, A) [mm]
+    s: FloatArray  # (T,) the way run [mm]
+    t: FloatArray  # (T,) [s]
+
+
+class _Wanted(NamedTuple):
+    """The joints of a path."""
+
+    vertex: FloatArray  # (M+1, A) [mm]
+    length: FloatArray  # (M,) of the segment after each [mm]
+    slack: FloatArray  # (M,) by how much the way run may differ from it [mm]
+
+
 def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
 
@@ -39,19 +56,19 @@ def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatA
     vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
     times = np.empty(len(vertex))
     slack = SLACK * np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
-    seen: tuple[FloatArray, ...] | None = None  # position, s and t from the chord on that was reached
+    wanted, seen = _Wanted(vertex, toolpath.length, slack), None
     done, share = 1, 0.0
     for chunk in chunks:
-        new = chunk.position, chunk.s, chunk.t
+        new = _Seen(chunk.position, chunk.s, chunk.t)
         if seen is None:
             seen, times[0] = new, chunk.t[0]
         else:
-            fresh = int(np.searchsorted(chunk.t, seen[2][-1], side="right"))
-            seen = tuple(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True))
-        done, k, share = _pass(*seen, vertex, toolpath.length, slack, times, done, share, False)
-        seen = tuple(column[k:].copy() for column in seen)
+            fresh = int(np.searchsorted(chunk.t, seen.t[-1], side="right"))
+            seen = _Seen(*(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True)))
+        done, k, share = _pass(seen, wanted, times, done, share, False)
+        seen = _Seen(*(column[k:].copy() for column in seen))
     assert seen is not None
-    _pass(*seen, vertex, toolpath.length, slack, times, done, share, True)
+    _pass(seen, wanted, times, done, share, True)
     return times
 
 
@@ -72,12 +89,14 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
 
 
 @njit(cache=True, error_model="numpy")
-def _pass(position, s, t, vertex, length, slack, times, i, share, last_part):
-    """Write when the polyline position (T, A) with way s and times t (T,) is nearest to each vertex (N+1, A) from vertex i on, as
-    far as it goes; of the last part to the end. The place reached is at the `share` of the first chord.
+def _pass(seen, wanted, times, i, share, last_part):
+    """Write into times (M+1,) when the polyline `seen` is nearest to each vertex from vertex i on, as far as it goes; of the last part
+    to the end. The place reached is at the `share` of the first chord.
 
     Returns the next vertex, and the place reached: chord and share of it.
     """
+    position, s, t = seen
+    vertex, length, slack = wanted
     last = len(t) - 2
     k = 0
     while i < len(vertex) and last >= 0:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.feedrate.jerk.layout import Columns, Room
+from planner.feedrate.jerk.layout import ProblemColumns, Room
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.window import ScaledWindow, Window
 
@@ -53,7 +53,7 @@ class Chain:
     def __init__(
         self,
         solver: JerkLimited,
-        columns: Columns,
+        columns: ProblemColumns,
         profile: Profile,
         first: int,
         last: int,

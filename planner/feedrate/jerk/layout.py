@@ -80,7 +80,7 @@ def rows_of(axes, jumps):
     return (3 + jumps) * axes + 2
 
 
-class Columns(NamedTuple):
+class ProblemColumns(NamedTuple):
     """A problem of P points and A axes, in its own units."""
 
     unit: float  # of accelerations
@@ -115,7 +115,7 @@ class Room:
     def __init__(self) -> None:
         self._kept: dict[str, FloatArray] = {}
 
-    def blocks(self, columns: Columns, begin: int, end: int, feed: float, time: float) -> Blocks:
+    def blocks(self, columns: ProblemColumns, begin: int, end: int, feed: float, time: float) -> Blocks:
         """`Blocks` with the grid of the points begin..end, in units of speed and time; whatever was there before is overwritten."""
         n, axes, jumps = end - begin, columns.d1.shape[1], _jumps(columns, begin, end)
         blocks = Blocks(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain
-from planner.feedrate.jerk.layout import Columns, Room
+from planner.feedrate.jerk.layout import ProblemColumns, Room
 from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.window import ScaledWindow, Way
@@ -34,7 +34,7 @@ class Piece:
     def __init__(
         self,
         solver: JerkLimited,
-        columns: Columns,
+        columns: ProblemColumns,
         profile: Profile,
         first: int,
         last: int,

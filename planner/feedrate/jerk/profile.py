@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.feedrate.jerk.layout import Columns
+from planner.feedrate.jerk.layout import ProblemColumns
 from planner.feedrate.jerk.window import Window
 
 
@@ -52,14 +52,14 @@ class Profile:
         self.feed[intervals, 0] = found.feed[count:0:-1, 0]  # of the point where the interval starts
 
 
-def backward(columns: Columns, first: int, last: int) -> Columns:
+def backward(columns: ProblemColumns, first: int, last: int) -> ProblemColumns:
     """The points first..last as they are passed backward."""
     own = slice(first, last + 1)
 
     def turned(values: FloatArray, sign: float = 1.0) -> FloatArray:
         return np.ascontiguousarray(sign * values[own][::-1])
 
-    return Columns(
+    return ProblemColumns(
         unit=columns.unit,
         s=columns.s[last] - turned(columns.s),
         x_max=turned(columns.x_max),

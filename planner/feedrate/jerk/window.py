@@ -25,8 +25,8 @@ from planner.feedrate.jerk.layout import (
     ROW,
     X_END,
     Blocks,
-    Columns,
     P,
+    ProblemColumns,
     Room,
     X,
     profile,
@@ -57,9 +57,9 @@ DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [
 Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
 
 
-def columns_of(problem: FeedrateProblem) -> Columns:
+def columns_of(problem: FeedrateProblem) -> ProblemColumns:
     """What the kernel needs to know of a problem."""
-    return Columns(
+    return ProblemColumns(
         unit=float(problem.acceleration[: problem.machine_axes].max()),
         s=problem.s,
         x_max=problem.feed_sq_limit,
@@ -113,7 +113,7 @@ class ScaledWindow:
     time   : unit of time [s]
     """
 
-    columns: Columns
+    columns: ProblemColumns
     begin: int
     blocks: Blocks
     s: FloatArray
@@ -126,7 +126,7 @@ class ScaledWindow:
     @classmethod
     def of(
         cls,
-        columns: Columns,
+        columns: ProblemColumns,
         begin: int,
         end: int,
         room: Room,

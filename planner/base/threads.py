@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
 _given: int | None = None
 
@@ -19,8 +18,11 @@ def use_threads(count: int | None) -> None:
 
 def threads() -> int:
     """How many threads to use."""
-    if _given is not None:
-        return _given
+    return cores() if _given is None else _given
+
+
+def cores() -> int:
+    """How many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -37,6 +39,12 @@ def side_by_side(
     stop    : called after an error or an interrupt, which is then raised: makes what is still running end soon
     waiting : called in this thread, about once a period [s]
     """
+    from concurrent.futures import (  # not loaded by commands that solve nothing
+        FIRST_EXCEPTION,
+        ThreadPoolExecutor,
+        wait,
+    )
+
     with ThreadPoolExecutor(max_workers=min(threads(), len(work))) as pool:
         running = [pool.submit(task) for task in work]
         try:

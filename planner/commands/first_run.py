@@ -18,6 +18,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from planner.base.names import OPTIMAL, SECOND_ORDER, SINGLE_CORNERS
+from planner.base.threads import cores
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -61,13 +62,6 @@ class Helper:
         if self._process is not None:
             self._process.terminate()
             self._process.communicate()
-
-
-def cores() -> int:
-    """How many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def compile_beside(machine: str, method: str) -> list[Plan]:

@@ -31,6 +31,19 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 
+# What a problem says of each of its points, beside where it is and limits of one's own.
+ROWS = (
+    "d1",
+    "d2_left",
+    "d2_right",
+    "d3_left",
+    "d3_right",
+    "feed_sq_max",
+    "feed_sq_bound",
+    "margin",
+    "limit_scale",
+)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FeedrateProblem:
@@ -148,16 +161,13 @@ class FeedrateProblem:
         """The problem of some of the pieces (n,) alone, ascending."""
         size = np.diff(self.piece)[pieces]
         at = np.concatenate([np.arange(self.piece[g], self.piece[g + 1]) for g in pieces])
-        per_point = (
-            "s", "d1", "d2_left", "d2_right", "d3_left", "d3_right", "feed_sq_max", "feed_sq_bound", "margin", "limit_scale"
-        )  # fmt: skip
         return replace(
             self,
             piece=np.concatenate([[0], np.cumsum(size)]),
             feed_sq_start=self.feed_sq_start[pieces],
             feed_sq_end=self.feed_sq_end[pieces],
             own_here=None if self.own_here is None else self.own_here[:, at],
-            **{name: getattr(self, name)[at] for name in per_point},
+            **{name: getattr(self, name)[at] for name in ("s", *ROWS)},
         )
 
     @property

@@ -13,22 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.constraints.problem import ROWS, FeedrateProblem
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 ROUNDING = 1e-9  # of the length of an interval [-]: metres into a job it is known no better
-ROWS = (
-    "d1",
-    "d2_left",
-    "d2_right",
-    "d3_left",
-    "d3_right",
-    "feed_sq_max",
-    "feed_sq_bound",
-    "margin",
-    "limit_scale",
-)
 
 
 class Known(NamedTuple):

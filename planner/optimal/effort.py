@@ -1,7 +1,7 @@
 """How much work a plan is worth: grids and rounds of reshaping for `--effort quick`, `normal` and `best`.
 
-Splines are reshaped on a coarse grid, on which motions are within some 1e-3 of what they are on a fine one, and are compared with each
-other much better than that. The last shape is solved again on the final grid, that of the plan. The error of a grid goes with the
+Splines are reshaped on a coarse grid, on which motions take up to 1e-2 longer than on a fine one; which of two shapes is faster it
+tells better than that. The last shape is solved again on the final grid, that of the plan. The error of a grid goes with the
 square of its intervals, and so do its points with the root of its resolution: 16 times finer are about 4 times as many points.
 """
 
@@ -13,7 +13,7 @@ from typing import NamedTuple
 from planner.base.names import BEST, NORMAL, QUICK
 
 # Interpolation error of the axis accelerations on the coarsest grid [share of the limit] (path/samples.py). Rounds of reshaping on a
-# quarter of it end 2e-3 faster on the bracket and take twice as long.
+# quarter of it end 2e-3 faster on the bracket and take 1.6 times as long.
 COARSE = 3.2e-2
 
 
@@ -44,8 +44,9 @@ class Effort:
 
 
 # Rounds: the first five gain 2e-2 of the time, the next five 2e-3, then ten 1e-3, and the last twenty 4e-4 (means over random jobs,
-# benchmarks/ablation.py). Final grids: 8e-3 is within 1e-3 of the time on an infinitely fine grid, 2e-3 within 4e-4, 5e-4 within 1e-4
-# (zig-zag, relief, bracket); the memory sets the limit. Rounds on the coarse grid leave small jobs 1e-3 slower.
+# benchmarks/ablation.py). Final grids: motions on 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than
+# on 2e-4 (zig-zag on mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the
+# coarse grid leave small jobs 1e-3 slower.
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
     QUICK: Effort(work=25_000, rounds=5, sizes=(_LARGE,)),

@@ -23,6 +23,7 @@ from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
 from planner.nc.program import Kind, PathControl, Program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
@@ -39,8 +40,8 @@ _WHY_NO_MOTION = {
 class Interpreter:
     """Runs the words of one program. After `run`: `program()`, `faults()`, `notes`."""
 
-    def __init__(self, words: Words, machine: Machine | None, source: str):
-        self.words, self.source = words, source
+    def __init__(self, words: Words, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
+        self.words, self.source, self.reading = words, source, reading
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
         self.store = Store(len(words.line), len(words.letter))
@@ -49,7 +50,7 @@ class Interpreter:
 
     def program(self) -> Program:
         """The program that was read; call it after `run`, and if there are no faults."""
-        return self.store.finish(self.source, self.notes)
+        return self.store.finish(self.source, self.notes, self.reading)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.nc.reading import AS_USUAL, Reading
 
 
 class Kind(IntEnum):
@@ -62,6 +63,7 @@ class Program:
     arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
     events       : words without influence on the motion
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
+    reading      : the settings it was read with
     """
 
     source: str
@@ -80,6 +82,7 @@ class Program:
     arc_sweep: FloatArray
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
+    reading: Reading = AS_USUAL
 
     def __post_init__(self) -> None:
         axes = len(self.axes)

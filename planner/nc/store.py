@@ -12,6 +12,7 @@ from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
 from planner.nc.program import Kind, Program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
 
@@ -111,7 +112,7 @@ class Store:
         event.value[k] = value
         self.events += 1
 
-    def finish(self, source: str, notes: Sequence[str]) -> Program:
+    def finish(self, source: str, notes: Sequence[str], reading: Reading = AS_USUAL) -> Program:
         """The program read so far; the arrays are cut to size, so that the spare room is given back."""
         used, seen = slice(0, self.blocks), slice(0, self.events)
         dwell = np.zeros(self.blocks)
@@ -139,6 +140,7 @@ class Store:
                 value=self.event.value[seen].copy(),
             ),
             notes=tuple(notes),
+            reading=reading,
         )
 
 

@@ -12,6 +12,8 @@ next line, so that `info` can show them all; `reader` refuses a program that has
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
@@ -22,7 +24,7 @@ from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
-from planner.nc.program import Kind, PathControl, Program
+from planner.nc.program import Frame, Kind, PathControl, Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
@@ -38,19 +40,31 @@ _WHY_NO_MOTION = {
 
 
 class Interpreter:
-    """Runs the words of one program. After `run`: `program()`, `faults()`, `notes`."""
+    """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`, `faults()`, `notes`.
 
-    def __init__(self, words: Words, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
-        self.words, self.source, self.reading = words, source, reading
+    Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
+
+    ended : M2, M30 or a second % was executed; later chunks are not
+    """
+
+    def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
+        self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
-        self.store = Store(len(words.line), len(words.letter))
+        self.store = Store()
+        self.ended = False
+        self._begun = False
+        self._read = 0  # rows of the last chunk
+        self._units_at: int | None = None  # number of blocks before the first G20 or G21
         self._reports: list[tuple[int, str]] = []
+        self._found: list[tuple[Words, int, str]] = []
+        self._said: set[tuple[int, str]] = set()
         self._notes: dict[str, list[int]] = {}  # in their order: first line, times
 
-    def program(self) -> Program:
-        """The program that was read; call it after `run`, and if there are no faults."""
-        return self.store.finish(self.source, self.notes, self.reading)
+    def program(self, frames: Sequence[Frame] = ()) -> Program:
+        """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
+        self._note_units()
+        return self.store.finish(self.source, self.notes, frames, self.reading)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -60,37 +74,53 @@ class Interpreter:
             f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}" for text, (line, times) in found
         )
 
-    def run(self) -> None:
-        """Read all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
-        row, rows, begun, ended = 0, len(self.words.line), False, False
-        while row < rows and not ended:
+    def execute(self, words: Words) -> None:
+        """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
+        row, rows = 0, len(words.line)
+        self.store.begin(len(words.letter))
+        while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(self.words, row, self.state, self.store)
-            begun |= after > row
+            after = run_plain(words, row, self.state, self.store)
+            self._begun |= after > row
             if after < rows:
-                block = read_block(self.words, after, self.report)
+                self.store.frame = int(words.frame[after])
+                block = read_block(words, after, self.report)
                 if block is not None and block.ended:
-                    ended = begun  # the first % starts the program
+                    self.ended = self._begun  # the first % starts the program
                 elif block is not None:
-                    ended = self._execute_or_report(block)
-                begun = True
+                    self.ended = self._execute_or_report(block)
+                self._begun = True
                 after += 1
             row = after
-        if not (self.words.letter[self.words.first[row] :] == ord("%")).all():
-            end, after = int(self.words.line[row - 1]), int(self.words.line[row])
+        self._read = row
+        self._keep_faults(words)
+
+    def note_what_follows(self, words: Words) -> None:
+        """Say it if the last chunk, `words`, goes on after the end of the program."""
+        row = self._read
+        if not (words.letter[words.first[row] :] == ord("%")).all():
+            end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
-        self._note_units()
 
     def report(self, word: int, message: str) -> None:
-        """Keep a fault of a word, by its index."""
+        """Keep a fault of a word of the chunk, by its index."""
         self._reports.append((word, message))
 
     def faults(self) -> FaultList:
-        """All faults in the order of the program."""
+        """All faults in the order of the program; a line that is executed many times is named once."""
+        return FaultList(self._found)
+
+    def _keep_faults(self, words: Words) -> None:
+        """Keep the chunk's faults in the order of its words."""
         refused = self.store.refused_word[: self.store.refusals]
-        letters = self.words.letter[refused]
+        letters = words.letter[refused]
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
-        return FaultList(self.words, sorted(found + self._reports))
+        for word, message in sorted(found + self._reports):
+            key = (int(words.at[word]), message)
+            if key not in self._said:
+                self._said.add(key)
+                self._found.append((words, word, message))
+        self._reports.clear()
 
     def note(self, text: str, line: int) -> None:
         """Keep what was assumed on a line."""
@@ -99,13 +129,8 @@ class Interpreter:
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
         moves = np.flatnonzero(self.store.block.kind[: self.store.blocks] <= Kind.ARC)
-        if not len(moves):
-            return
-        line = int(self.store.block.line[moves[0]])
-        before = slice(0, self.words.first[np.searchsorted(self.words.line, line, side="right")])
-        code = np.rint(10.0 * self.words.value[before])
-        if not ((self.words.letter[before] == ord("G")) & ((code == 200.0) | (code == 210.0))).any():
-            self.note("no G20 or G21 before the first move: mm", line)
+        if len(moves) and (self._units_at is None or moves[0] < self._units_at):
+            self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -188,6 +213,8 @@ class Interpreter:
             state.normal = {170: 2, 180: 1, 190: 0}[g["plane"]]
         if "units" in g:
             set_units(state, g["units"])
+            if self._units_at is None:
+                self._units_at = self.store.blocks
         if "tool length" in g:
             state.tool_length = self._tool_length(block) if g["tool length"] == 430 else 0.0
         if "work offset" in g:

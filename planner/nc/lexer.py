@@ -15,6 +15,7 @@ compiled loop and read by Python.
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -40,7 +41,7 @@ class Unreadable(IntEnum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Words:
-    """W words on R rows; a row is a source line with at least one word.
+    """W words on R rows; a row is a source line with at least one word. An expanded program has rows of one line many times.
 
     letter : (W,) upper case letter code, b"%"[0], or `FAULT`
     value  : (W,) number, as written (no unit applied)
@@ -48,6 +49,8 @@ class Words:
     line   : (R,) 1-based source line
     first  : (R+1,) index of a row's first word; row r holds words first[r] ... first[r+1]-1
     data   : the source
+    frame  : (R,) index of the call that the row stands in (`Program.frames`); 0 in the main program
+    files  : further files in `data`: where each begins, and its name, ascending
     """
 
     letter: Array
@@ -56,6 +59,13 @@ class Words:
     line: Array
     first: Array
     data: bytes
+    frame: Array
+    files: tuple[tuple[int, str], ...] = ()
+
+    def file(self, word: int) -> str:
+        """The file that a word stands in; empty for the main program."""
+        found = bisect_right(self.files, int(self.at[word]), key=lambda file: file[0])
+        return self.files[found - 1][1] if found else ""
 
     def row(self, word: int) -> int:
         """The row that holds a word."""
@@ -108,6 +118,7 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
         line=line[:rows],
         first=first[: rows + 1],
         data=data,
+        frame=np.zeros(rows, dtype=np.int32),
     )
 
 

@@ -35,6 +35,7 @@ class _Rows(NamedTuple):
     value: FloatArray
     line: Array
     first: Array
+    frame: Array
 
 
 class _Fixed(NamedTuple):
@@ -60,7 +61,7 @@ class _Counts(NamedTuple):
 
 def run_plain(words: Words, row: int, state: State, store: Store) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
-    rows = _Rows(words.letter, words.value, words.line, words.first)
+    rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
     fixed = _Fixed(state.absolute, state.unit, int(state.path_control), state.tolerance, state.offset)
     begin = _Counts(row, store.blocks, store.events, store.refusals, state.motion, state.feed)
     end = _run(rows, begin, fixed, state.position, store.block, store.event, store.refused_word, _REFUSED)
@@ -72,7 +73,7 @@ def run_plain(words: Words, row: int, state: State, store: Store) -> int:
 @njit(cache=True)
 def _run(rows, begin, fixed, position, block, event, refused_word, is_refused):  # pragma: no cover - compiled
     """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
-    letter, value, line, first = rows
+    letter, value, line, first, frame = rows
     absolute, unit, path_control, tolerance, offset = fixed
     row, blocks, events, refusals, motion, feed = begin
     given = np.empty(3)
@@ -123,6 +124,7 @@ def _run(rows, begin, fixed, position, block, event, refused_word, is_refused): 
             block.line[blocks] = line[row]
             block.path_control[blocks] = path_control
             block.tolerance[blocks] = tolerance
+            block.frame[blocks] = frame[row]
             blocks += 1
         row += 1
     return _Counts(row, blocks, events, refusals, motion, feed)

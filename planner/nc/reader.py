@@ -58,8 +58,9 @@ def interpret(
     words = split_words(b"" if foreign else data, block_delete=reading.block_delete)
     if not foreign and not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    interpreter = Interpreter(words, machine, source, reading)
-    interpreter.run()
+    interpreter = Interpreter(machine, source, reading)
+    interpreter.execute(words)
+    interpreter.note_what_follows(words)
     return interpreter.program(), [foreign] if foreign else interpreter.faults()
 
 

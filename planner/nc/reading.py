@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass
 
 from planner.base.errors import InputError
+from planner.nc.settings import may_be_ignored
 
 AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
 ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
@@ -60,7 +61,12 @@ def _normal(entry: str) -> str:
     text = "".join(entry.upper().split())
     if found := _CODE.fullmatch(text):
         letter, whole, tenth = found.groups()
-        return f"{letter}{int(whole)}" + (f".{tenth}" if tenth and tenth != "0" else "")
+        name = f"{letter}{int(whole)}" + (f".{tenth}" if tenth and tenth != "0" else "")
+        if not may_be_ignored(name):
+            raise InputError(
+                f"ignore: {name} cannot be left out: it moves the axes, or what follows it has another meaning without it"
+            )
+        return name
     if _OTHER.fullmatch(text):
         return text
     raise InputError(f"ignore: '{entry}' is nothing that can be ignored; {_SAY}")

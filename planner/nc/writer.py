@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.nc.lexer import Words, split_words
+from planner.nc.lexer import NUMBER, Words, split_words
 from planner.nc.program import Kind, Program
 
 SIGNIFICANT = 4  # digits of a feed
@@ -29,7 +29,7 @@ FEED_MIN = 0.01
 SAME_FEED = 1e-6
 
 _F, _G = ord("F"), ord("G")
-_NUMBER = re.compile(rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*")
+_NUMBER = re.compile(NUMBER)
 
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 

@@ -16,7 +16,7 @@ from planner.nc import codes
 from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
 from planner.nc.commands import MESSAGE, command, homed
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
-from planner.nc.settings import EXTRUDER_MODES, TEXTS, setting
+from planner.nc.settings import EVERYTHING, EXTRUDER_MODES, TEXTS, setting
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
@@ -87,7 +87,7 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
     own = ""  # letters that belong to a setting
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])
-        if own == MESSAGE:
+        if own == MESSAGE or (own == EVERYTHING and code == FAULT):
             break
         if code == FAULT:
             if homed(words, word, block, assumed) or command(words, word, block, report, assumed):

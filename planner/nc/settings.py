@@ -19,7 +19,7 @@ from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption
 
 AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
-_ALL = "ABCDEFHIJKLPQRSTUVWXYZ"
+EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
 
 UNKNOWN_M = Assumption(
     "M code that this reader does not know",
@@ -113,15 +113,15 @@ def _m_setting(code: int, before: str, behind: str) -> Setting | None:
     ):
         return None
     if number in _PARKING:
-        return Setting(PARKS, _ALL, stops=True)
+        return Setting(PARKS, EVERYTHING, stops=True)
     what = PRINTER_M if number in _OF_PRINTERS else UNKNOWN_M
     if before:
         return Setting(what, "PQ")
     if number in _OF_AXES:
-        return Setting(what, _ALL)
+        return Setting(what, EVERYTHING)
     if 100 <= number <= 199:
-        return Setting(what, "".join(c for c in _ALL if c not in "XYZFT"))
-    return None if set("XYZ").intersection(behind) else Setting(what, _ALL)
+        return Setting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
+    return None if set("XYZ").intersection(behind) else Setting(what, EVERYTHING)
 
 
 def may_be_ignored(name: str) -> bool:

@@ -25,6 +25,15 @@ class Refusal:
         return f"{self.what} not supported; {self.remedy}"
 
 
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """Something counted and said once: its name for one and for many, and what is assumed of it."""
+
+    one: str
+    many: str
+    said: str
+
+
 G_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 30), "motion"),
     **dict.fromkeys((40, 280, 300, 530, 920, 921, 922, 923), "one-shot"),
@@ -37,24 +46,25 @@ G_GROUP: dict[int, str] = {
     **dict.fromkeys((430, 490), "tool length"),
     400: "cutter compensation",
     940: "feed mode",
-    970: "spindle mode",
+    **dict.fromkeys((960, 970), "spindle mode"),
     **dict.fromkeys((980, 990), "retract mode"),
     80: "lathe diameter mode",
     800: "cycle end",  # a motion code on its line beats it
 }
 
-# Codes that change nothing here and are kept as events: spindle speed in rpm, retract modes of canned cycles,
+# Codes that change nothing here and are kept as events: spindle speed in rpm or by the radius, retract modes of canned cycles,
 # lathe radius mode.
-G_EVENTS = frozenset((970, 980, 990, 80))
+G_EVENTS = frozenset((960, 970, 980, 990, 80))
 
 M_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),
     **dict.fromkeys((30, 40, 50), "spindle"),
     60: "tool change",
+    190: "spindle orientation",
     **dict.fromkeys((70, 80, 90), "coolant"),
-    **dict.fromkeys((480, 490), "override"),
+    **dict.fromkeys((480, 490, 500, 510, 520, 530), "override"),
+    610: "tool number",
 }
-M_EVENTS = frozenset((30, 40, 50, 70, 80, 90, 480, 490))
 
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
 _POST = "choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
@@ -83,7 +93,8 @@ G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys(
         (431, 432), Refusal("a tool offset given in the program is", "use G43 H and [tools]", True)
     ),
-    **dict.fromkeys((500, 510), Refusal("scaling is", "write the scaled coordinates out")),
+    500: Refusal("presetting coordinates with G50 is", "write G92", True),
+    510: Refusal("scaling is", "write the scaled coordinates out"),
     520: Refusal("a local coordinate system is", "use G92 or one of G54 to G59.3", True),
     **dict.fromkeys(
         (680, 690), Refusal("rotating the coordinate system is", "write the rotated coordinates out", True)
@@ -92,16 +103,9 @@ G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890), _CYCLE),
     930: Refusal("inverse-time feed is", "write feeds in length per minute (G94)"),
     950: Refusal("feed per revolution is", "write feeds in length per minute (G94)"),
-    960: Refusal("constant surface speed is", "write a spindle speed (G97)"),
 }
 
 M_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys(
-        (500, 510, 520, 530),
-        Refusal("switching overrides is", "remove it: a plan is made for the programmed feed"),
-    ),
-    190: Refusal("orienting the spindle is", "plan the parts before and after it"),
-    610: Refusal("setting the tool number is", "write T and M6"),
     **dict.fromkeys(
         range(620, 690, 10),
         Refusal("reading or writing the control's signals is", "plan the parts before and after it"),
@@ -122,15 +126,17 @@ def unknown(letter: str, code: int) -> Refusal:
 
 # Letters that no supported code uses.
 LETTERS_REFUSED: dict[str, Refusal] = {
-    **dict.fromkeys("ABC", Refusal("a rotary axis is", _POST)),
-    **dict.fromkeys("UVW", Refusal("a second linear axis is", _POST)),
+    **dict.fromkeys("ABC", Refusal("a rotary axis that moves is", _POST)),
+    **dict.fromkeys("UVW", Refusal("a second linear axis that moves is", _POST)),
     "E": Refusal(
-        "an extruder axis (or a number with an exponent) is", "remove E words, write numbers out in digits"
+        "an extruder axis is", "give --extruder ignore to plan the motion of the other axes without it"
     ),
-    "D": Refusal("a cutter radius number is", "let the CAM system compensate and remove it"),
     "L": Refusal("a repetition or parameter word is", "remove it, or write the repetitions out"),
     "O": Refusal("a subprogram or O word is", "write its blocks out, or remove a mere program number"),
 }
+
+# Axes that are not planned: they may be named as long as they stand still.
+PARKABLE = "ABCUVW"
 
 # Letters that only some words use: "I word without G2 or G3".
 LETTER_NEEDS = {
@@ -141,6 +147,7 @@ LETTER_NEEDS = {
     "P": "G4, G64, G2 or G3",
     "Q": "G64",
     "H": "G43",
+    "D": "G41, G42 or G96",
 }
 
 # Characters that start no word, and what they mean in the dialects that use them.
@@ -148,7 +155,7 @@ CHARACTERS: dict[str, str] = {
     "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
     "[": "expressions are not supported; write the number out",
     "<": "named parameters are not supported; write the number out",
-    "$": "commands to the control ($H, $J ...) are not supported; remove the line if nothing moves, else write G0 or G1",
+    "$": "this command to the control is not supported: it may move ($J does); write G0 or G1, or give --ignore $ if nothing moves",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     "@": "polar coordinates are not supported; write x and y",

@@ -16,15 +16,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.base.units import SECONDS_PER_MINUTE
+from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
 from planner.nc import codes, moves
+from planner.nc.assumed import Assumed
 from planner.nc.block import Block, read_block
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
 from planner.nc.program import Frame, Kind, PathControl, Program
+from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
@@ -46,11 +48,13 @@ class Interpreter:
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
-    def __init__(self, machine: Machine | None, source: str):
-        self.source = source
+    def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
+        self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
         self.store = Store()
+        self.assumed = Assumed(reading)
+        self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.ended = False
         self._begun = False
         self._read = 0  # rows of the last chunk
@@ -63,15 +67,16 @@ class Interpreter:
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
-        return self.store.finish(self.source, self.notes, frames)
+        return self.store.finish(self.source, self.notes, frames, self.reading)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed, each once, with its first line and how often."""
-        found = sorted(self._notes.items(), key=lambda note: note[1][0])
-        return tuple(
-            f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}" for text, (line, times) in found
-        )
+        found = [
+            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
+            for text, (line, times) in self._notes.items()
+        ]
+        return tuple(text for _, text in sorted(found + self.assumed.notes(), key=lambda note: note[0]))
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
@@ -79,11 +84,11 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(words, row, self.state, self.store)
+            after = run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
                 self.store.frame = int(words.frame[after])
-                block = read_block(words, after, self.report)
+                block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
                 elif block is not None:
@@ -92,6 +97,7 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
+        self.assumed.count_letters(words, row)
         self._keep_faults(words)
 
     def note_what_follows(self, words: Words) -> None:
@@ -146,10 +152,14 @@ class Interpreter:
             self._dwell(block)
         self._modes(block)
         if not block.foreign:
+            self._check_parked(block)
+            self._go_to_switches(block)
             self._one_shot(block)
             self._motion(block)
         stop = block.m.get("stopping")
-        if stop in (0, 10, 600):
+        if stop == 600:
+            self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
             self.state.motion = REFUSED_MOTION
@@ -189,8 +199,12 @@ class Interpreter:
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
             store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop that takes no time", line)
-        for group in ("spindle", "coolant", "override"):
+            self.note("a tool change is a full stop that takes no time and moves nothing", line)
+        for letter, value in block.events:
+            store.add_event(letter, value, line)
+        if "tool number" in block.m:
+            state.tool_loaded = integer(block, "Q", 0) if "Q" in block.value else state.tool_selected
+        for group in ("spindle", "spindle orientation", "coolant", "override"):
             if group in block.m:
                 store.add_event("M", block.m[group] / 10, line)
         for code in block.g.values():
@@ -199,6 +213,12 @@ class Interpreter:
 
     def _dwell(self, block: Block) -> None:
         seconds = block.value.get("P")
+        if seconds is not None and self.assumed.printer:
+            seconds *= MILLISECOND
+            self.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        elif seconds is None and not self.assumed.strict and (self.assumed.printer or "S" in block.value):
+            seconds = block.value.get("S", 0.0)
+            self.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
         if seconds is None or seconds < 0:
             word = block.at["one-shot"] if seconds is None else block.at["P"]
             raise WordFault(
@@ -266,6 +286,28 @@ class Interpreter:
         else:
             self._shift_origin(block, code)
 
+    def _go_to_switches(self, block: Block) -> None:
+        """Homing: to the machine's G28 position, or machine zero."""
+        if not block.homing:
+            return
+        home = self.setup.positions.get(280, np.zeros(3))
+        for letter in block.homing:
+            axis = "XYZ".index(letter)
+            self.state.position[axis] = home[axis]
+        self.store.add(Kind.RAPID, block.line, self.state)
+        self.note(
+            "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not",
+            block.line,
+        )
+
+    def _check_parked(self, block: Block) -> None:
+        """Report words of axes that are not planned and would move."""
+        for letter in codes.PARKABLE:
+            if letter in block.value and not self.assumed.may_stand(
+                letter, block.value[letter], absolute=self.state.absolute
+            ):
+                self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
+
     def _go_home(self, block: Block, code: int) -> None:
         """G28, G30: through the intermediate point, if there is one, to the machine's position (of the axes given)."""
         state, name = self.state, f"G{codes.number(code)}"
@@ -316,8 +358,17 @@ class Interpreter:
             return
         if state.motion < 0:
             raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
+        if state.motion > 0 and not state.feed > 0 and self.setup.feed_default and not self.assumed.strict:
+            state.feed = self.setup.feed_default
+            feed = state.feed * SECONDS_PER_MINUTE / state.unit
+            self.note(
+                f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line
+            )
         if state.motion > 0 and not state.feed > 0:
-            found = f"G{state.motion} moves without a feed; write an F word on this line or before it"
+            found = (
+                f"G{state.motion} moves without a feed; write an F word on this line or before it, or feed_default "
+                "into the machine file"
+            )
             raise WordFault(block.motion_word(), found)
         target = moves.target(state, block)
         if state.motion < 2:

@@ -55,7 +55,7 @@ def _arc(state: State, block: Block, end: FloatArray) -> Arc:
     a, b = IN_PLANE[normal]
     plane = f"{AXES[a]} {AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value and block.g.get("one-shot") != 40 else 1
-    if "IJK"[normal] in block.value:
+    if block.value.get("IJK"[normal], 0.0) != 0.0:
         raise ArcError(
             f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
         )

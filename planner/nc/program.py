@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.nc.reading import AS_USUAL, Reading
 
 
 class Kind(IntEnum):
@@ -80,6 +81,7 @@ class Program:
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
+    reading      : the settings it was read with
     """
 
     source: str
@@ -100,6 +102,7 @@ class Program:
     notes: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     frames: tuple[Frame, ...] = ()
+    reading: Reading = AS_USUAL
 
     def __post_init__(self) -> None:
         axes = len(self.axes)

@@ -62,12 +62,14 @@ class State:
 
 @dataclass(frozen=True)
 class Setup:
-    """What the machine says about a program: offsets, positions and tools; all zero without a machine."""
+    """What the machine says about a program: offsets, positions and tools, all zero without a machine; a feed [mm/s] where the program
+    gives none."""
 
     path_control: PathControl = PathControl.BLEND
     systems: dict[int, FloatArray] = field(default_factory=dict)
     positions: dict[int, FloatArray] = field(default_factory=dict)
     tools: dict[int, float] = field(default_factory=dict)
+    feed_default: float | None = None
 
     @classmethod
     def of(cls, machine: Machine | None) -> Setup:
@@ -78,6 +80,7 @@ class Setup:
             path_control=_PATH_CONTROL[machine.path_control],
             systems={_SYSTEMS[name]: _vector(given) for name, given in machine.work_offsets.items()},
             positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
+            feed_default=machine.feed_default,
             tools={int(tool): length for tool, length in machine.tools.items()},
         )
 

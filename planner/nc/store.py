@@ -12,6 +12,7 @@ from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
 from planner.nc.program import Frame, Kind, Program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
 
@@ -121,7 +122,9 @@ class Store:
         event.value[k] = value
         self.events += 1
 
-    def finish(self, source: str, notes: Sequence[str], frames: Sequence[Frame] = ()) -> Program:
+    def finish(
+        self, source: str, notes: Sequence[str], frames: Sequence[Frame] = (), reading: Reading = AS_USUAL
+    ) -> Program:
         """The program read so far; the arrays are cut to size, so that the spare room is given back.
 
         frames : the calls that the blocks stand in, for an expanded program
@@ -152,6 +155,7 @@ class Store:
                 value=self.event.value[seen].copy(),
             ),
             notes=tuple(notes),
+            reading=reading,
             frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
             frames=tuple(frames),
         )

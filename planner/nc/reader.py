@@ -13,6 +13,7 @@ from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.detect import dialect_of
 from planner.nc.lexer import split_words
 from planner.nc.program import Program
 from planner.nc.reading import AS_USUAL, Reading
@@ -59,6 +60,11 @@ def interpret(
     if not foreign and not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     interpreter = Interpreter(machine, source, reading)
+    dialect = dialect_of(words, reading)
+    if dialect is not None:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+
+        return expand(interpreter, words, dialect)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
     return interpreter.program(), [foreign] if foreign else interpreter.faults()

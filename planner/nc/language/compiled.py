@@ -41,6 +41,7 @@ from planner.nc.language.tree import (
     Place,
     PlainRows,
     Procedure,
+    ProgramFault,
     Return,
     Statement,
 )
@@ -52,14 +53,6 @@ ENDS = (
     30.0,
 )  # M codes that end the program: what is pending is executed, to see whether the program goes on
 _HEAD = "P=run.numbered;G=run.shared;S=run.rows.pending.append;V=run.rows.values.extend;R=run.get;A=run.ask;T=run.tick;n=0;pc=0"
-
-
-class ProgramFault(Exception):
-    """A program that cannot be run, or not further; carries the place and the sentence."""
-
-    def __init__(self, place: Place, message: str):
-        super().__init__(message)
-        self.place, self.message = place, message
 
 
 def whole(value: float | None) -> int:
@@ -96,7 +89,7 @@ def compile_procedures(
             text.append(line)
             found.places.append(place)
     namespace: dict[str, object] = {"whole": whole, **language.functions}
-    exec(compile("\n".join(text), marker, "exec"), namespace)  # noqa: S102 - our own text: names and numbers are repr()
+    exec(compile("\n".join(text), marker, "exec"), namespace)
     for k, procedure in enumerate(procedures):
         found.functions[procedure.name] = namespace[f"p{k}"]  # type: ignore[assignment]
     return found

@@ -19,7 +19,6 @@ import re
 from dataclasses import dataclass
 
 from planner.nc.language.asked import LinuxcncAsked
-from planner.nc.language.compiled import ProgramFault
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import NEGATIVE, LineReader, Spelling, Unspelled
 from planner.nc.language.tree import (
@@ -39,6 +38,7 @@ from planner.nc.language.tree import (
     Place,
     PlainRows,
     Procedure,
+    ProgramFault,
     Return,
     Statement,
 )

@@ -11,14 +11,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from types import TracebackType
 
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
-from planner.nc.language.compiled import Compiled, ProgramFault, whole
+from planner.nc.language.compiled import Compiled, whole
 from planner.nc.language.rows import NotFinite, Rows
-from planner.nc.language.tree import Language, Place
+from planner.nc.language.tree import Language, Place, ProgramFault
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
@@ -29,20 +28,11 @@ ROWS_AT_ONCE = 100_000  # rows that are executed together
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
 
-Load = Callable[[str], Compiled | None]
+Load = Callable[[str], bool]
 
 
 class Ended(Exception):
     """The program has come to its end."""
-
-
-@dataclass
-class Expanded:
-    """What was expanded: calls by name, turns of loops and jumps, and rows."""
-
-    calls: Counter[str] = field(default_factory=Counter)
-    turns: int = 0
-    rows: int = 0
 
 
 class Run:
@@ -65,9 +55,10 @@ class Run:
         self.functions: dict[str, Callable[..., float | None]] = {}
         self.frames = [Frame(name="", source=interpreter.source, line=0, caller=-1)]
         self.files = [interpreter.source]
-        self.load: Load = lambda name: None
+        self.load: Load = lambda name: False
         self.tee: Callable[[Words], None] = lambda words: None
-        self.expanded = Expanded()
+        self.calls: Counter[str] = Counter()  # by name
+        self.executed = 0  # rows
         self._frame = 0
         self._depth = 0
         self._known_frames: dict[tuple[int, int, int, str], int] = {}
@@ -104,7 +95,7 @@ class Run:
         """Execute what is pending. Raises Ended if the program has ended with it."""
         if self.rows.pending:
             words = self.rows.take()
-            self.expanded.rows += len(words.line)
+            self.executed += len(words.line)
             self.tee(words)
             self.interpreter.execute(words)
         if self.interpreter.ended:
@@ -118,7 +109,7 @@ class Run:
         pending = len(self.rows.pending)
         if pending > ROWS_AT_ONCE:
             self.flush()
-        if self.expanded.rows + pending > ROWS_MAX:
+        if self.executed + pending > ROWS_MAX:
             raise _Endless(f"{ROWS_MAX:,} lines executed")
         return 0
 
@@ -143,7 +134,7 @@ class Run:
         value = None
         for _ in range(count):
             self.turns += 1
-            self.expanded.calls[str(name)] += 1
+            self.calls[str(name)] += 1
             if not self.turns & 127 or len(self.rows.pending) > ROWS_AT_ONCE:
                 self.tick(0)
             if arguments is None:
@@ -246,8 +237,7 @@ class Run:
 
     def _function(self, name: str, word: str) -> Callable[..., float | None]:
         if name not in self.functions:
-            compiled = self.load(name)
-            if compiled is None or name not in self.functions:
+            if not self.load(name) or name not in self.functions:
                 raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
         return self.functions[name]
 

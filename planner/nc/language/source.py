@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.base.arrays import Array
 from planner.nc.faults import Fault
-from planner.nc.language.compiled import ProgramFault
-from planner.nc.language.tree import Place, PlainRows
-from planner.nc.lexer import FAULT, Words
+from planner.nc.language.detect import bare, computes, may_compute, row_text
+from planner.nc.language.tree import Place, PlainRows, ProgramFault
+from planner.nc.lexer import Words
 
 _BOM = b"\xef\xbb\xbf"
 _CALLS = {
@@ -45,16 +44,12 @@ class Source:
 
     def __init__(self, words: Words, file: int, first_row: int = 0, begin: int = 0):
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
-        self.lines = self._may_be_language()
+        self.lines = self._statements()
 
-    def _may_be_language(self) -> Array:
-        """Rows, ascending, that the lexer could not split, or that call."""
+    def _statements(self) -> list[int]:
+        """Rows, ascending, that are statements of the language rather than words."""
         words = self.words
-        mark = (words.letter == FAULT) | (words.letter == ord("O"))
-        for letter, numbers in _CALLS.items():
-            mark |= (words.letter == letter) & np.isin(words.value, numbers)
-        marked = np.searchsorted(words.first, np.flatnonzero(mark), side="right") - 1
-        return np.unique(marked)
+        return [row for row in may_compute(words).tolist() if computes(bare(row_text(words, row)))]
 
     def _message_lines(self) -> list[tuple[int, SourceLine]]:
         """Lines with a message in a comment, each with the row that it comes before."""
@@ -86,7 +81,7 @@ class Source:
 
     def in_order(self) -> Iterator[SourceLine | PlainRows]:
         """The program in its order: lines of the language, and runs of plain rows between them."""
-        waiting = [(row, self.line(row)) for row in self.lines.tolist()]
+        waiting = [(row, self.line(row)) for row in self.lines]
         known = {row for row, _ in waiting}
         for row, line in self._message_lines():
             if row < len(self.words.line) and self.words.line[row] == line.place.line:

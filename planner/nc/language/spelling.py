@@ -30,8 +30,8 @@ NESTED_MAX = (
 )
 OPERATIONS_MAX = 80  # one inside the other: Python compiles no more brackets than 200
 
-_NUMBER = re.compile(r"\d+(?:\.\d*)?|\.\d+")
-_NAME = re.compile(r"<([^<>#\[\]()\n]+)>")
+_NUMBER = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?")
+_NAME = re.compile(r"<([^<>#()\n]+)>")
 _LETTERS = re.compile(r"[A-Za-z]+")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
 _BLANK = re.compile(r"[ \t\r\x1a]")
@@ -146,8 +146,11 @@ class LineReader:
         found = _NAME.match(self.text, self.at)
         if found is None:
             raise self.refused(self.at, "a name is < characters >, such as <depth>")
+        name = found.group(1).lower()
+        if name.startswith(("_hal[", "_ini[")):
+            raise self.refused(self.at, "a signal or setting that only the control knows; write its value")
         self.at = found.end()
-        return found.group(1).lower()
+        return name
 
     # --- values -------------------------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 
 class Place(NamedTuple):
@@ -213,3 +213,20 @@ class Language:
     asked_names: frozenset[str] = frozenset()
     read: str = "{0}"
     raw: frozenset[str] = field(default_factory=frozenset)
+
+
+class Parser(Protocol):
+    """Reads one file of a language. Whoever writes one gives it a `planner.nc.language.source.Source`."""
+
+    faults: list[ProgramFault]
+
+    def parse(self) -> list[Procedure]:
+        """All procedures of the file, the main program under the empty name; lines that cannot be read are in `faults`."""
+
+
+class ProgramFault(Exception):
+    """A program that cannot be run, or not further; carries the place and the sentence."""
+
+    def __init__(self, place: Place, message: str):
+        super().__init__(message)
+        self.place, self.message = place, message

@@ -19,8 +19,7 @@ from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
 NUMBER_MAX = 1e9
 CODE_MAX = 1e4  # larger G and M numbers are all unknown
 _CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
-_MOTION_LETTERS = "XYZ"
-_ARC_LETTERS = "IJKR"
+_ALWAYS = frozenset("XYZFST")  # words that need no code beside them
 
 Report = Callable[[int, str], None]
 
@@ -37,6 +36,7 @@ class Block:
     foreign : a code that is not supported uses the line's words; no move is read from it
     refused_motion : such a code is a motion code and stays in force
     partial : some words were reported and left out; others may have belonged to them
+    own     : letters of the words that codes of the line use
     """
 
     line: int
@@ -48,6 +48,7 @@ class Block:
     foreign: bool = False
     refused_motion: bool = False
     partial: bool = False
+    own: frozenset[str] = frozenset()
 
     def has(self, letters: str) -> bool:
         """Whether the block has a word with one of the letters."""
@@ -84,7 +85,7 @@ def read_block(words: Words, row: int, report: Report) -> Block | None:
                 return None
         elif letter in "GM":
             block.partial |= _add_code(block, letter, value, word, report)
-        elif letter in codes.LETTERS_REFUSED:
+        elif letter in codes.LETTERS_REFUSED and letter != "E":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
         elif letter in block.value:
@@ -126,23 +127,20 @@ def _add_code(block: Block, letter: str, value: float, word: int, report: Report
 
 
 def _check_used(block: Block, report: Report) -> None:
-    """Report words that no code of the line uses. I J K and R may belong to an arc code in force: the
-    interpreter looks."""
-    one_shot, motion = block.g.get("one-shot"), block.g.get("motion", block.g.get("cycle end"))
-    path, arc = block.g.get("path control"), motion in (20, 30)
-    used = {
-        "P": arc or motion is None or one_shot == 40 or path == 640,
-        "Q": path == 640,
-        "H": block.g.get("tool length") == 430,
-        **dict.fromkeys(_ARC_LETTERS, arc or motion is None),
-    }
-    for letter, allowed in used.items():
-        if letter in block.value and not allowed:
-            report(
-                block.at[letter],
-                f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it",
-            )
-            del block.value[letter]
+    """Report words that no code of the line uses. Where the line has no motion code, the one in force may: the interpreter looks."""
+    named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
+    block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
+    in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
+    for letter in sorted(block.value.keys() - block.own - _ALWAYS - set(in_force), key=block.at.__getitem__):
+        report(block.at[letter], unused(letter))
+        del block.value[letter]
+
+
+def unused(letter: str) -> str:
+    """What is said of a word that no code of its block uses."""
+    if letter in codes.LETTERS_REFUSED:
+        return str(codes.LETTERS_REFUSED[letter])
+    return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
 
 
 def _unreadable(words: Words, word: int) -> str:

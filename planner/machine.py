@@ -80,6 +80,14 @@ class Plotter(_Record):
     pen_up: NotNegative = 0.0
 
 
+class ToolData(_Record):
+    """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42 use [mm]."""
+
+    length: Finite = 0.0
+    x: Finite = 0.0
+    diameter: NotNegative = 0.0
+
+
 class Machine(_Record):
     """A machine. The template explains every key.
 
@@ -106,7 +114,7 @@ class Machine(_Record):
     fir: Fir | None = None
     modes: tuple[Mode, ...] = ()
     plotter: Plotter | None = None
-    tools: dict[str, Finite] = {}
+    tools: dict[str, ToolData] = {}
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}
     _own: tuple[OwnLimit, ...] = PrivateAttr(default=())
@@ -122,6 +130,14 @@ class Machine(_Record):
             if letter not in axes:
                 raise ValueError(f"axis '{letter}' is missing; write a table [axes.{letter}]")
         return {letter: axes[letter] for letter in known if letter in axes}
+
+    @field_validator("tools", mode="before")
+    @classmethod
+    def _lengths_alone(cls, tools: object) -> object:
+        """A number alone is a tool's length."""
+        if not isinstance(tools, dict):
+            return tools
+        return {n: {"length": t} if isinstance(t, int | float | str) else t for n, t in tools.items()}
 
     @model_validator(mode="after")
     def _names_known(self) -> Machine:

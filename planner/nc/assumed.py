@@ -49,6 +49,7 @@ class Assumed:
         for letter in LETTERS_REFUSED:
             self.treatment[ord(letter)] = self._treatment(letter)
         self._counted: dict[Assumption, _Counted] = {}
+        self._used: dict[str, int] = {}
 
     def _treatment(self, letter: str) -> int:
         if letter in self.reading.ignore or (letter == "E" and self.reading.extruder == IGNORE):
@@ -73,12 +74,17 @@ class Assumed:
             self.parked[code] = value
         return bool(self.parked[code] == value)
 
+    def used(self, letter: str) -> None:
+        """A code uses a word of this letter: it is not left out."""
+        self._used[letter] = self._used.get(letter, 0) + 1
+
     def count_letters(self, words: Words, rows: int) -> None:
         """Count the words of letters that were left out or parked in the first `rows` rows of a chunk."""
         letter = words.letter[: words.first[rows]]
         times = np.bincount(letter, minlength=256)
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
-            if times[code]:
+            times[code] -= self._used.pop(chr(code), 0)
+            if times[code] > 0:
                 word = int(np.argmax(letter == code))
                 line = int(words.line[words.row(word)])
                 self.count(self._of_letter(chr(code)), words.text(word), line, int(times[code]))

@@ -23,8 +23,7 @@ from planner.nc.settings import EVERYTHING, EXTRUDER_MODES, TEXTS, setting
 NUMBER_MAX = 1e9
 CODE_MAX = 1e4  # larger G and M numbers are all unknown
 _CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
-_MOTION_LETTERS = "XYZ"
-_ARC_LETTERS = "IJKR"
+_ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code beside them
 
 Report = Callable[[int, str], None]
 
@@ -51,6 +50,7 @@ class Block:
     events  : letter and number of words that move nothing and are kept, in their order
     homing  : axes that go to their home position
     stops   : one of `events` is a full stop
+    own     : letters of the words that codes of the line use
     """
 
     line: int
@@ -65,6 +65,7 @@ class Block:
     events: list[tuple[str, float]] = field(default_factory=list)
     homing: str = ""
     stops: bool = False
+    own: frozenset[str] = frozenset()
 
     def has(self, letters: str) -> bool:
         """Whether the block has a word with one of the letters."""
@@ -84,10 +85,10 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
     whole, or holds nothing."""
     block = Block(line=int(words.line[row]))
     first, last = int(words.first[row]), int(words.first[row + 1])
-    own = ""  # letters that belong to a setting
+    owned = ""  # letters that belong to a setting
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])
-        if own == MESSAGE or (own == EVERYTHING and code == FAULT):
+        if owned == MESSAGE or (owned == EVERYTHING and code == FAULT):
             break
         if code == FAULT:
             if homed(words, word, block, assumed) or command(words, word, block, report, assumed):
@@ -108,15 +109,15 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
                 report(word, "a line number comes first on its line, once")
                 return None
         elif letter in "GM":
-            own = ""
+            owned = ""
             taken = _settle(words, word, (first, last), block, assumed)
             if taken is not None:
-                own = taken
+                owned = taken
             else:
                 block.partial |= _add_code(block, letter, value, word, report)
-        elif letter in own or assumed.treatment[code] == LEFT_OUT:
+        elif letter in owned or (assumed.treatment[code] == LEFT_OUT and letter != "E"):
             continue
-        elif assumed.treatment[code] == REFUSED:
+        elif assumed.treatment[code] == REFUSED and letter != "E":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
         elif letter in block.value and block.value[letter] != value:
@@ -210,28 +211,26 @@ def _add_code(block: Block, letter: str, value: float, word: int, report: Report
 
 
 def _check_used(words: Words, block: Block, report: Report, assumed: Assumed) -> None:
-    """Report words that no code of the line uses; numbers of offsets are counted. I J K and R may belong to an arc code in force: the
-    interpreter looks."""
-    one_shot, motion = block.g.get("one-shot"), block.g.get("motion", block.g.get("cycle end"))
-    path, arc = block.g.get("path control"), motion in (20, 30)
-    used = {
-        "P": arc or motion is None or one_shot == 40 or path == 640,
-        "Q": path == 640,
-        "H": block.g.get("tool length") == 430,
-        "D": block.g.get("spindle mode") == 960 or block.g.get("cutter compensation", 400) != 400,
-        **dict.fromkeys(_ARC_LETTERS, arc or motion is None),
-    }
-    for letter, allowed in used.items():
-        if letter in block.value and not allowed:
-            if letter in "DH" and not assumed.strict:
-                assumed.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
-                del block.value[letter]
-                continue
-            report(
-                block.at[letter],
-                f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it",
-            )
-            del block.value[letter]
+    """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no motion code, the one in force
+    may use them: the interpreter looks."""
+    named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
+    block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
+    in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
+    if "E" in block.own:
+        assumed.used("E")
+    for letter in sorted(block.value.keys() - block.own - _ALWAYS - set(in_force), key=block.at.__getitem__):
+        if letter in "DH" and not assumed.strict:
+            assumed.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
+        elif assumed.treatment[ord(letter)] != LEFT_OUT:
+            report(block.at[letter], unused(letter))
+        del block.value[letter]
+
+
+def unused(letter: str) -> str:
+    """What is said of a word that no code of its block uses."""
+    if letter in codes.LETTERS_REFUSED:
+        return str(codes.LETTERS_REFUSED[letter])
+    return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
 
 
 def _unreadable(words: Words, word: int) -> str:

@@ -66,11 +66,17 @@ class _Counts(NamedTuple):
 
 def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assumed) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
+    if not state.is_plain:
+        return row
     rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
     fixed = _Fixed(state.absolute, state.unit, int(state.path_control), state.tolerance, state.offset)
     begin = _Counts(row, store.blocks, store.events, store.refusals, state.motion, state.feed)
     others = _Others(assumed.treatment, assumed.parked)
     end = _run(rows, begin, fixed, state.position, store.block, store.event, store.refused_word, others)
+    if end.blocks > begin.blocks:
+        state.series = None
+    if end.events > begin.events:
+        state.spindle.speed = float(store.event.value[end.events - 1])  # plain rows have no other events
     store.blocks, store.events, store.refusals = end.blocks, end.events, end.refusals
     state.motion, state.feed = end.motion, end.feed
     return int(end.row)

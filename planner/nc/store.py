@@ -102,9 +102,9 @@ class Store:
         block.frame[k] = self.frame
         self.blocks += 1
 
-    def add_arc(self, arc: Arc, line: int, state: State) -> None:
-        """Append an arc that ends at the state's position."""
-        self.arcs.append((self.blocks, arc.centre, state.normal, arc.sweep))
+    def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
+        """Append an arc about a normal axis that ends at the state's position."""
+        self.arcs.append((self.blocks, arc.centre, normal, arc.sweep))
         self.add(Kind.ARC, line, state)
 
     def add_dwell(self, seconds: float, line: int, state: State) -> None:

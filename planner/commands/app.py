@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from planner.commands.compare import compare_command
+from planner.commands.expand import expand_command
 from planner.commands.info import info_command
 from planner.commands.machine import init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
@@ -47,6 +48,7 @@ for name, command in {
     "compare": compare_command,
     "verify": verify_command,
     "info": info_command,
+    "expand": expand_command,
     "pulses": pulses_command,
 }.items():
     app.command(name)(command)

@@ -156,6 +156,7 @@ def _not_limited(verdict: Verdict) -> list[str]:
 def info_summary(info: ProgramInfo) -> dict[str, Any]:
     """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`."""
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
+    fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
     fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported]
     return _plain(fields)
 

@@ -2,8 +2,8 @@
 
 A program that holds nothing of it is told from the words that the lexer has made, without looking at its text.
 
-LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [ with DO, G65, G66, M98, M99,
-and sums without brackets behind an equals sign. Parameters and brackets alone belong to both and are read as LinuxCNC's.
+LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [ with DO, G65, G66, M98,
+M99, and sums without brackets behind an equals sign. Parameters and brackets alone belong to both and are read as LinuxCNC's.
 """
 
 from __future__ import annotations

@@ -58,6 +58,7 @@ class Interpreter:
         self.state = self.setup.start()
         self.store = Store()
         self.assumed = Assumed(reading)
+        self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.ended = False
         self._begun = False
@@ -101,8 +102,8 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
-        self.assumed.count_letters(words, row)
         self._keep_faults(words)
+        self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
         """Say it if the last chunk, `words`, goes on after the end of the program."""
@@ -123,6 +124,7 @@ class Interpreter:
         """Keep the chunk's faults in the order of its words."""
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         for word, message in sorted(found + self._reports):
             key = (int(words.at[word]), message)
@@ -289,6 +291,7 @@ class Interpreter:
             if letter in block.value and not self.assumed.may_stand(
                 letter, block.value[letter], absolute=self.state.absolute
             ):
+                self.assumed.moved.add(letter)
                 self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
 
     def _motion(self, block: Block) -> None:

@@ -111,7 +111,8 @@ def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
     a, b = IN_PLANE[normal]
     plane = f"{AXES[a]} {AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value else 1
-    if block.value.get("IJK"[normal], 0.0) != 0.0:
+    along = block.value.get("IJK"[normal])  # many programs write K0 in G17
+    if along is not None and (along != 0.0 or state.strict):
         raise ArcError(
             f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
         )

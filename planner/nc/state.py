@@ -100,6 +100,7 @@ class State:
     to_level     : canned cycles retract to the level before them (G98), not to R (G99)
     retract_given : a G98 or G99 was read
     series       : canned cycles in force
+    strict       : nothing is assumed (`Reading.strict`)
     in_thread    : the last block was cut in step with the spindle
     """
 
@@ -131,6 +132,7 @@ class State:
     retract_given: bool = False
     series: Series | None = None
     in_thread: bool = False
+    strict: bool = False
 
     @property
     def is_plain(self) -> bool:

@@ -49,6 +49,7 @@ class Interpreter:
 
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
+    open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -60,6 +61,7 @@ class Interpreter:
         self.assumed = Assumed(reading)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
+        self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
         self._begun = False
         self._read = 0  # rows of the last chunk
@@ -147,6 +149,8 @@ class Interpreter:
         try:
             return self._execute(block)
         except WordFault as fault:
+            if isinstance(fault, moves.ArcFault):
+                self.open_arcs.append((block.line, fault.otherwise))
             self.report(fault.word, fault.message)
             return block.m.get("stopping") in (20, 300)
 

@@ -195,7 +195,7 @@ def _add_code(block: Block, letter: str, value: float, word: int, report: Report
     exact = abs(value * 10.0 - code) <= 10.0 * _CODE_ROUNDING
     if not exact or code not in known:
         refusal = refused.get(code) if exact else None
-        refusal = refusal or codes.unknown(letter, code)
+        refusal = refusal or codes.unknown(letter, code, strict=assumed.strict or not exact)
         report(word, str(refusal))
         block.foreign |= refusal.takes_axes
         block.refused_motion |= refusal.takes_axes and 330 <= code <= 890

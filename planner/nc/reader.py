@@ -58,10 +58,10 @@ def interpret(
 
         return read_drawing(data, machine, source, reading)
     foreign = recognise(data)
-    run = _run(b"" if foreign else data, machine, reading, source)
     if foreign:
-        return run.program(), [foreign]
-    if reading.arc_centres == AUTO and run.open_arcs and all(otherwise for _, otherwise in run.open_arcs):
+        return Interpreter(machine, source, reading).program(), [foreign]
+    run = _run(data, machine, reading, source)
+    if reading.arc_centres == AUTO and not reading.strict and run.open_arcs and all(otherwise for _, otherwise in run.open_arcs):
         other = _run(data, machine, dataclasses.replace(reading, arc_centres=ABSOLUTE), source)
         if not other.open_arcs:
             lines = [line for line, _ in run.open_arcs]
@@ -78,7 +78,7 @@ def _run(data: bytes, machine: Machine | None, reading: Reading, source: str) ->
     """Execute a program. Raises InputError if there is no word in it."""
     data, leader = (data, "") if reading.strict else without_leader(data)
     words = split_words(data, block_delete=reading.block_delete)
-    if data and not len(words.line):
+    if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     interpreter = Interpreter(machine, source, reading)
     if leader:

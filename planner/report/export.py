@@ -24,6 +24,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
+from planner.nc.info import PLACES_SHOWN
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program
@@ -154,9 +155,13 @@ def _not_limited(verdict: Verdict) -> list[str]:
 
 
 def info_summary(info: ProgramInfo) -> dict[str, Any]:
-    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`."""
+    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`.
+
+    Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
+    """
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
-    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported]
+    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
+    fields["unsupported_places"] = len(info.unsupported)
     return _plain(fields)
 
 

@@ -32,6 +32,7 @@ LAYERS = (
     "planner.constraints.own",
     "planner.fir.filters",
     "planner.machine",
+    "planner.machine_import",
     "planner.constraints",
     "planner.nc",
     "planner.geometry",

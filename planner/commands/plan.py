@@ -27,13 +27,16 @@ from planner.commands.options import (
     SolverOption,
     ThreadsOption,
     ToleranceOption,
+    takes_reading,
 )
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.nc.reading import Reading
 
 NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 
 
 @guarded
+@takes_reading
 def plan_command(
     job: Job,
     machine: MachineOption = None,
@@ -86,6 +89,8 @@ def plan_command(
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
     force: ForceOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Plan the motion of a program, sample it and verify it."""
     if plot and output is None:
@@ -121,6 +126,7 @@ def plan_command(
             solver=solver,
             shaped=shaped,
             tolerance=tolerance,
+            reading=reading,
             progress=progress,
             log=steps if verbose or trace is not None else None,
         )

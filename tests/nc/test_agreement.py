@@ -24,6 +24,7 @@ from planner.base.units import MM_PER_INCH
 from planner.machine import Machine
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
+from planner.nc.reading import Reading
 
 HERE = Path(__file__).parent
 SHARED = HERE.parents[1].parent / "shared"
@@ -126,7 +127,7 @@ def test_real_programs_agree(tmp_path: Path) -> None:
     read, refused = {}, []
     for path in PROGRAMS:
         try:
-            read[path] = read_program(path, block_delete=False)
+            read[path] = read_program(path, reading=Reading(block_delete=False))
         except InputError:
             refused.append(path.name)
     assert len(read) >= 25, f"only {len(read)} programs are read; refused: {refused}"

@@ -297,7 +297,7 @@ class Interpreter:
             code = block.g["motion"]
             state.motion = code // 10 if code <= 30 else code
         elif "cycle end" in block.g:
-            state.motion = NO_MOTION
+            state.motion, state.series = NO_MOTION, None
         if one_shot in _COVET_AXES or self._gives_offsets(block):
             return
         if one_shot == 530:

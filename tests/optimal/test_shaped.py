@@ -76,7 +76,7 @@ def test_an_exact_stop_stands_still():
 
 
 def test_a_bow_between_samples_of_half_the_tolerance():
-    """Seed 12: two lines at 2 ms and 5 um, where a period bows by 6 um: going slower leaves no room for the path."""
+    """Seed 12: two lines at 2 ms and 5 um, where a chord bows by more than half of the tolerance."""
     program, machine = never_slower.job(12)
     machine = machine.model_copy(update={"modes": (Mode(frequency=25.0, damping=0.03),)})
     made = plan(program, machine, method="second-order", corner="bezier", shaped=True)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from planner.commands.compare import compare_command
+from planner.commands.export import export_command
 from planner.commands.info import info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
@@ -48,6 +49,7 @@ for name, command in {
     "verify": verify_command,
     "info": info_command,
     "pulses": pulses_command,
+    "export": export_command,
 }.items():
     app.command(name)(command)
 

@@ -114,6 +114,11 @@ class Interpreter:
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
 
+    @property
+    def all_arcs_close_otherwise(self) -> bool:
+        """Whether there are arcs that do not close, and all of them would with their centres read the other way."""
+        return bool(self.open_arcs) and all(otherwise for _, otherwise in self.open_arcs)
+
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
         self._reports.append((word, message))
@@ -304,7 +309,7 @@ class Interpreter:
             code = block.g["motion"]
             state.motion = code // 10 if code <= 30 else code
         elif "cycle end" in block.g:
-            state.motion = NO_MOTION
+            state.motion, state.series = NO_MOTION, None
         if one_shot in _COVET_AXES or self._gives_offsets(block):
             return
         if one_shot == 530:

@@ -14,6 +14,7 @@ from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise, refuse_models
 from planner.nc.faults import Fault, require_none
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.detect import dialect_of
 from planner.nc.leader import without_leader
 from planner.nc.lexer import split_words
 from planner.nc.program import Program
@@ -60,21 +61,18 @@ def interpret(
     foreign = recognise(data)
     if foreign:
         return Interpreter(machine, source, reading).program(), [foreign]
-    run = _run(data, machine, reading, source)
-    if reading.arc_centres == AUTO and not reading.strict and run.open_arcs and all(otherwise for _, otherwise in run.open_arcs):
-        other = _run(data, machine, dataclasses.replace(reading, arc_centres=ABSOLUTE), source)
+    run, program, faults = _run(data, machine, reading, source)
+    if reading.arc_centres == AUTO and not reading.strict and run.all_arcs_close_otherwise:
+        absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
+        other, as_absolute, found = _run(data, machine, absolute, source)
         if not other.open_arcs:
-            lines = [line for line, _ in run.open_arcs]
-            other.note(
-                f"arc centres read as absolute, as after G90.1: {len(lines):,} arcs close only so (--arc-centres "
-                "absolute|incremental says which)",
-                lines[0],
-            )
-            run = other
-    return run.program(), run.faults()
+            return _with_note(as_absolute, run.open_arcs), found
+    return program, faults
 
 
-def _run(data: bytes, machine: Machine | None, reading: Reading, source: str) -> Interpreter:
+def _run(
+    data: bytes, machine: Machine | None, reading: Reading, source: str
+) -> tuple[Interpreter, Program, Sequence[Fault]]:
     """Execute a program. Raises InputError if there is no word in it."""
     data, leader = (data, "") if reading.strict else without_leader(data)
     words = split_words(data, block_delete=reading.block_delete)
@@ -83,9 +81,23 @@ def _run(data: bytes, machine: Machine | None, reading: Reading, source: str) ->
     interpreter = Interpreter(machine, source, reading)
     if leader:
         interpreter.note(f"the text before the first % is not read ({leader!r})", 1)
+    dialect = dialect_of(words, reading)
+    if dialect is not None:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+
+        return interpreter, *expand(interpreter, words, dialect)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
-    return interpreter
+    return interpreter, interpreter.program(), interpreter.faults()
+
+
+def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Program:
+    """The program, with the arcs for whose sake it was read with absolute centres."""
+    note = (
+        f"line {open_arcs[0][0]}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
+        "(--arc-centres absolute|incremental says which)"
+    )
+    return dataclasses.replace(program, notes=(note, *program.notes))
 
 
 def load(path: str | Path) -> bytes:

@@ -16,6 +16,8 @@ AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
 ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
 REFUSE, IGNORE = "refuse", "ignore"
 EXTRUDERS = (REFUSE, IGNORE)
+LINUXCNC, FANUC = "linuxcnc", "fanuc"
+DIALECTS = (AUTO, LINUXCNC, FANUC)
 
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?")
@@ -31,6 +33,8 @@ class Reading:
     arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute", or "auto", which is
                    incremental unless only absolute centres close every arc of the program
     extruder     : "refuse" or "ignore": what is done with the E words of 3-D printers
+    dialect      : whose language parameters, expressions and subprograms are: "linuxcnc", "fanuc" (Haas too), or "auto", by what the
+                   program holds
     block_delete : leave out the lines that start with "/"
 
     Raises InputError for a value that is not one of these.
@@ -40,10 +44,11 @@ class Reading:
     ignore: tuple[str, ...] = ()
     arc_centres: str = AUTO
     extruder: str = REFUSE
+    dialect: str = AUTO
     block_delete: bool = True
 
     def __post_init__(self) -> None:
-        for name, allowed in (("arc_centres", ARC_CENTRES), ("extruder", EXTRUDERS)):
+        for name, allowed in (("arc_centres", ARC_CENTRES), ("extruder", EXTRUDERS), ("dialect", DIALECTS)):
             if getattr(self, name) not in allowed:
                 raise InputError(f"{name} = {getattr(self, name)!r}; allowed are {', '.join(allowed)}")
         if isinstance(self.ignore, str):

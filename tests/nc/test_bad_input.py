@@ -155,8 +155,8 @@ def test_refused(text: str | bytes, line: int, column: int, parts: list[str], st
 def test_words_that_nothing_uses_are_refused(letter: str, needs: str) -> None:
     if letter == "E":
         return  # refused as an extruder's
+    text = f"G21 {letter}1\nG0 X1" if letter in "QH" else f"G0 X1 {letter}1"
     with pytest.raises(InputError, match=f"{letter} word without {needs}"):
-        text = f"G21 {letter}1\nG0 X1" if letter in "QH" else f"G0 X1 {letter}1"
         parse_program(text, reading=Reading(strict=letter in "DH"))
 
 

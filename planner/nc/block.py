@@ -162,14 +162,15 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed
     if abs(value * 10.0 - code) > 10.0 * _CODE_ROUNDING:
         return None
     name = f"{letter}{codes.number(code)}"
+    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
+    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
     if assumed.ignores(name):
         assumed.count(LEFT_OUT_BY_USER, name, block.line)
         block.events.append((letter, code / 10))
         block.partial = True
         block.foreign |= letter == "G"
-        return ""
-    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
-    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
+        alone = letter == "M" and code not in codes.M_GROUP and not before
+        return found.own if found else EVERYTHING if alone else ""
     if found is None or assumed.strict:
         return None
     assumed.count(found.what, words.text(word), block.line)

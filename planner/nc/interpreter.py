@@ -20,7 +20,7 @@ from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
 from planner.nc import codes, drilling, feeds, homing, moves, offsets, signals, threads
 from planner.nc.assumed import Assumed
-from planner.nc.block import Block, read_block
+from planner.nc.block import OFFSET_NUMBER, Block, read_block
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
@@ -314,6 +314,8 @@ class Interpreter:
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
+        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
         if not moves.is_move(state, block):
             if "motion" in block.g and state.motion > 3:

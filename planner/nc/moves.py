@@ -183,12 +183,17 @@ def check_machine_coordinates(state: State, block: Block) -> None:
         raise WordFault(block.at["one-shot"], "G53 goes with absolute coordinates only; write G90 before it")
 
 
+def used_in_force(state: State) -> set[str]:
+    """Letters that the motion code in force uses beside the axes."""
+    code = 10 * state.motion if state.motion <= 3 else state.motion
+    return set(codes.WORDS.get(("G", code), ""))
+
+
 def check_words(state: State, block: Block) -> None:
     """Words that neither a code of the line nor the motion code in force uses. Raises WordFault for the first."""
     if state.motion == REFUSED_MOTION or block.partial:
         return
-    code = 10 * state.motion if state.motion <= 3 else state.motion
-    used = block.own | set(codes.WORDS.get(("G", code), ""))
+    used = block.own | used_in_force(state)
     for letter in codes.MOTION_WORDS:
         if letter in block.value and letter not in used:
             raise WordFault(block.at[letter], unused(letter))

@@ -103,7 +103,6 @@ REFUSED = [
     ("F1\nG2 X1 I1 P0", 2, 10, ["P0", "whole number, 1 or more"]),
     ("F1 G90.1\nG2 X2 I1", 2, 1, ["J is missing", "G90.1"]),
     ("F1\nG2 X20.5 I10", 2, 1, ["10 mm", "10.5 mm", "0.5 mm apart", "allowed are 0.0282843 mm", "correct"]),
-    ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
     ("F1\nG90.1\nG0 X30\nG2 X50 I10 J0", 4, 1, ["if its centre were incremental: write G91.1"]),
     # other languages, other files
     ("0 BEGIN PGM 11 MM\n1 L X+5", 1, 3, ["BEGIN PGM", "Heidenhain"]),
@@ -133,6 +132,7 @@ STRICTLY = [
     ("TEXT\n%\nG0 X1", 1, 1, ["T", "without a number"]),
     ("G15", 1, 1, ["G15", "does not know"]),
     ("G50 S1600", 1, 1, ["G50"]),
+    ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
 ]
 
 

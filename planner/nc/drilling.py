@@ -39,14 +39,14 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
     if code in cycles.DWELLING and words["P"] < 0:
         raise WordFault(block.at["P"], "a dwell must not be negative; write its seconds, such as P0.5")
     _check_spindle(state, code, word)
+    state.cycle_dwell = block.value.get("P", state.cycle_dwell)
     if not state.retract_given:
         note(
             f"{name} before any G98 or G99: holes end at R (G99), as LinuxCNC has it; some controls start with G98",
             block.line,
         )
     clear = words["R"] + (0.0 if state.absolute else series.level)
-    base = 0.0 if state.absolute else clear
-    bottom = words["XYZ"[normal]] + base
+    bottom = words["XYZ"[normal]] + (0.0 if state.absolute else clear)
     if bottom > clear:
         raise WordFault(
             word,
@@ -65,7 +65,8 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
                 length = _length(state, block.value, axis)
                 here[axis] = length + (0.0 if state.absolute else here[axis])
         place = (float(here[a]), float(here[b]))
-        _to(state, store, block.line, Step(Kind.RAPID, (*place, max(float(here[normal]), retract))))
+        height = float(here[normal]) if here[normal] >= clear else retract
+        _to(state, store, block.line, Step(Kind.RAPID, (*place, height)))
         _to(state, store, block.line, Step(Kind.RAPID, (*place, clear)))
         hole = Hole(
             code,
@@ -74,9 +75,9 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
             clear,
             retract,
             peck=words.get("Q", 0.0),
-            dwell=words.get("P", 0.0),
+            dwell=words.get("P", state.cycle_dwell),
             beside=(words.get("IJK"[a], 0.0), words.get("IJK"[b], 0.0)),
-            counterbore=words.get("IJK"[normal], 0.0) + base,
+            counterbore=words.get("IJK"[normal], 0.0) + (0.0 if state.absolute else bottom),
             turning=state.spindle.turning,
             unit=state.unit,
         )

@@ -21,7 +21,9 @@ from planner.nc.state import FeedMode, State
 Note = Callable[[str, int], None]
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
-_NOWHERE = 1e-9  # length that a block under G93 has at least, so that its feed is above 0 [mm]
+_SLOWEST = (
+    0.1  # feed of a block under G93, at least [programmed units per minute]: as LinuxCNC has it, and never 0
+)
 
 
 def set_feed(state: State, block: Block, note: Note) -> None:
@@ -85,4 +87,4 @@ def check_feed(state: State, block: Block) -> None:
 def feed_of_time(state: State, block: Block, length: float) -> None:
     """Under G93 the feed of a block of this length [mm]."""
     if state.feed_mode == "inverse time":
-        state.feed = max(length, _NOWHERE) * block.value["F"] / SECONDS_PER_MINUTE
+        state.feed = max(length * block.value["F"], _SLOWEST * state.unit) / SECONDS_PER_MINUTE

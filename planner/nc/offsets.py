@@ -1,8 +1,8 @@
 """Codes that set offsets: G10, G43 to G49, G52, G92 to G92.3, G28.1 and G30.1. None of them moves anything.
 
-With q the position in a work system before G92 and the tool are taken off (state.py), a coordinate x is
+With q the position in a work system before G92 is taken off (state.py), a coordinate x is
 
-    x = q - G92 offset - tool offset
+    x = q - G92 offset,      q = R^-1 (position - origin - tool offset)
 
 and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for the G92 offset, G10 L20 for
 the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10 takes coordinates as absolute, whatever G90 and G91
@@ -67,7 +67,7 @@ def shift_origin(state: State, block: Block) -> None:
             raise WordFault(
                 block.at["one-shot"], f"G{codes.number(code)} needs at least one of X, Y and Z: {what}"
             )
-        here = state.in_system() - state.tool_offset
+        here = state.in_system()
         for axis in _axes(block):
             length = coordinate(state, block, axis)
             state.g92[axis] = length if code == 520 else here[axis] - length
@@ -108,9 +108,8 @@ def _set_system(state: State, block: Block, kind: int) -> None:
     if kind == 2:
         system = System(_given(state, block, system.origin), block.value.get("R", system.rotation))
     else:
-        rest = state.g92 + state.tool_offset
-        wanted = _given(state, block, state.in_system(code) - rest) + rest
-        system = replace(system, origin=state.position - system.turn(wanted))
+        wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
+        system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
 
 
@@ -127,15 +126,22 @@ def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:
     if kind == 1:
         offset = _given(state, block, tool.offset)
     else:
-        if kind == 11 and state.work_system(_FIXTURE).rotation != state.work_system().rotation:
-            found = "G10 L11 while G59.3 is rotated otherwise than the work system in force is not supported"
-            raise WordFault(block.at["one-shot"], f"{found}; write the tool's length with G10 L1")
-        base = state.in_system() - state.g92 if kind == 10 else state.in_system(_FIXTURE)
-        offset = tool.offset.copy()
-        for axis in _axes(block):
-            offset[axis] = base[axis] - coordinate(state, block, axis)
+        offset = _offset_from_place(state, block, tool, kind)
     diameter = 2.0 * block.value["R"] * state.unit if "R" in block.value else tool.diameter
     state.tools[number] = Tool(offset, diameter)
+
+
+def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:
+    """(3,) the tool's offset with which the place has the block's coordinates: in the system in force (L10), or in G59.3 without G92 (L11)
+    [mm]."""
+    system = state.work_system(_FIXTURE if kind == 11 else 0)
+    place = system.turn(state.position - system.origin, -1.0)
+    if kind == 10:
+        place = place - state.g92
+    offset = np.array(system.turn(tool.offset, -1.0))
+    for axis in _axes(block):
+        offset[axis] = place[axis] - coordinate(state, block, axis)
+    return system.turn(offset)
 
 
 def _offset_of(state: State, number: int, block: Block, note: Note) -> FloatArray:

@@ -1,6 +1,6 @@
 """The modal state of the interpreter, and where the offsets put a coordinate.
 
-    machine position = origin of the work system + R (programmed coordinate * unit + G92 offset + tool offset)
+    machine position = origin of the work system + tool offset + R (programmed coordinate * unit + G92 offset)
 
 R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm and all positions in machine coordinates, so
 that changing an offset moves nothing.
@@ -100,6 +100,8 @@ class State:
     to_level     : canned cycles retract to the level before them (G98), not to R (G99)
     retract_given : a G98 or G99 was read
     series       : canned cycles in force
+    cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
+    strict       : nothing is assumed (`Reading.strict`)
     in_thread    : the last block was cut in step with the spindle
     """
 
@@ -130,7 +132,9 @@ class State:
     to_level: bool = False
     retract_given: bool = False
     series: Series | None = None
+    cycle_dwell: float = 0.0
     in_thread: bool = False
+    strict: bool = False
 
     @property
     def is_plain(self) -> bool:
@@ -148,22 +152,22 @@ class State:
         self.offset[:] = self.g92 + system.origin + self.tool_offset
 
     def in_system(self, code: int = 0) -> FloatArray:
-        """(3,) the position in a work system, or the one in force, before G92 and the tool are taken off [mm]."""
+        """(3,) the position in a work system, or the one in force, before G92 is taken off [mm]."""
         system = self.work_system(code)
-        return system.turn(self.position - system.origin, -1.0)
+        return system.turn(self.position - system.origin - self.tool_offset, -1.0)
 
     def programmed(self) -> FloatArray:
         """(3,) the position in programmed coordinates [mm]."""
         if not self.rotated:
             return self.position - self.offset
-        return self.in_system() - self.g92 - self.tool_offset
+        return self.in_system() - self.g92
 
     def machine(self, point: FloatArray) -> FloatArray:
         """(3,) machine position of programmed coordinates (3,) [mm]."""
         if not self.rotated:
             return point + self.offset
         system = self.work_system()
-        return system.origin + system.turn(point + self.g92 + self.tool_offset)
+        return system.origin + self.tool_offset + system.turn(point + self.g92)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ moved back by K - d, at the compound angle Q along z:
     from  z0 + t d tan Q  to  z1 - t (K - d) tan Q,   cut at x0 + s (|I| + d),   cleared at x0 - s (K - d)
 
 Tapers of length E at its entry (L1), its end (L2) or both (L3) lead between the peak line of the pass and its depth; on them the
-pitch along z stays P. Lengths are in programmed units, depths are radii.
+pitch along z stays P. Lengths are in programmed units. In diameter mode (G7) I, J and K are diameters too.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ENTRY, _END = 1, 2  # bits of L
 
 @dataclass(frozen=True)
 class Thread:
-    """A thread in programmed coordinates and units, x as a radius.
+    """A thread in programmed coordinates and units, x and depths as radii.
 
     start, end  : (x, z) of the drive line and z of its end
     peak        : I, from the drive line to the thread's peak;  depth : K;  first : J;  degression : R;  angle : Q [degrees]
@@ -116,12 +116,13 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
             block.at["Q"], f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees"
         )
     here = state.programmed() / state.unit
+    part = 0.5 if state.diameters else 1.0
     thread = Thread(
         start=(float(here[0]), float(here[2])),
         end=end / state.unit,
-        peak=value["I"],
-        depth=value["K"],
-        first=value["J"],
+        peak=part * value["I"],
+        depth=part * value["K"],
+        first=part * value["J"],
         pitch=abs(value["P"]),
         degression=max(value.get("R", 1.0), 1.0),
         angle=value.get("Q", 0.0),

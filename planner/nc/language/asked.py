@@ -13,6 +13,7 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.program import PathControl
+from planner.nc.state import System
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
@@ -230,7 +231,9 @@ class FanucAsked(Asked):
 
     numbers = frozenset(
         (*range(4001, 4131), *range(4201, 4331), *range(5001, 5009), *range(5021, 5029), *range(5041, 5049))
-    ) | frozenset((*range(5201, 5209), *range(5221, 5327), *range(3000, 3020)))
+    ) | frozenset(
+        (*range(5201, 5209), *range(5221, 5327), *range(3000, 3020), *range(1000, 1200), *range(2000, 3000))
+    )
 
     def get(self, parameter: int | str, depth: int) -> float:
         """The value of a parameter by its number; `depth` calls are open. Raises ValueError for what only the control knows."""
@@ -268,7 +271,21 @@ class FanucAsked(Asked):
         )
 
     def put(self, number: int, value: float | None) -> None:
-        """Assign to a parameter of the control. Raises ValueError: an alarm, or a state that is changed by codes."""
+        """Assign to a parameter of the control: a work offset. Raises ValueError: an alarm, or a state that is changed by codes."""
         if number == 3000:
             raise ValueError(f"the program raises its alarm {value or 0:g} here")
+        if 3001 <= number <= 3007:
+            return  # timers and what the operator may do: nothing moves
+        if 5221 <= number <= 5326 and (number - 5221) % 20 < 3:
+            self._set_offset(number - 5221, value or 0.0)
+            return
         super().put(number, value)
+
+    def _set_offset(self, place: int, value: float) -> None:
+        state = self.interpreter.state
+        code = _SYSTEMS[place // 20]
+        old = state.work_system(code)
+        origin = old.origin.copy()
+        origin[place % 20] = value * state.unit
+        state.systems[code] = System(origin, old.rotation)
+        state.apply_offsets()

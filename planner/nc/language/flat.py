@@ -12,11 +12,9 @@ from pathlib import PurePath
 from planner.machine import Machine
 from planner.nc.events import plain
 from planner.nc.faults import require_none
-from planner.nc.interpreter import Interpreter
-from planner.nc.language.detect import dialect_of
-from planner.nc.language.expand import expand
-from planner.nc.lexer import Words, split_words
+from planner.nc.lexer import Words
 from planner.nc.program import Program
+from planner.nc.reader import execute, interpret
 from planner.nc.reading import Reading
 
 DECIMALS = 7  # of a number
@@ -64,11 +62,12 @@ def flat_program(
 
     Raises InputError for the first construct that is not supported or not valid.
     """
-    words = split_words(data, block_delete=reading.block_delete)
-    dialect = dialect_of(words, reading)
-    if dialect is None:
+    program, faults = interpret(data, machine, reading, source=source)
+    require_none(faults, source)
+    if program.expansion is None:
         return None
     flat = Flat(source)
-    program, faults = expand(Interpreter(machine, source, reading), words, dialect, flat.add)
-    require_none(faults, source)
+    execute(
+        data, machine, program.reading, source, flat.add
+    )  # once more, now that it is known how arc centres are read
     return flat.text(), program

@@ -1,8 +1,8 @@
 """Languages that are not RS274NGC, by what only they contain.
 
 Conversational Heidenhain programs and Siemens programs with their commands and assignments cannot be read word by word: a message
-about their first odd letter would not help. Plotter files (HPGL) are read, by `planner.nc.hpgl`. The marks below occur in no
-RS274NGC program outside comments.
+about their first odd letter would not help. The former are read by `planner.nc.language.heidenhain`, plotter files (HPGL) by
+`planner.nc.hpgl`. The marks below occur in no RS274NGC program outside comments.
 """
 
 from __future__ import annotations
@@ -24,15 +24,10 @@ class _Dialect:
 _LOOKED_AT = 20_000  # bytes at the start of a file that tell its language
 _RS274 = "choose a post-processor for RS274NGC (LinuxCNC, grbl, Mach3) in the CAM system"
 
+_CONVERSATIONAL = re.compile(
+    rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b", re.MULTILINE | re.IGNORECASE
+)
 _DIALECTS = (
-    _Dialect(
-        "a conversational Heidenhain program",
-        re.compile(
-            rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b",
-            re.MULTILINE | re.IGNORECASE,
-        ),
-        _RS274,
-    ),
     _Dialect(
         "a Siemens (Sinumerik) program",
         re.compile(
@@ -62,6 +57,11 @@ def is_plotter_file(data: bytes, source: str) -> bool:
     if _HPGL.match(head):
         return True
     return source.lower().endswith(PLOTTER_SUFFIXES) and not _NC.match(head)
+
+
+def is_conversational(data: bytes) -> bool:
+    """Whether a text is a conversational Heidenhain program."""
+    return _CONVERSATIONAL.search(data[:_LOOKED_AT]) is not None
 
 
 def recognise(data: bytes) -> Fault | None:

@@ -10,13 +10,13 @@ from pathlib import Path
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.machine import Machine
-from planner.nc.dialects import is_plotter_file, recognise
+from planner.nc.dialects import is_conversational, is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import dialect_of
-from planner.nc.lexer import split_words
+from planner.nc.lexer import split_words, text_alone
 from planner.nc.program import Program
-from planner.nc.reading import AS_USUAL, Reading
+from planner.nc.reading import AS_USUAL, AUTO, HEIDENHAIN, Reading
 
 
 def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
@@ -55,6 +55,10 @@ def interpret(
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
+    if reading.dialect == HEIDENHAIN or (reading.dialect == AUTO and is_conversational(data)):
+        from planner.nc.language.expand import expand
+
+        return expand(Interpreter(machine, source, reading), text_alone(data), HEIDENHAIN)
     foreign = recognise(data)
     words = split_words(b"" if foreign else data, block_delete=reading.block_delete)
     if not foreign and not len(words.line):

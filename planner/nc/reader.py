@@ -10,13 +10,13 @@ from pathlib import Path
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.machine import Machine
-from planner.nc.dialects import is_conversational, is_plotter_file, recognise
+from planner.nc.dialects import is_plotter_file, language_of
 from planner.nc.faults import Fault, require_none
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import dialect_of
 from planner.nc.lexer import split_words, text_alone
 from planner.nc.program import Program
-from planner.nc.reading import AS_USUAL, AUTO, HEIDENHAIN, Reading
+from planner.nc.reading import AS_USUAL, AUTO, HEIDENHAIN, SIEMENS, Reading
 
 
 def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
@@ -45,7 +45,7 @@ def interpret(
 ) -> tuple[Program, Sequence[Fault]]:
     """Run a program to its end, past everything that is not supported.
 
-    Returns the program and the faults, in the order of the lines. A program in another language is one fault, and nothing of it is run.
+    Returns the program and the faults, in the order of the lines.
 
     Raises InputError for an empty or binary text.
     """
@@ -55,23 +55,23 @@ def interpret(
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
-    if reading.dialect == HEIDENHAIN or (reading.dialect == AUTO and is_conversational(data)):
-        from planner.nc.language.expand import expand
+    language = language_of(data) if reading.dialect == AUTO else reading.dialect
+    if language == HEIDENHAIN:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
         return expand(Interpreter(machine, source, reading), text_alone(data), HEIDENHAIN)
-    foreign = recognise(data)
-    words = split_words(b"" if foreign else data, block_delete=reading.block_delete)
-    if not foreign and not len(words.line):
+    words = split_words(data, block_delete=reading.block_delete)
+    if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     interpreter = Interpreter(machine, source, reading)
-    dialect = dialect_of(words, reading)
+    dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
     if dialect is not None:
-        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+        from planner.nc.language.expand import expand
 
         return expand(interpreter, words, dialect)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
-    return interpreter.program(), [foreign] if foreign else interpreter.faults()
+    return interpreter.program(), interpreter.faults()
 
 
 def load(path: str | Path) -> bytes:

@@ -280,7 +280,11 @@ class Interpreter:
         if code is None or code in (40, 530):
             return
         motion = block.g.get("motion")
-        if code in _COVET_AXES and motion is not None:
+        if code in (280, 300) and motion == 0 and not self.state.strict:
+            self.note(
+                f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
+            )
+        elif code in _COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",

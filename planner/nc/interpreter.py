@@ -20,7 +20,7 @@ from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
 from planner.nc import codes, drilling, feeds, homing, moves, offsets, signals, threads
 from planner.nc.assumed import Assumed
-from planner.nc.block import Block, read_block
+from planner.nc.block import OFFSET_NUMBER, Block, read_block
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
@@ -49,6 +49,7 @@ class Interpreter:
 
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
+    open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -58,7 +59,9 @@ class Interpreter:
         self.state = self.setup.start()
         self.store = Store()
         self.assumed = Assumed(reading)
+        self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
+        self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
         self._begun = False
         self._read = 0  # rows of the last chunk
@@ -101,8 +104,8 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
-        self.assumed.count_letters(words, row)
         self._keep_faults(words)
+        self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
         """Say it if the last chunk, `words`, goes on after the end of the program."""
@@ -110,6 +113,11 @@ class Interpreter:
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
+
+    @property
+    def all_arcs_close_otherwise(self) -> bool:
+        """Whether there are arcs that do not close, and all of them would with their centres read the other way."""
+        return bool(self.open_arcs) and all(otherwise for _, otherwise in self.open_arcs)
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
@@ -123,6 +131,7 @@ class Interpreter:
         """Keep the chunk's faults in the order of its words."""
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         for word, message in sorted(found + self._reports):
             key = (int(words.at[word]), message)
@@ -145,6 +154,8 @@ class Interpreter:
         try:
             return self._execute(block)
         except WordFault as fault:
+            if isinstance(fault, moves.ArcFault):
+                self.open_arcs.append((block.line, fault.otherwise))
             self.report(fault.word, fault.message)
             return block.m.get("stopping") in (20, 300)
 
@@ -269,7 +280,11 @@ class Interpreter:
         if code is None or code in (40, 530):
             return
         motion = block.g.get("motion")
-        if code in _COVET_AXES and motion is not None:
+        if code in (280, 300) and motion == 0 and not self.state.strict:
+            self.note(
+                f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
+            )
+        elif code in _COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
@@ -289,6 +304,7 @@ class Interpreter:
             if letter in block.value and not self.assumed.may_stand(
                 letter, block.value[letter], absolute=self.state.absolute
             ):
+                self.assumed.moved.add(letter)
                 self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
 
     def _motion(self, block: Block) -> None:
@@ -302,6 +318,8 @@ class Interpreter:
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
+        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
         if not moves.is_move(state, block):
             if "motion" in block.g and state.motion > 3:

@@ -101,6 +101,7 @@ class State:
     retract_given : a G98 or G99 was read
     series       : canned cycles in force
     cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
+    strict       : nothing is assumed (`Reading.strict`)
     in_thread    : the last block was cut in step with the spindle
     """
 
@@ -133,6 +134,7 @@ class State:
     series: Series | None = None
     cycle_dwell: float = 0.0
     in_thread: bool = False
+    strict: bool = False
 
     @property
     def is_plain(self) -> bool:

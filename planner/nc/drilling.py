@@ -152,8 +152,8 @@ def _to(state: State, store: Store, line: int, step: Step) -> None:
         a, b = IN_PLANE[state.normal]
         point[[a, b, state.normal]] = step.place
         end = state.machine(point * state.unit)
-        if step.kind == Kind.LINE or (end != state.position).any():
-            state.position[:] = end
+        if step.kind == Kind.LINE or (end != state.place).any():
+            state.position[:], state.actual = end, None
             store.add(step.kind, line, state)
 
 

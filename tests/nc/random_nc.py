@@ -185,4 +185,48 @@ def lathe(rng: Rng) -> str:
     return "\n".join(lines) + "\nM2\n"
 
 
-KINDS = {"cycles": cycles, "offsets": offsets, "feeds": feeds, "lathe": lathe}
+def compensated(rng: Rng) -> str:
+    """Cutter radius compensation on both sides, in G17 and G18, around lines and arcs; some tools do not fit, some paths gouge."""
+    plane = rng.integers(2)
+    a, b = ("XY", "ZX")[plane]
+    i, j = ("IJ", "KI")[plane]
+    c = "ZY"[plane]
+    diameter = rng.uniform(0.5, 4.0)
+    lines = [f"G21 G{17 + plane} G0 X0 Y0 Z0", "F120"]
+    if plane == 0 and rng.random() < 0.3:
+        lines.append(f"G10 L2 P1 R{number(rng, -180, 180)}")
+    lines.append(f"G{rng.integers(41, 43)}.1 D{diameter:.3f}")
+    lines.append(f"G{rng.integers(2)} {a}{number(rng, 10, 20)} {b}{number(rng, -10, 10)} ")
+    heading = rng.uniform(0, 2 * np.pi)
+    for _ in range(rng.integers(2, 14)):
+        choice = rng.integers(12)
+        heading += rng.normal(0.0, 0.9) if rng.random() < 0.7 else 0.0
+        if choice < 6:
+            size = rng.uniform(2, 15)
+            code = "" if rng.random() < 0.2 and lines[-1].startswith("G91 G1") else f"G{0 if rng.random() < 0.1 else 1} "
+            z = f" {c}{number(rng, -1, 1)}" if rng.random() < 0.2 else ""
+            f = f" F{number(rng, 50, 200)}" if rng.random() < 0.2 else ""
+            lines.append(f"G91 {code or 'G1 '}{a}{size * np.cos(heading):.4f} {b}{size * np.sin(heading):.4f}{z}{f}")
+        elif choice < 9:
+            size, sweep = rng.uniform(1.5, 9), rng.uniform(0.2, 5.5) if rng.random() < 0.3 else rng.uniform(0.2, 2)
+            turning = rng.choice([-1, 1])
+            centre = size * np.array([-np.sin(heading), np.cos(heading)]) * turning
+            spoke = complex(*-centre) * np.exp(1j * turning * sweep)
+            end = complex(*centre) + spoke
+            heading += turning * sweep
+            lines.append(
+                f"G91 G{3 if turning > 0 else 2} {a}{end.real:.5f} {b}{end.imag:.5f} {i}{centre[0]:.5f} {j}{centre[1]:.5f}"
+                + (f" {c}{number(rng, -1, 1)}" if rng.random() < 0.2 else "")
+            )
+        elif choice == 9:
+            lines.append(f"G90 G1 {c}{number(rng, -3, 3)}")
+        elif choice == 10:
+            lines.append(pick(rng, "M3", "G4 P0.5", "S300", "M0", "F200"))
+        elif rng.random() < 0.3:
+            lines += ["G40", f"G91 G{rng.integers(2)} {a}{number(rng, -30, 30)} {b}20"]
+            lines += [f"G{rng.integers(41, 43)}.1 D{diameter / 2:.3f}", f"G91 G1 {a}{number(rng, 5, 10)} {b}-3"]
+    lines += ["G40 G90", f"G0 {a}{number(rng, -30, 30)}"]
+    return "\n".join(lines) + "\nM2\n"
+
+
+KINDS = {"compensated": compensated, "cycles": cycles, "offsets": offsets, "feeds": feeds, "lathe": lathe}

@@ -36,9 +36,10 @@ def check_words(state: State, block: Block) -> None:
 
 def _system_in_force(state: State, block: Block) -> bool:
     number = round(block.value.get("P", 0.0))
-    return number == 0 or {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}[
-        state.system
-    ] == number
+    return (
+        number == 0
+        or {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}[state.system] == number
+    )
 
 
 def _refusal(name: str) -> str:
@@ -69,7 +70,10 @@ def switch(state: State, store: Store, block: Block, on: Cutter | None, note: No
     if state.normal == 1 and state.rotated:
         raise WordFault(word, f"{name} in G18 while the work system is rotated is not supported")
     if "L" in block.value:
-        raise WordFault(block.at["L"], f"the edge orientation L of {name} is not supported; remove it and write the tool's path")
+        raise WordFault(
+            block.at["L"],
+            f"the edge orientation L of {name} is not supported; remove it and write the tool's path",
+        )
     diameter = _diameter(state, block, code, note)
     if diameter == 0.0:
         return None

@@ -9,12 +9,12 @@ second turns by beta towards the tool's side (inner corner), away from it (outer
     inner corner    both offset moves end at their intersection: the one that crosses in the sense in which the programmed moves turn
     straight on     the second begins where the first ends
 
-An inner corner that takes more of a move than there is would gouge, and is refused. A turn by more than pi - `STRAIGHT_ON` is an outer
-corner on either side.
+An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to `STRAIGHT_ON`, is an outer
+corner between lines, and an inner one beside an arc.
 
 The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one that ends there with the
 programmed tangent). The move after G40 leads straight from there to the programmed end. Moves along the normal alone keep the place in the
-plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after it is cut straight. All this is what LinuxCNC does.
+plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does.
 
 Lengths are machine coordinates in mm. Points and vectors in the plane are complex numbers: n(t) = i t.
 """
@@ -33,6 +33,7 @@ from planner.nc.state import State
 from planner.nc.store import Store
 
 STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
+_ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
 NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of coordinates around 1e3 mm
 
 _GOUGE = "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a smaller tool"
@@ -68,7 +69,7 @@ class Side:
 class _Open:
     """The last move, whose end the next corner may move.
 
-    row   : its block;  arc : its row among the arcs, or -1
+    row   : its block, or, once it is fixed, that of the first move along the normal after it, or -1;  arc : its row among the arcs, or -1
     begin : where the tool begins it
     sweep : of an arc, as it is now
     fixed : its end is not moved any more
@@ -84,7 +85,9 @@ class _Open:
 
 def meeting(before: Side, after: Side, sense: float) -> complex | None:
     """Where two offset moves cross in a sense (the sign of the turn from the one to the other), or None."""
-    crossing = [p for p in _crossings(before, after) if _cross(before.tangent(p), after.tangent(p)) * sense > 0]
+    crossing = [
+        p for p in _crossings(before, after) if _cross(before.tangent(p), after.tangent(p)) * sense > 0
+    ]
     return min(crossing, key=lambda p: abs(p - before.end)) if crossing else None
 
 
@@ -169,36 +172,45 @@ class Cutter:
         if not self.started:
             side, sweep = self._entry_arc(side, start, sweep)
         else:
-            self._corner(start, side, Kind.ARC, line)
-        self._add(side, target, Kind.ARC, line, sweep=sweep, entry=not self.started)
+            inner = self._corner(start, side, Kind.ARC, line)
+            sweep -= self._left_out(side, allowed_back=STRAIGHT_ON if not inner else _ROUNDING)
+        if sweep * turning <= 0:
+            raise CutterFault(_GOUGE)
+        self._add(side, target, Kind.ARC, line, sweep)
 
     def fix(self) -> None:
         """The place is fixed: a stop, G40 or the end of the program. Raises CutterFault if the last move would gouge."""
         if self._open is not None:
             self._settle(self._open)
-            self._open.fixed = True
+            self._open.fixed, self._open.row = True, -1
 
     # --- corners ------------------------------------------------------------------------------------------------------------
 
-    def _corner(self, corner: complex, side: Side, kind: Kind, line: int) -> None:
-        """Join the open move to the next at a programmed corner."""
+    def _corner(self, corner: complex, side: Side, kind: Kind, line: int) -> bool:
+        """Join the open move to the next at a programmed corner; True for an inner one."""
         assert self._open is not None
         before = self._open.side
         turn = cmath.phase(side.first / before.last) * self._sign  # towards the tool's side
-        if STRAIGHT_ON < turn < math.pi - STRAIGHT_ON:
-            self._inner_corner(side, turn * self._sign)
+        back = math.pi - abs(turn) < STRAIGHT_ON
+        outer = not (side.turning or before.turning) if back else turn < -STRAIGHT_ON
+        inner = not outer and (back or turn > STRAIGHT_ON)
+        if inner:
+            self._inner_corner(side)
         self._settle(self._open)
-        if turn < -STRAIGHT_ON or turn >= math.pi - STRAIGHT_ON:
+        if outer:
             self._outer_corner(corner, self._beside(corner, side.first), kind, line)
+        return inner
 
-    def _inner_corner(self, side: Side, sense: float) -> None:
+    def _inner_corner(self, side: Side) -> None:
         open_ = self._open
         assert open_ is not None
-        if open_.fixed:
-            return
-        point = meeting(open_.side, side, sense)
+        point = meeting(open_.side, side, self._sign)
         if point is None:
             raise CutterFault(_GOUGE)
+        if open_.fixed:
+            if open_.row >= 0:
+                self._move_end(open_.row, point)
+            return
         if open_.arc >= 0:
             left_out = _turn(point, open_.side.end, open_.side)
             open_.sweep -= left_out
@@ -224,7 +236,7 @@ class Cutter:
 
     def _settle(self, open_: _Open) -> None:
         """See that the open move still leads forward, now that its end is known; write an arc's sweep."""
-        if open_.arc >= 0:
+        if open_.arc >= 0 and not open_.fixed:
             block, centre, normal, _ = self._store.arcs[open_.arc]
             self._store.arcs[open_.arc] = (block, centre, normal, open_.sweep)
         elif not open_.fixed and _dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
@@ -232,18 +244,10 @@ class Cutter:
 
     # --- blocks -------------------------------------------------------------------------------------------------------------
 
-    def _add(
-        self, side: Side, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0, entry: bool = False
-    ) -> None:
+    def _add(self, side: Side, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
         state, store = self._state, self._store
         assert state.actual is not None
         begin, before = self._plane(state.actual), state.actual
-        if kind == Kind.ARC and not entry:
-            # what an inner corner took off its start
-            start = side.centre + side.radius * side.first / (1j * side.turning)
-            sweep -= _turn(start, begin, side)
-            if sweep * side.turning <= 0:
-                raise CutterFault(_GOUGE)
         state.position[:] = target
         state.actual = self._at(side.end, target)
         store.make_room(2)
@@ -254,6 +258,15 @@ class Cutter:
         else:
             store.add(kind, line, state)
         self._open = _Open(side, row, arc, begin, sweep)
+
+    def _left_out(self, side: Side, allowed_back: float) -> float:
+        """What the corner at the start of an arc takes off its sweep [rad]."""
+        assert self._state.actual is not None
+        start = side.centre + side.radius * side.first / (1j * side.turning)
+        left_out = _turn(start, self._plane(self._state.actual), side)
+        if left_out * side.turning < -allowed_back:
+            raise CutterFault(_GOUGE)
+        return left_out
 
     def _entry_arc(self, side: Side, start: complex, sweep: float) -> tuple[Side, float]:
         """The arc from where the tool is that ends at the offset end with the programmed tangent."""
@@ -284,6 +297,8 @@ class Cutter:
         state.position[:] = target
         state.actual = self._at(place, target)
         self._store.make_room(1)
+        if self._open is not None and self._open.row < 0:
+            self._open.row = self._store.blocks
         self._store.add(kind, line, state)
 
     def _move_end(self, row: int, point: complex) -> None:

@@ -42,7 +42,10 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
     _check_spindle(state, code, word)
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
     if not state.retract_given:
-        note(f"{name} before any G98 or G99: holes end at R (G99), as LinuxCNC has it; some controls start with G98", block.line)
+        note(
+            f"{name} before any G98 or G99: holes end at R (G99), as LinuxCNC has it; some controls start with G98",
+            block.line,
+        )
     clear = words["R"] + (0.0 if state.absolute else series.level)
     bottom = words["XYZ"[normal]] + (0.0 if state.absolute else clear)
     if bottom > clear:
@@ -83,7 +86,9 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
             _to(state, store, block.line, step)
         here[normal] = retract
     if code == 880:
-        note("G88: the operator retracts the tool after the full stop; the plan has a rapid for it", block.line)
+        note(
+            "G88: the operator retracts the tool after the full stop; the plan has a rapid for it", block.line
+        )
     if code in cycles.TAPPING:
         note(
             f"{name} is synchronised with the spindle: planned with F as its upper limit and full stops at both ends, "

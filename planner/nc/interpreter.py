@@ -335,7 +335,8 @@ class Interpreter:
         state = self.state
         if self._cutter is None and state.actual is not None:
             raise WordFault(
-                block.motion_word(), "the move after G40 must be straight; write G0 or G1 to where this arc begins"
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
             )
         try:
             arc, normal = moves.arc(state, block, target)

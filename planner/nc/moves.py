@@ -20,7 +20,14 @@ from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_
 from planner.nc.block import Block, unused
 from planner.nc.state import REFUSED_MOTION, State
 
-_ROUNDING = {"T": 1e-4, "H": 1e-4, "D": 1e-4, "L": 1e-4, "Q": 1e-4, "P": 1e-3}  # what RS274NGC rounds away from a whole number
+_ROUNDING = {
+    "T": 1e-4,
+    "H": 1e-4,
+    "D": 1e-4,
+    "L": 1e-4,
+    "Q": 1e-4,
+    "P": 1e-3,
+}  # what RS274NGC rounds away from a whole number
 
 
 class WordFault(Exception):

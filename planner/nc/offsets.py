@@ -40,7 +40,9 @@ def set_tool_offset(state: State, block: Block, note: Note) -> None:
         state.tool_offset = _offset_of(state, tool, block, note)
     elif "H" in block.value:
         if block.has("XYZ"):
-            raise WordFault(block.at["H"], "G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines")
+            raise WordFault(
+                block.at["H"], "G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines"
+            )
         state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, note)
     elif block.has("XYZ"):
         state.tool_offset = state.tool_offset + _given(state, block, np.zeros(3))
@@ -88,7 +90,8 @@ def set_data(state: State, block: Block, note: Note) -> None:
     else:
         word = block.at["L"] if kind >= 0 else block.at["one-shot"]
         raise WordFault(
-            word, "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them"
+            word,
+            "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them",
         )
 
 
@@ -117,7 +120,9 @@ def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:
     tool = state.tools.get(number) or Tool(np.zeros(3))
     for letter in "IJQ":
         if letter in block.value:
-            note(f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge", block.line)
+            note(
+                f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge", block.line
+            )
     if kind == 1:
         offset = _given(state, block, tool.offset)
     else:

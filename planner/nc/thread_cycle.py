@@ -108,10 +108,13 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
         raise WordFault(block.at[letter], f"{letter} of G76 must not be 0: {_NEEDED[letter]}")
     if not 0 < value["J"] < value["K"]:
         raise WordFault(
-            block.at["J"], "J of G76, the depth of the first pass, must be above 0 and below K, the full depth"
+            block.at["J"],
+            "J of G76, the depth of the first pass, must be above 0 and below K, the full depth",
         )
     if not 0 <= value.get("Q", 0.0) <= ANGLE_MAX:
-        raise WordFault(block.at["Q"], f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees")
+        raise WordFault(
+            block.at["Q"], f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees"
+        )
     here = state.programmed() / state.unit
     part = 0.5 if state.diameters else 1.0
     thread = Thread(

@@ -100,8 +100,11 @@ def _feed(state: State, block: Block, pitch: float) -> float:
     name, spindle = f"G{codes.number(state.motion)}", state.spindle
     if spindle.surface_speed:
         raise WordFault(
-            block.motion_word(), f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S"
+            block.motion_word(),
+            f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S",
         )
     if not spindle.turning or not spindle.speed > 0:
-        raise WordFault(block.motion_word(), f"{name} needs the spindle turning; write S and M3 or M4 before it")
+        raise WordFault(
+            block.motion_word(), f"{name} needs the spindle turning; write S and M3 or M4 before it"
+        )
     return pitch * state.unit * spindle.speed / SECONDS_PER_MINUTE

@@ -97,6 +97,7 @@ class Machine(_Record):
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
     feed_max            : largest feed along the path [mm/s], or None
+    feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
     """
@@ -107,6 +108,7 @@ class Machine(_Record):
     path_control: Literal["blend", "exact_path", "exact_stop"] = "blend"
     axes: dict[str, Axis]
     feed_max: Positive | None = None
+    feed_default: Positive | None = None
     normal_acceleration: Positive | None = None
     blend_rapids: bool = False
     fir: Fir | None = None

@@ -13,7 +13,7 @@ import typer
 
 from planner.base import names
 from planner.base.errors import InputError
-from planner.nc.reading import ARC_CENTRES, EXTRUDERS, Reading, ignore_list
+from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore_list
 
 DEFAULT_MACHINE = "mill"
 
@@ -155,6 +155,15 @@ _READING: dict[str, tuple[Any, Any]] = {
             _one_of(EXTRUDERS),
             "what to do with the E words of a 3-D printer",
             "|".join(EXTRUDERS),
+        ),
+    ),
+    "dialect": (
+        str,
+        _choice(
+            "--dialect",
+            _one_of(DIALECTS),
+            "whose language parameters, expressions and subprograms are; auto: by what the program holds",
+            "|".join(DIALECTS),
         ),
     ),
 }

@@ -25,6 +25,15 @@ class Refusal:
         return f"{self.what} not supported; {self.remedy}"
 
 
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """Something counted and said once: its name for one and for many, and what is assumed of it."""
+
+    one: str
+    many: str
+    said: str
+
+
 G_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 30), "motion"),
     **dict.fromkeys((330, 331, 730, 740, 760, *range(810, 900, 10)), "motion"),
@@ -69,8 +78,9 @@ M_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),
     **dict.fromkeys((30, 40, 50), "spindle"),
     60: "tool change",
+    190: "spindle orientation",
     **dict.fromkeys((70, 80, 90), "coolant"),
-    **dict.fromkeys((480, 490), "override"),
+    **dict.fromkeys((480, 490, 500, 510, 520, 530), "override"),
     **dict.fromkeys(range(620, 690, 10), "signals"),
     610: "tool number",
 }
@@ -86,7 +96,8 @@ G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((50, 51, 52, 53), _SPLINE),
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
     **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
-    **dict.fromkeys((500, 510), Refusal("scaling is", "write the scaled coordinates out")),
+    500: Refusal("presetting coordinates with G50 is", "write G92", True),
+    510: Refusal("scaling is", "write the scaled coordinates out"),
     **dict.fromkeys(
         (680, 690), Refusal("rotating the coordinate system is", "write the rotated coordinates out", True)
     ),
@@ -94,34 +105,36 @@ G_REFUSED: dict[int, Refusal] = {
 }
 
 M_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys(
-        (500, 510, 520, 530),
-        Refusal("switching overrides is", "remove it: a plan is made for the programmed feed"),
-    ),
-    190: Refusal("orienting the spindle is", "plan the parts before and after it"),
     **dict.fromkeys((700, 710, 720, 730), Refusal("saving and restoring modes is", "write the modes out")),
     **dict.fromkeys((980, 990), Refusal("a subprogram is", "write its blocks out")),
 }
 
 
-def unknown(letter: str, code: int) -> Refusal:
-    """The refusal of a code that no table names."""
+def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
+    """The refusal of a code that no table names; one that is not refused by `strict` alone may move."""
+    if letter == "M" and not strict:
+        what = "an M code that this reader does not know, and that may move with its words or by itself, is"
+        return Refusal(what, f"write G0 or G1, or give --ignore M{number(code)} if nothing moves", True)
     if letter == "M":
         if 1000 <= code <= 1990:
             return Refusal("a command that each machine defines for itself is", "remove it if nothing moves")
         return Refusal("an M code that RS274NGC does not know is", "remove it if nothing moves")
-    return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
+    what, remedy = "a G code that RS274NGC does not know is", "write it with the codes of RS274NGC"
+    return Refusal(what, f"{remedy}, or give --ignore G{number(code)} if nothing moves", True)
 
 
 # Letters that no supported code uses.
 LETTERS_REFUSED: dict[str, Refusal] = {
-    **dict.fromkeys("ABC", Refusal("a rotary axis is", _POST)),
-    **dict.fromkeys("UVW", Refusal("a second linear axis is", _POST)),
+    **dict.fromkeys("ABC", Refusal("a rotary axis that moves is", _POST)),
+    **dict.fromkeys("UVW", Refusal("a second linear axis that moves is", _POST)),
     "E": Refusal(
-        "an extruder axis (or a number with an exponent) is", "remove E words, write numbers out in digits"
+        "an extruder axis is", "give --extruder ignore to plan the motion of the other axes without it"
     ),
     "O": Refusal("a subprogram or O word is", "write its blocks out, or remove a mere program number"),
 }
+
+# Axes that are not planned: they may be named as long as they stand still.
+PARKABLE = "ABCUVW"
 
 # Letters that only some words use: "I word without G2 or G3".
 LETTER_NEEDS = {
@@ -142,13 +155,14 @@ CHARACTERS: dict[str, str] = {
     "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
     "[": "expressions are not supported; write the number out",
     "<": "named parameters are not supported; write the number out",
-    "$": "commands to the control ($H, $J ...) are not supported; remove the line if nothing moves, else write G0 or G1",
+    "$": "this command to the control is not supported: it may move ($J does); write G0 or G1, or give --ignore $ if nothing moves",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     "@": "polar coordinates are not supported; write x and y",
     "^": "polar coordinates are not supported; write x and y",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
+    ",": "corner roundings and chamfers (,R and ,C) are not supported; write the arc or the line",
     "!": "a comment starts with ( or ;",
 }
 

@@ -30,6 +30,8 @@ def check_words(state: State, block: Block) -> None:
     sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
     if one_shot in _REFUSED_ONE_SHOTS or (sets_system and _system_in_force(state, block)):
         raise WordFault(block.at["one-shot"], _refusal(f"G{codes.number(one_shot)}"))
+    if block.homing:
+        raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
     if "tool change" in block.m:
         raise WordFault(block.at["tool change"], _refusal("M6"))
 

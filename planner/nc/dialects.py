@@ -1,4 +1,4 @@
-"""Languages that are not RS274NGC, by what only they contain.
+"""Languages that are not RS274NGC, by what only they contain, and files that are no programs at all.
 
 Conversational Heidenhain programs and Siemens programs with their commands and assignments cannot be read word by word: a message
 about their first odd letter would not help. Plotter files (HPGL) are read, by `planner.nc.hpgl`. The marks below occur in no
@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from planner.base.errors import InputError
 from planner.nc.faults import Fault
 from planner.nc.hpgl.lexer import CONTROL
 
@@ -54,6 +55,39 @@ _HPGL = re.compile(
 )
 _NC = re.compile(rb"\A(?:[%\s]|;[^\n]*|\([^)\n]*\)|/)*[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
+
+
+_CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
+_MODELS = (
+    # name, what only such a file starts with, what to do
+    (
+        "a drawing (DXF)",
+        re.compile(rb"\A\s*(?:999\s*\n[^\n]*\n\s*)*0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF"),
+        _CAM,
+    ),
+    ("a model (STL)", re.compile(rb"\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", re.IGNORECASE), _CAM),
+    ("a model (STEP)", re.compile(rb"\A\s*ISO-10303-21\s*;"), _CAM),
+    (
+        "a drawing (SVG)",
+        re.compile(rb"\A\s*(?:<\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*<svg\b", re.DOTALL),
+        _CAM,
+    ),
+    ("a document (PDF)", re.compile(rb"\A%PDF-\d"), _CAM),
+    ("an archive (ZIP, 3MF)", re.compile(rb"\APK\x03\x04"), "unpack it and give the program in it"),
+)
+# A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
+_STL_HEAD, _STL_TRIANGLE = 84, 50
+
+
+def refuse_models(data: bytes, source: str) -> None:
+    """Raise InputError for a drawing or a model: files that people have beside their programs."""
+    head = data[:_LOOKED_AT]
+    triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+    if triangles and len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
+        raise InputError(f"this is a model (STL), not a program; {_CAM}", source=source)
+    for name, mark, remedy in _MODELS:
+        if mark.search(head):
+            raise InputError(f"this is {name}, not a program; {remedy}", source=source)
 
 
 def is_plotter_file(data: bytes, source: str) -> bool:

@@ -78,7 +78,10 @@ def check_feed(state: State, block: Block) -> None:
             )
         state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
     if not state.feed > 0:
-        raise WordFault(word, f"{name} moves without a feed; write an F word on this line or before it")
+        raise WordFault(
+            word,
+            f"{name} moves without a feed; write an F word on this line or before it, or feed_default into the machine file",
+        )
 
 
 def feed_of_time(state: State, block: Block, length: float) -> None:

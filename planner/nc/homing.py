@@ -1,4 +1,4 @@
-"""G28 and G30: through the intermediate point, if there is one, to the machine's position."""
+"""G28 and G30: through the intermediate point, if there is one, to the machine's position; and homing by switches."""
 
 from __future__ import annotations
 
@@ -32,6 +32,20 @@ def go_home(state: State, store: Store, block: Block, note: Note) -> None:
         store.add(Kind.RAPID, block.line, state)
         state.position[:] = _some_axes(state, block, home)
     store.add(Kind.RAPID, block.line, state)
+
+
+def go_to_switches(state: State, store: Store, block: Block, note: Note) -> None:
+    """Homing ($H, or G28 with bare letters on 3-D printers): `block.homing` goes to the position of G28, or to machine zero."""
+    if not block.homing:
+        return
+    home = state.homes.get(280, np.zeros(3))
+    for letter in block.homing:
+        state.position["XYZ".index(letter)] = home["XYZ".index(letter)]
+    store.add(Kind.RAPID, block.line, state)
+    note(
+        "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not",
+        block.line,
+    )
 
 
 def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:

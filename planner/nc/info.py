@@ -7,6 +7,7 @@ tangents; moves of length zero are passed over, and a rapid, dwell or stop betwe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from planner.nc.reading import AS_USUAL, Reading
 
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
+PLACES_SHOWN = 100  # of what is not supported, in tables and summaries; the others are counted
 _NOWHERE = 1e-9  # a move shorter than this turns no corner [mm]: the rounding of coordinates around 1e3 mm
 
 
@@ -65,7 +67,7 @@ class ProgramInfo:
     dwell: float
     tools: tuple[int, ...]
     notes: tuple[str, ...]
-    unsupported: tuple[Fault, ...]
+    unsupported: Sequence[Fault]
 
 
 def inspect_program(
@@ -77,10 +79,10 @@ def inspect_program(
     """
     data = load(path)
     program, faults = interpret(data, machine, reading, source=str(path))
-    return describe(program, lines=len(data.splitlines()), unsupported=tuple(faults))
+    return describe(program, lines=len(data.splitlines()), unsupported=faults)
 
 
-def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = ()) -> ProgramInfo:
+def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ()) -> ProgramInfo:
     """The figures of a program that has been read."""
     start = np.vstack([program.start, program.end])[:-1]
     length = _lengths(program, start)

@@ -17,16 +17,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
 from planner.nc import codes, compensation, drilling, feeds, homing, moves, offsets, signals, threads
-from planner.nc.block import Block, read_block
+from planner.nc.assumed import Assumed
+from planner.nc.block import OFFSET_NUMBER, Block, read_block
 from planner.nc.cutter import Cutter, CutterFault
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
 from planner.nc.program import Frame, Kind, PathControl, Program
-from planner.nc.reading import AS_USUAL, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
@@ -49,6 +51,7 @@ class Interpreter:
 
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
+    open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -57,6 +60,10 @@ class Interpreter:
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
         self.store = Store()
+        self.assumed = Assumed(reading)
+        self.state.strict = reading.strict
+        self.state.absolute_centre = reading.arc_centres == ABSOLUTE
+        self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
         self._cutter: Cutter | None = None
         self._begun = False
@@ -75,10 +82,11 @@ class Interpreter:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed, each once, with its first line and how often."""
-        found = sorted(self._notes.items(), key=lambda note: note[1][0])
-        return tuple(
-            f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}" for text, (line, times) in found
-        )
+        found = [
+            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
+            for text, (line, times) in self._notes.items()
+        ]
+        return tuple(text for _, text in sorted(found + self.assumed.notes(), key=lambda note: note[0]))
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
@@ -86,11 +94,11 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(words, row, self.state, self.store)
+            after = run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
                 self.store.frame = int(words.frame[after])
-                block = read_block(words, after, self.report)
+                block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
                 elif block is not None:
@@ -100,6 +108,7 @@ class Interpreter:
             row = after
         self._read = row
         self._keep_faults(words)
+        self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
         """Say it if the last chunk, `words`, goes on after the end of the program."""
@@ -107,6 +116,11 @@ class Interpreter:
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
+
+    @property
+    def all_arcs_close_otherwise(self) -> bool:
+        """Whether there are arcs that do not close, and all of them would with their centres read the other way."""
+        return bool(self.open_arcs) and all(otherwise for _, otherwise in self.open_arcs)
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
@@ -120,6 +134,7 @@ class Interpreter:
         """Keep the chunk's faults in the order of its words."""
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         for word, message in sorted(found + self._reports):
             key = (int(words.at[word]), message)
@@ -142,6 +157,8 @@ class Interpreter:
         try:
             return self._execute(block)
         except WordFault as fault:
+            if isinstance(fault, moves.ArcFault):
+                self.open_arcs.append((block.line, fault.otherwise))
             self.report(fault.word, fault.message)
             return block.m.get("stopping") in (20, 300)
         except CutterFault as fault:
@@ -159,12 +176,16 @@ class Interpreter:
             self._dwell(block)
         self._modes(block)
         if not block.foreign:
+            self._check_parked(block)
+            homing.go_to_switches(self.state, self.store, block, self.note)
             self._one_shot(block)
             self._motion(block)
         stop = block.m.get("stopping")
         if stop is not None and self._cutter is not None:
             self._cutter.fix()
-        if stop in (0, 10, 600):
+        if stop == 600:
+            self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
             self.state.motion = REFUSED_MOTION
@@ -193,8 +214,10 @@ class Interpreter:
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
             store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop that takes no time", line)
-        for group in ("spindle", "coolant", "override"):
+            self.note("a tool change is a full stop that takes no time and moves nothing", line)
+        for letter, value in block.events:
+            store.add_event(letter, value, line)
+        for group in ("spindle", "spindle orientation", "coolant", "override"):
             if group in block.m:
                 store.add_event("M", block.m[group] / 10, line)
         state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
@@ -208,6 +231,12 @@ class Interpreter:
 
     def _dwell(self, block: Block) -> None:
         seconds = block.value.get("P")
+        if seconds is not None and self.assumed.printer:
+            seconds *= MILLISECOND
+            self.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        elif seconds is None and not self.assumed.strict and (self.assumed.printer or "S" in block.value):
+            seconds = block.value.get("S", 0.0)
+            self.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
         if seconds is None or seconds < 0:
             word = block.at["one-shot"] if seconds is None else block.at["P"]
             raise WordFault(
@@ -264,7 +293,11 @@ class Interpreter:
         if code is None or code in (40, 530):
             return
         motion = block.g.get("motion")
-        if code in _COVET_AXES and motion is not None:
+        if code in (280, 300) and motion == 0 and not self.state.strict:
+            self.note(
+                f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
+            )
+        elif code in _COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
@@ -278,6 +311,15 @@ class Interpreter:
         else:
             offsets.shift_origin(self.state, block)
 
+    def _check_parked(self, block: Block) -> None:
+        """Report words of axes that are not planned and would move."""
+        for letter in codes.PARKABLE:
+            if letter in block.value and not self.assumed.may_stand(
+                letter, block.value[letter], absolute=self.state.absolute
+            ):
+                self.assumed.moved.add(letter)
+                self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
+
     def _motion(self, block: Block) -> None:
         state, one_shot = self.state, block.g.get("one-shot")
         if "motion" in block.g:
@@ -289,6 +331,8 @@ class Interpreter:
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
+        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
         if not moves.is_move(state, block):
             if "motion" in block.g and state.motion > 3:
@@ -297,6 +341,8 @@ class Interpreter:
             return
         if state.motion < 0:
             raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
+        if not self.assumed.strict:
+            self._take_default_feed(block)
         if state.motion not in codes.CYCLES:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
@@ -312,6 +358,15 @@ class Interpreter:
             drilling.drill(state, self.store, block, self.note)
         else:
             self._move(block)
+
+    def _take_default_feed(self, block: Block) -> None:
+        """The machine's feed for a feed move before the first F word."""
+        state, default = self.state, self.setup.feed_default
+        if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
+            return
+        state.feed = default
+        feed = default * SECONDS_PER_MINUTE / state.unit
+        self.note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 
     def _move(self, block: Block) -> None:
         """G0, G1, G2, G3."""

@@ -59,6 +59,22 @@ class Frame:
     caller: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class Expansion:
+    """What was expanded to make a program of one that computes.
+
+    dialect : whose language it is: "linuxcnc" or "fanuc"
+    calls   : subprograms in the order of their first call, and how often each was called
+    turns   : turns of loops, jumps and calls
+    rows    : lines executed, each as often as it was
+    """
+
+    dialect: str
+    calls: tuple[tuple[str, int], ...]
+    turns: int
+    rows: int
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Program:
     """An NC program: B blocks over A axes.
@@ -81,6 +97,7 @@ class Program:
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
+    expansion    : what was expanded; None where nothing was
     reading      : the settings it was read with
     """
 
@@ -102,6 +119,7 @@ class Program:
     notes: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     frames: tuple[Frame, ...] = ()
+    expansion: Expansion | None = None
     reading: Reading = AS_USUAL
 
     def __post_init__(self) -> None:

@@ -4,18 +4,21 @@ and what to do. The content of a text says which of the two it is, and its name 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.machine import Machine
-from planner.nc.dialects import is_plotter_file, recognise
+from planner.nc.dialects import is_plotter_file, recognise, refuse_models
 from planner.nc.faults import Fault, require_none
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.detect import dialect_of
+from planner.nc.leader import without_leader
 from planner.nc.lexer import split_words
 from planner.nc.program import Program
-from planner.nc.reading import AS_USUAL, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, Reading
 
 
 def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
@@ -49,19 +52,52 @@ def interpret(
     Raises InputError for an empty or binary text.
     """
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
+    refuse_models(data, source)
     _check_text(data, source)
     if is_plotter_file(data, source):
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
     foreign = recognise(data)
-    words = split_words(b"" if foreign else data, block_delete=reading.block_delete)
-    if not foreign and not len(words.line):
+    if foreign:
+        return Interpreter(machine, source, reading).program(), [foreign]
+    run, program, faults = _run(data, machine, reading, source)
+    if reading.arc_centres == AUTO and not reading.strict and run.all_arcs_close_otherwise:
+        absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
+        other, as_absolute, found = _run(data, machine, absolute, source)
+        if not other.open_arcs:
+            return _with_note(as_absolute, run.open_arcs), found
+    return program, faults
+
+
+def _run(
+    data: bytes, machine: Machine | None, reading: Reading, source: str
+) -> tuple[Interpreter, Program, Sequence[Fault]]:
+    """Execute a program. Raises InputError if there is no word in it."""
+    data, leader = (data, "") if reading.strict else without_leader(data)
+    words = split_words(data, block_delete=reading.block_delete)
+    if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     interpreter = Interpreter(machine, source, reading)
+    if leader:
+        interpreter.note(f"the text before the first % is not read ({leader!r})", 1)
+    dialect = dialect_of(words, reading)
+    if dialect is not None:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+
+        return interpreter, *expand(interpreter, words, dialect)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
-    return interpreter.program(), [foreign] if foreign else interpreter.faults()
+    return interpreter, interpreter.program(), interpreter.faults()
+
+
+def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Program:
+    """The program, with the arcs for whose sake it was read with absolute centres."""
+    note = (
+        f"line {open_arcs[0][0]}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
+        "(--arc-centres absolute|incremental says which)"
+    )
+    return dataclasses.replace(program, notes=(note, *program.notes))
 
 
 def load(path: str | Path) -> bytes:

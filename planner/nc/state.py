@@ -102,6 +102,7 @@ class State:
     series       : canned cycles in force
     cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
     actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
+    strict       : nothing is assumed (`Reading.strict`)
     in_thread    : the last block was cut in step with the spindle
     """
 
@@ -135,6 +136,7 @@ class State:
     cycle_dwell: float = 0.0
     actual: FloatArray | None = None
     in_thread: bool = False
+    strict: bool = False
 
     @property
     def place(self) -> FloatArray:
@@ -179,12 +181,14 @@ class State:
 
 @dataclass(frozen=True)
 class Setup:
-    """What the machine says about a program: offsets, positions and tools; all zero without a machine."""
+    """What the machine says about a program: offsets, positions and tools, all zero without a machine; a feed [mm/s] where the program
+    gives none."""
 
     path_control: PathControl = PathControl.BLEND
     systems: dict[int, FloatArray] = field(default_factory=dict)
     positions: dict[int, FloatArray] = field(default_factory=dict)
     tools: dict[int, Tool] = field(default_factory=dict)
+    feed_default: float | None = None
 
     @classmethod
     def of(cls, machine: Machine | None) -> Setup:
@@ -195,6 +199,7 @@ class Setup:
             path_control=_PATH_CONTROL[machine.path_control],
             systems={_SYSTEMS[name]: _vector(given) for name, given in machine.work_offsets.items()},
             positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
+            feed_default=machine.feed_default,
             tools={
                 int(number): Tool(np.array([tool.x, 0.0, tool.length]), tool.diameter)
                 for number, tool in machine.tools.items()

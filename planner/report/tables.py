@@ -13,6 +13,7 @@ from rich.text import Text
 from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
+from planner.nc.info import PLACES_SHOWN
 from planner.report.optimum import held_by_text, price_rows
 
 if TYPE_CHECKING:
@@ -146,14 +147,16 @@ def info_table(info: ProgramInfo) -> Group:
 
 
 def _unsupported(faults: Sequence[Fault]) -> list[Text]:
-    """Every place of every fault, gathered by message: 10,000 expressions give one message, not 10,000."""
+    """The places of the faults, gathered by message, `PLACES_SHOWN` in all; the others are counted."""
     places: dict[str, list[str]] = {}
-    for fault in faults:
+    for fault in faults[:PLACES_SHOWN]:
         places.setdefault(fault.message, []).append(f"{fault.line}:{fault.column} {fault.word}")
-    said = [Text(f"not supported, {len(faults):,} places (line:column word):", style="bold red")]
+    more = len(faults) - PLACES_SHOWN
+    shown = f", the first {PLACES_SHOWN}" if more > 0 else ""
+    said = [Text(f"not supported, {len(faults):,} places{shown} (line:column word):", style="bold red")]
     for message, where in places.items():
         said += [Text(f"{message} ({len(where):,})"), Text("    " + ", ".join(where), style="dim")]
-    return said
+    return [*said, *([Text(f"and {more:,} more")] if more > 0 else [])]
 
 
 def machines_table(machines: Iterable[Machine]) -> Table:

@@ -131,7 +131,7 @@ def test_real_programs_agree(tmp_path: Path) -> None:
     read, refused = {}, []
     for path in PROGRAMS:
         try:
-            read[path] = read_program(path, reading=Reading(block_delete=False))
+            read[path] = read_program(path, reading=Reading(block_delete=False, strict=True))
         except InputError:
             refused.append(path.name)
     assert len(read) >= 25, f"only {len(read)} programs are read; refused: {refused}"
@@ -289,7 +289,7 @@ def test_both_refuse_the_same_lines(tmp_path: Path) -> None:
     wrong = []
     for (text, expected), canon in zip(VERDICTS.items(), ask_oracle(jobs, tmp_path), strict=True):
         try:
-            parse_program(text + "\nM2\n")
+            parse_program(text + "\nM2\n", reading=Reading(strict=True))
             here = True
         except InputError:
             here = False

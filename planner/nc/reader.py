@@ -5,7 +5,7 @@ and what to do. The content of a text says which of the two it is, and its name 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
@@ -13,10 +13,11 @@ from planner.base.files import require_ending
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
+from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import dialect_of
 from planner.nc.leader import without_leader
-from planner.nc.lexer import split_words, text_alone
+from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, SIEMENS, Reading
 
@@ -58,25 +59,36 @@ def interpret(
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
-    run, program, faults = _run(data, machine, reading, source)
+    run, program, faults = execute(data, machine, reading, source)
     if reading.arc_centres == AUTO and not reading.strict and run.all_arcs_close_otherwise:
         absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
-        other, as_absolute, found = _run(data, machine, absolute, source)
+        other, as_absolute, found = execute(data, machine, absolute, source)
         if not other.open_arcs:
             return _with_note(as_absolute, run.open_arcs), found
     return program, faults
 
 
-def _run(
-    data: bytes, machine: Machine | None, reading: Reading, source: str
+def execute(
+    data: bytes,
+    machine: Machine | None,
+    reading: Reading,
+    source: str,
+    tee: Callable[[Words], None] | None = None,
 ) -> tuple[Interpreter, Program, Sequence[Fault]]:
-    """Execute a program. Raises InputError if there is no word in it."""
+    """Execute a program once, as `reading` says.
+
+    tee : gets the expanded rows of a program that computes, chunk by chunk
+
+    Raises InputError if there is no word in it.
+    """
     interpreter = Interpreter(machine, source, reading)
     language = language_of(data) if reading.dialect == AUTO else reading.dialect
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
-        return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN)
+        return interpreter, *expand(
+            interpreter, text_alone(data), HEIDENHAIN, integers_of(machine, HEIDENHAIN), tee
+        )
     if language != SIEMENS and not reading.strict:
         data, leader = without_leader(data)
         if leader:
@@ -85,10 +97,12 @@ def _run(
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
+    integers = integers_of(machine, dialect)
+    words = integers.applied(words)
     if dialect is not None:
         from planner.nc.language.expand import expand
 
-        return interpreter, *expand(interpreter, words, dialect)
+        return interpreter, *expand(interpreter, words, dialect, integers, tee)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
     return interpreter, interpreter.program(), interpreter.faults()
@@ -101,7 +115,6 @@ def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Progr
         "(--arc-centres absolute|incremental says which)"
     )
     return dataclasses.replace(program, notes=(note, *program.notes))
->>>>>>> lenient
 
 
 def load(path: str | Path) -> bytes:

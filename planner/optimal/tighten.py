@@ -63,7 +63,8 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         motions = (seen.velocity, seen.acceleration, seen.jerk)
         _worst(seen.feed / programmed[seen.block], motions, limits, smooth[own], worst)
         for order, ratio in ratios(machine.own, seen):
-            worst = np.maximum(worst, ratio.reshape(times.shape).max(axis=1) ** (1.0 / order))
+            most = _with_peaks(ratio.reshape(times.shape), smooth[own])
+            worst = np.maximum(worst, most ** (1.0 / order))
         factor[own] = worst
     for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
@@ -111,6 +112,19 @@ def _worst(feed, motions, limits, smooth, out):
                 most = max(most, known + PEAK_MORE * (peak - known) if peak > known else max(seen, peak))
             worst = max(worst, most ** (1.0 / (order + 1)))
         out[n] = worst
+
+
+def _with_peaks(ratio: FloatArray, smooth: Array) -> FloatArray:
+    """(n,) the largest of the ratios of n pieces (n, 3) at `WATCHED`, and on smooth pieces (n,) the peak of the parabola through them,
+    counted as in `_worst`."""
+    y0, y1, y2 = ratio.T
+    slope = (y2 - y0) / (WATCHED[2] - WATCHED[0])
+    bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+    inside = smooth & (np.abs(slope) < np.abs(bend))
+    peak = np.where(inside, np.abs(y1 - slope**2 / (4.0 * np.where(inside, bend, 1.0))), y1)
+    seen = ratio.max(axis=1)
+    known = np.maximum(seen, 1.0)
+    return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
 
 
 def fastest_inside(law: TimeLaw) -> FloatArray:

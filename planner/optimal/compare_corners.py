@@ -9,8 +9,6 @@ corners of a few um need 200 each if jerks are low; runs are therefore compared 
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -18,6 +16,7 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
 from planner.machine import Machine
+from planner.optimal.corner_times import CornerBounds, corner_times
 from planner.optimal.effort import Grids
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, second_order
@@ -35,22 +34,18 @@ COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 CLOSE = 1.01
 
 
-class CornerBounds(NamedTuple):
-    """Of a motion on corners between full stops: time (G,) that it takes at least [s], points (G,) of its grid, about."""
-
-    time: FloatArray
-    points: FloatArray
-
-
-def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
-    """From the motion without jerk limits on a coarse grid; no time at all where that has no solution: then the corners are planned to
-    see."""
+def corner_bounds(path: SmoothPath, machine: Machine, jerk_limited: bool = True) -> CornerBounds:
+    """The closed form (corner_times.py); of paths up to `COMPARED_POINTS` also from the motion without jerk limits on a coarse grid, the
+    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see."""
+    bounds = corner_times(path, machine, jerk_limited=jerk_limited)
+    if bounds.points.sum() > COMPARED_POINTS:
+        return bounds
     samples = sample_path(path, machine, COARSER * RESOLUTION, third_order=True)
     points = FEWER * np.diff(samples.piece)
     planned = second_order(path, samples, machine, Reachability())
     if not planned.solution.solved:
         return CornerBounds(np.zeros(len(points)), points)
-    return CornerBounds(COARSE_SHARE * planned.stop_to_stop(), points)
+    return CornerBounds(np.maximum(bounds.time, COARSE_SHARE * planned.stop_to_stop()), points)
 
 
 def with_corners(
@@ -86,6 +81,7 @@ def with_corners(
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
+    if __import__("os").environ.get("DUMP"): np.save("/tmp/long/gain.npy", np.stack([best.stop_to_stop(), corners.time, corners.points, chosen]))
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
     # on the final grid the second time on those that turned out to be faster
     tries = (grids.rounds, coarse, CLOSE), (grids.final, best, 1.0), (grids.final, best, 1.0)

@@ -167,8 +167,8 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     # Single corners where they are faster: between full stops, and everywhere, without the stops that were added for the splines.
     if settings.corner == AUTO:
         with job.stage("solve"):
-            bounds = corner_bounds(rounded, machine)
-            of_given = bounds if rounded is given else corner_bounds(given, machine)
+            bounds = corner_bounds(rounded, machine, order.jerk_limited)
+            of_given = bounds if rounded is given else corner_bounds(given, machine, order.jerk_limited)
         best, left = with_corners(rounded, best, coarse, bounds, job, order, grids)
         notes = not_compared_note(rounded, left, bounds.points)
         small = of_given.points.sum() <= COMPARED_POINTS

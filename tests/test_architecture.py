@@ -51,6 +51,7 @@ LAYERS = (
     "planner.motion.vertex_times",
     "planner.motion.time_law",
     "planner.motion.sampling",
+    "planner.motion.lots",
     "planner.motion.timing",
     "planner.motion",
     "planner.lookahead",

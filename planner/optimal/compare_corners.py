@@ -81,7 +81,8 @@ def with_corners(
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
-    if __import__("os").environ.get("DUMP"): np.save("/tmp/long/gain.npy", np.stack([best.stop_to_stop(), corners.time, corners.points, chosen]))
+    if __import__("os").environ.get("DUMP"):
+        np.save("/tmp/long/gain.npy", np.stack([best.stop_to_stop(), corners.time, corners.points, chosen]))
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
     # on the final grid the second time on those that turned out to be faster
     tries = (grids.rounds, coarse, CLOSE), (grids.final, best, 1.0), (grids.final, best, 1.0)

@@ -80,6 +80,7 @@ VERIFY_MAY_IMPORT = {
     "base.arrays",
     "base.kernels",
     "base.series",
+    "base.threads",
     "machine",
     "geometry.toolpath",
     "motion.trajectory",

@@ -156,7 +156,7 @@ def _point(table, on, room, w, out):
         out[3, k] = (t[2, k] * w + t[1, k]) * w + t[0, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def inverses(table, grid, axes):
     """(P, `COEFFICIENTS`) for the interval to the right of each point: how far the polynomial is off [share of the interval],
     c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces."""

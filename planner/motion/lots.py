@@ -181,8 +181,9 @@ def sample(table, law, grid, inverse, times, axes):
     """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that each lies at; an interval
     of a span may cover several.
 
-    table, law, grid : `ElementTable` (corners/elements.py), `Law`, `Grid` (sampling.py)
-    inverse          : (P, `COEFFICIENTS`), from `inverses` (sampling.py)
+    table, grid : `ElementTable` (corners/elements.py), `Grid` (sampling.py)
+    law         : `TimeLaw.columns`
+    inverse     : (P, `COEFFICIENTS`), from `inverses` (sampling.py)
     """
     legs, _, spans = table
     t, s_law, feed, acc_s, jerk_s, run, end = law

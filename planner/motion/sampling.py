@@ -45,18 +45,6 @@ REFINE_STEPS = 60
 CUBE_ROOT_ROUNDING = 4e-5
 
 
-class Law(NamedTuple):
-    """The fields of `TimeLaw`."""
-
-    t: FloatArray
-    s: FloatArray
-    feed: FloatArray
-    acc_s: FloatArray
-    jerk_s: FloatArray
-    run: Array
-    end: float
-
-
 class Grid(NamedTuple):
     """The fields of `PathSamples` that say where its intervals are on the elements of the path; and where its joints are on the
     programmed one."""

@@ -10,7 +10,7 @@ from benchmarks import problems
 from planner.corners.elements import ElementTable, element_length, element_point
 from planner.geometry.spline import span_dtype
 from planner.motion.lots import LANES, sample
-from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, Law, inverses
+from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses
 from planner.nc.reader import parse_program
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
@@ -85,11 +85,11 @@ def test_samples_lie_where_their_arc_length_says(name):
             assert off <= 4.0 * LENGTH_ROUNDING * h[row] + 2e-13 * max(1.0, np.abs(out[0]).max())
 
 
-def even_law(grid: Grid) -> Law:
+def even_law(grid: Grid) -> tuple[object, ...]:
     """1 mm/s all along."""
     run = np.repeat(np.arange(len(grid.piece) - 1), np.diff(grid.piece))
     one = np.ones(len(grid.s))
-    return Law(grid.s, grid.s, one, 0.0 * one, 0.0 * one, run, float(grid.s[-1]) + 1.0)
+    return grid.s, grid.s, one, 0.0 * one, 0.0 * one, run, float(grid.s[-1]) + 1.0
 
 
 @pytest.mark.parametrize("name", list(CASES))

@@ -1,14 +1,17 @@
 """Single corners instead of splines, on the runs between full stops where they are faster.
 
-The motion without jerk limits on a coarse grid gives a lower bound on the time of single corners. If the bound is above the time of the
-splines, there is nothing to compare. Otherwise the corners are planned. That takes at least the points of their own grid, of which
-corners of a few um need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up to
-`COMPARED_POINTS`, and the notes say which runs were left out.
+A closed form (corner_times.py) and, on shorter paths, the motion without jerk limits on a coarse grid give a lower bound on the time
+of single corners. If the bound is above the time of the
+splines, there is nothing to compare. Otherwise the corners are planned, by themselves: on the grid of the rounds, those that are still
+close to the splines on the final one, and those that win with the whole path. That takes at least the points of their own grid, of
+which corners of a few um need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up
+to `COMPARED_POINTS`, and the notes say which runs were left out.
 """
 
 from __future__ import annotations
 
 import dataclasses
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -32,6 +35,9 @@ COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 # Corners that take so many times as long as splines on the coarse grid are not tried on the final one [-]: times on the coarse grid are
 # up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
 CLOSE = 1.01
+FASTER = (
+    1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap
+)
 
 
 def corner_bounds(path: SmoothPath, machine: Machine, jerk_limited: bool = True) -> CornerBounds:
@@ -81,29 +87,19 @@ def with_corners(
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
-    if __import__("os").environ.get("DUMP"):
-        np.save("/tmp/long/gain.npy", np.stack([best.stop_to_stop(), corners.time, corners.points, chosen]))
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
-    # on the final grid the second time on those that turned out to be faster
-    tries = (grids.rounds, coarse, CLOSE), (grids.final, best, 1.0), (grids.final, best, 1.0)
-    for resolution, splines, fraction in tries:
-        fits = shape.laid.fits & ~chosen[piece]
-        if (fits == shape.laid.fits).all():
-            break
-        mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
-        planned = order.solve(with_spline(rounded, mixed), job, resolution, [splines])
+    for resolution, splines, fraction in ((grids.rounds, coarse, CLOSE), (grids.final, best, 1.0)):
+        if not chosen.any():
+            return best, left
+        planned = order.solve(rounded.part(chosen), job, resolution)
         if not planned.solution.solved:
-            break
-        job.tell(
-            "corners",
-            found=planned.solution.cycle_time,
-            before=splines.solution.cycle_time,
-            kept=planned.faster_than(splines),
-            runs=int(chosen.sum()),
-        )
-        slower = chosen & (planned.stop_to_stop() >= fraction * splines.stop_to_stop())
-        if resolution == grids.final and not slower.any():
-            faster = planned.faster_than(best)
-            return dataclasses.replace(planned, shape=mixed) if faster else best, left
-        chosen &= ~slower
-    return best, left
+            return best, left
+        time, before = planned.stop_to_stop(), splines.stop_to_stop()[chosen]
+        faster = time < fraction * before
+        job.tell("corners", found=time.sum(), before=before.sum(), runs=len(time), kept=int(faster.sum()))
+        chosen[chosen] = faster
+    if not chosen.any() or (before - time)[faster].sum() < FASTER * best.solution.cycle_time:
+        return best, left
+    mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=shape.laid.fits & ~chosen[piece]))
+    planned = order.solve(with_spline(rounded, mixed), job, grids.final, [best])
+    return dataclasses.replace(planned, shape=mixed) if planned.faster_than(best) else best, left

@@ -58,12 +58,14 @@ def corner_times(path: SmoothPath, machine: Machine, *, jerk_limited: bool = Tru
     speed = np.minimum(feed, np.where(line, _least_ratio(velocity, along), fastest))
     straight = np.maximum(legs.length - path.d_out[:-1] - path.d_in[1:], 0.0) / speed
 
-    corner = np.flatnonzero(path.d > 0.0)
+    between_lines = np.concatenate([[False], line[:-1] & line[1:], [False]])
+    corner = np.flatnonzero(
+        between_lines & (path.d > 0.0)
+    )  # the tangents of arcs are not those at the corner's ends
     before, after = corner - 1, corner
     d_in, d_out = path.d_in[corner], path.d_out[corner]
     theta = path.theta[corner]
     length = np.sqrt(np.maximum(d_in**2 + d_out**2 + 2.0 * d_in * d_out * np.cos(theta), 0.0))
-    length *= line[before] & line[after]  # the tangents of arcs are not those at the corner's ends
     s = np.maximum(np.sin(theta / 2.0), 1e-9)  # with less there is no corner
     n = np.abs(legs.table["direction"][after] - legs.table["direction"][before]) / (2.0 * s[:, None])
     held = _least_ratio(acceleration, along)

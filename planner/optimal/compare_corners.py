@@ -40,11 +40,13 @@ FASTER = (
 )
 
 
-def corner_bounds(path: SmoothPath, machine: Machine, jerk_limited: bool = True) -> CornerBounds:
-    """The closed form (corner_times.py); of paths up to `COMPARED_POINTS` also from the motion without jerk limits on a coarse grid, the
+def corner_bounds(
+    path: SmoothPath, machine: Machine, jerk_limited: bool = True, most: float = COMPARED_POINTS
+) -> CornerBounds:
+    """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk limits on a coarse grid, the
     larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see."""
     bounds = corner_times(path, machine, jerk_limited=jerk_limited)
-    if bounds.points.sum() > COMPARED_POINTS:
+    if bounds.points.sum() > most:
         return bounds
     samples = sample_path(path, machine, COARSER * RESOLUTION, third_order=True)
     points = FEWER * np.diff(samples.piece)

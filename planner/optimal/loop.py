@@ -61,7 +61,7 @@ from planner.optimal.order import Order
 from planner.optimal.reshape import FIRST_FORCE, chosen, price_bands, reshape, run_times
 from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
-from planner.path.samples import sample_path
+from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, with_spline
 
 # None after so many that together gained less than this [-]: half of the gap that the solver leaves.
@@ -149,16 +149,19 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         shape = corner_shape(settings.corner, machine, job.toolpath, settings.bezier)
         given = round_corners(job.toolpath, machine, shape, blend_tangents=order.jerk_limited)
     if settings.corner not in (AUTO, SPLINE):
-        return order.solve(given, job, grids_for(given, job, settings).final)
+        return order.solve(given, job, grids_for(given, job, settings)[0].final)
     with job.stage("geometry"):
         rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
     if not splines.laid.fits.any():
-        cornered = order.solve(given, job, grids_for(given, job, settings).final)
+        cornered = order.solve(given, job, grids_for(given, job, settings)[0].final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
     # Solve and reshape in turns, on a coarse grid; then once on the final one.
-    grids = grids_for(with_spline(rounded, splines), job, settings)
-    coarse = best = reshaped(rounded, splines, job, settings, grids.rounds)
+    with job.stage("geometry"):
+        laid = with_spline(rounded, splines)
+    grids, samples = grids_for(laid, job, settings)
+    first = order.solve(laid, job, grids.rounds, samples=samples if grids.rounds == COARSE else None)
+    coarse = best = reshaped(rounded, dataclasses.replace(first, shape=splines), job, settings, grids.rounds)
     if best.solution.solved:
         best = dataclasses.replace(order.solve(coarse.path, job, grids.final), shape=coarse.shape)
         _tell_of(job, "final grid", best, coarse)
@@ -182,11 +185,12 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
 
 
 def reshaped(
-    rounded: SmoothPath, shape: SplineShape, job: Job, settings: Settings, resolution: float
+    rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, resolution: float
 ) -> OnPath:
     """The motion on splines after the best of some rounds of reshaping (reshape.py).
 
     rounded    : the path with the corners that the splines replace
+    best       : the motion on the first splines
     resolution : of the grid
     """
 
@@ -194,7 +198,8 @@ def reshaped(
         planned = settings.order.solve(with_spline(rounded, shape), job, resolution, known)
         return dataclasses.replace(planned, shape=shape)
 
-    best = solve(shape)
+    shape = best.shape
+    assert shape is not None
     if not best.solution.solved or best.solution.multipliers is None or not len(best.path.spline):
         return best
     jerk_limited, rounds = settings.order.jerk_limited, settings.rounds
@@ -230,11 +235,11 @@ def reshaped(
     return best
 
 
-def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
-    """The grids that a path of this size is worth."""
+def grids_for(path: SmoothPath, job: Job, settings: Settings) -> tuple[Grids, PathSamples]:
+    """The grids that a path of this size is worth, and the coarse one by which that is told."""
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
-    return settings.effort.grids(len(coarse))
+    return settings.effort.grids(len(coarse)), coarse
 
 
 def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> None:

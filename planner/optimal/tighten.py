@@ -30,11 +30,11 @@ from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than the first of these [-], and not for long: the first round gains 4e-3 of the
-# time, the second 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid
-# points, where the time it takes counts, it is done once, above the second: that leaves less than half of the excess.
-TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
+# Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 4e-3 of the time, the second
+# 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid points, where the time
+# it takes counts, it is done while slowing down costs more than the last [share of the time].
+TIGHTENED_EXCESS = 1e-5
+TIGHTENING_ROUNDS, TIGHTENED_POINTS, TIGHTENED_LOSS = 3, 50_000, 2e-4
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
 SLOWING_ROUNDS = 6
 # What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
@@ -147,8 +147,9 @@ def within_limits(
     tell("between points", found=least, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
-    for _ in range(1 if large else TIGHTENING_ROUNDS):
-        if factor.max() <= 1.0 + TIGHTENED_EXCESS[large]:
+    unslowed = motion.end
+    for _ in range(TIGHTENING_ROUNDS):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS or (large and least < (1.0 + TIGHTENED_LOSS) * unslowed):
             break
         room *= np.maximum(factor, 1.0)
         problem = tightened(planned.problem, room)

@@ -59,7 +59,7 @@ def corner_bounds(
 def with_corners(
     rounded: SmoothPath,
     best: OnPath,
-    coarse: OnPath,
+    coarse: FloatArray,
     corners: CornerBounds,
     job: Job,
     order: Order,
@@ -69,7 +69,7 @@ def with_corners(
     out.
 
     rounded : the path with the corners that the splines of `best` replace
-    coarse  : the motion on the same splines on the grid of the rounds, on which most corners are ruled out
+    coarse  : (G,) times between full stops on the same splines on the grid of the rounds, on which most corners are ruled out [s]
     corners : bounds on the motion on them
     grids   : of the rounds, and the final one, of `best`
     """
@@ -90,13 +90,16 @@ def with_corners(
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
-    for resolution, splines, fraction in ((grids.rounds, coarse, CLOSE), (grids.final, best, 1.0)):
+    for resolution, splines, fraction in (
+        (grids.rounds, coarse, CLOSE),
+        (grids.final, best.stop_to_stop(), 1.0),
+    ):
         if not chosen.any():
             return best, left
         planned = order.solve(rounded.part(chosen), job, resolution)
         if not planned.solution.solved:
             return best, left
-        time, before = planned.stop_to_stop(), splines.stop_to_stop()[chosen]
+        time, before = planned.stop_to_stop(), splines[chosen]
         faster = time < fraction * before
         job.tell("corners", found=time.sum(), before=before.sum(), runs=len(time), kept=int(faster.sum()))
         chosen[chosen] = faster

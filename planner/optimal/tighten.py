@@ -30,9 +30,9 @@ from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 4e-3 of the time, the second
-# 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid points, where the time
-# it takes counts, it is done while slowing down costs more than the last [share of the time].
+# Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 4e-3 of the time, the
+# second 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid points, where
+# the time it takes counts, it is done while slowing down costs more than the last [share of the time].
 TIGHTENED_EXCESS = 1e-5
 TIGHTENING_ROUNDS, TIGHTENED_POINTS, TIGHTENED_LOSS = 3, 50_000, 2e-4
 # Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.

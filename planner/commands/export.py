@@ -56,7 +56,7 @@ def export_command(
     """Write the setpoints of a plan for a control that plays them."""
     from planner.control_files.pvt import WITHIN, write_pvt
     from planner.control_files.stream import write_stream
-    from planner.report.trajectory_file import read_trajectory
+    from planner.report.trajectory_reader import read_trajectory
 
     if within is not None and for_ is not For.pvt:
         raise InputError(f"--within is for pvt; --for {for_} takes every setpoint as it is")

@@ -14,7 +14,7 @@ from planner.job.plan import Plan
 from planner.machine import machine_from_dict
 from planner.nc.reader import load, parse_program
 from planner.report.replace import SUMMARY
-from planner.report.trajectory_file import read_trajectory
+from planner.report.trajectory_reader import read_trajectory
 from planner.verify import verify
 
 

@@ -164,7 +164,12 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         path, shape = best.path, best.shape
         del best
         best = dataclasses.replace(order.solve(path, job, grids.final), shape=shape)
-        job.tell("final grid", found=best.solution.cycle_time, before=float(coarse.sum()))
+        job.tell(
+            "final grid",
+            found=best.solution.cycle_time,
+            before=float(coarse.sum()),
+            kept=best.solution.solved,
+        )
     notes: tuple[str, ...] = ()
 
     # Single corners where they are faster: between full stops, and everywhere, without the stops that were added for the splines.

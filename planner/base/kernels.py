@@ -18,7 +18,6 @@ import threading
 import warnings
 from collections.abc import Callable, Hashable
 from functools import cached_property
-from types import FunctionType
 from typing import Any
 
 import numpy as np

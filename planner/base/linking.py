@@ -17,6 +17,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -94,10 +95,8 @@ def _unpickle(data: int, size: int, _: int) -> Any:
 
 
 def _initialize() -> None:
-    try:
+    with suppress(RuntimeError):  # llvmlite does that by itself, from version 0.45 on
         binding.initialize()
-    except RuntimeError:  # llvmlite does that by itself, from version 0.45 on
-        pass
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
 

@@ -11,7 +11,7 @@ from numba.core import errors, registry, targetconfig, types
 from numba.core.compiler import Flags
 from numba.core.types import functions
 
-from planner.base import compiling, kernels, kept
+from planner.base import compiling, kept, kernels
 from planner.base.kernels import njit
 
 pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="another version of numba")

@@ -41,10 +41,14 @@ class Kept(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A file name without its folder: what stays the same when a kernel changes, and what does not."""
+    """A file name without its folder: what stays the same when a kernel changes, and what does not.
+
+    single : whether no other kernel has the same first part, as those have that are made by one function
+    """
 
     kernel: str
     version: str
+    single: bool
 
     @property
     def name(self) -> str:
@@ -57,7 +61,8 @@ def place(function: FunctionType, content: bytes, arguments: object) -> Place:
     of = hashlib.sha256(repr((function.__module__, arguments, sys.implementation.cache_tag)).encode())
     version = hashlib.sha256(content + _surroundings())
     named = re.sub(r"[^\w.]", "", where)[:80]
-    return Place(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24])
+    single = "<" not in function.__qualname__
+    return Place(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
 
 
 def read(where: Place) -> Kept | None:
@@ -90,6 +95,8 @@ def write(where: Place, kernel: Kept) -> None:
         except OSError as fault:
             faults.append(fault)
             continue
+        if not where.single:
+            return
         older = [name for name in os.listdir(folder) if name.startswith(f"{where.kernel}.")]
         _remove(
             os.path.join(folder, name) for name in older if name.endswith(".kernel") and name != where.name
@@ -158,13 +165,16 @@ def content_of(
 
     called : the digest of a value, if that is a kernel; else None
     """
-    found = hashlib.sha256()
+    found, seen = hashlib.sha256(), {id(function)}
 
     def of(value: Any) -> str:
         kernel = called(value)
         if kernel is not None:
             return kernel.hex()
         if isinstance(value, FunctionType):
+            if id(value) in seen:  # it calls itself
+                return value.__qualname__
+            seen.add(id(value))
             return code_of(value)
         if isinstance(value, ModuleType):
             return value.__name__
@@ -184,10 +194,9 @@ def content_of(
         code, known = function.__code__, function.__globals__
         names = sorted(_names_in(code))
         used = [(name, of(known[name])) for name in names if name in known]
-        inside = [known[name] for name in names if isinstance(known.get(name), ModuleType)]
-        for module in inside:  # kernels and constants by way of their module
-            if module.__name__.partition(".")[0] == function.__module__.partition(".")[0]:
-                used += [(name, of(vars(module)[name])) for name in names if name in vars(module)]
+        for module in [known[name] for name in names if isinstance(known.get(name), ModuleType)]:
+            inside = [(name, vars(module)[name]) for name in names if name in vars(module)]
+            used += [(name, of(value)) for name, value in inside if called(value) or _told_by_repr(value)]
         cells = [of(cell.cell_contents) for cell in function.__closure__ or ()]
         return repr((of(code), code.co_varnames, code.co_argcount, used, cells, of(function.__defaults__)))
 

@@ -107,7 +107,9 @@ class Chain:
             return self.last
         s = self.columns.s
         keep = np.arange(begin + int(NEAREST * size), min(begin + int(FARTHEST * size), self.last))
-        needed = np.minimum(np.searchsorted(s, s[keep] + BRAKING_WAYS * self._braking[keep - self.first]), self.last)
+        needed = np.minimum(
+            np.searchsorted(s, s[keep] + BRAKING_WAYS * self._braking[keep - self.first]), self.last
+        )
         count = needed - begin
         of_each = count / (keep - begin) * (1.0 + LARGER_COSTS * count / size)
         earliest = int(needed[np.argmin(of_each)])

@@ -33,6 +33,7 @@ LAYERS = (
     "planner.constraints.own",
     "planner.fir.filters",
     "planner.machine",
+    "planner.machine_import",
     "planner.constraints",
     "planner.nc",
     "planner.geometry",
@@ -69,6 +70,7 @@ LAYERS = (
     "planner.optimal",
     "planner.methods",
     "planner.report",
+    "planner.control_files",
     "planner.commands",
     "planner.cli",
     "planner.__main__",
@@ -191,6 +193,7 @@ NOT_OF_A_PLAN = {
     "scipy.optimize",
     "numba",
     "planner.report",
+    "planner.control_files",
     "planner.tube",
     "planner.nc.hpgl.plotter",
 }

@@ -9,6 +9,7 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.geometry.toolpath import Toolpath
+from planner.job.plausible import short_block_notes, unit_notes
 from planner.machine import Machine
 from planner.nc.program import Program
 
@@ -18,8 +19,14 @@ TOLERANCE_OF_PART = 0.02
 
 
 def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
-    """Notes of the reader, on feeds that the machine lowers, and on a tolerance that is large beside the part."""
-    return [*program.notes, *_feed_notes(program, machine), *_tolerance_notes(toolpath)]
+    """Notes of the reader, on numbers that are hardly meant, on feeds that the machine lowers, and on a tolerance that is large beside
+    the part."""
+    return [
+        *program.notes,
+        *unit_notes(machine),
+        *_feed_notes(program, machine),
+        *(_tolerance_notes(toolpath) or short_block_notes(toolpath)),
+    ]
 
 
 def _feed_notes(program: Program, machine: Machine) -> list[str]:

@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.nc.reading import AS_USUAL, Reading
 
 
 class Kind(IntEnum):
@@ -42,6 +43,38 @@ class Event:
     text: str  # as normalised: "M3", "S12000", "T2"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """A call that was open while blocks were made; the main program is the first.
+
+    name   : what was called, as the program names it; empty for the main program
+    source : the file that the blocks' lines belong to
+    line   : the line of the call, in the caller's file; 0 for the main program
+    caller : index of the calling frame; -1 for the main program
+    """
+
+    name: str
+    source: str
+    line: int
+    caller: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expansion:
+    """What was expanded to make a program of one that computes.
+
+    dialect : whose language it is: "linuxcnc" or "fanuc"
+    calls   : subprograms in the order of their first call, and how often each was called
+    turns   : turns of loops, jumps and calls
+    rows    : lines executed, each as often as it was
+    """
+
+    dialect: str
+    calls: tuple[tuple[str, int], ...]
+    turns: int
+    rows: int
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Program:
     """An NC program: B blocks over A axes.
@@ -62,6 +95,10 @@ class Program:
     arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
     events       : words without influence on the motion
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
+    frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
+    frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
+    expansion    : what was expanded; None where nothing was
+    reading      : the settings it was read with
     """
 
     source: str
@@ -80,6 +117,10 @@ class Program:
     arc_sweep: FloatArray
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
+    frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    frames: tuple[Frame, ...] = ()
+    expansion: Expansion | None = None
+    reading: Reading = AS_USUAL
 
     def __post_init__(self) -> None:
         axes = len(self.axes)
@@ -97,8 +138,20 @@ class Program:
         freeze(self, "arc_center", np.float64, (arcs, axes))
         freeze(self, "arc_normal", np.int64, (arcs,))
         freeze(self, "arc_sweep", np.float64, (arcs,))
+        freeze(self, "frame", np.int32, (blocks if self.frames else 0,))
         if not (self.feed > 0).all():
             raise ValueError("Program.feed: every feed must be positive")
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def place(self, block: int) -> str:
+        """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost first."""
+        text = f"line {self.line[block]}"
+        frame = int(self.frame[block]) if self.frames else 0
+        while frame > 0:
+            at = self.frames[frame]
+            elsewhere = f" in {at.source}" if at.source != self.source else ""
+            text += f"{elsewhere} ({at.name}), called from line {at.line}"
+            frame = at.caller
+        return text

@@ -11,7 +11,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
-from planner.nc.program import Kind, Program
+from planner.nc.program import Frame, Kind, Program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
 
@@ -24,6 +25,7 @@ class BlockColumns(NamedTuple):
     line: Array  # int32
     path_control: Array  # uint8
     tolerance: FloatArray
+    frame: Array  # int32
 
     @classmethod
     def of_size(cls, rows: int) -> BlockColumns:
@@ -35,6 +37,7 @@ class BlockColumns(NamedTuple):
             line=np.empty(rows, dtype=np.int32),
             path_control=np.empty(rows, dtype=np.uint8),
             tolerance=np.empty(rows),
+            frame=np.empty(rows, dtype=np.int32),
         )
 
 
@@ -58,20 +61,27 @@ class EventColumns(NamedTuple):
 
 
 class Store:
-    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used.
+    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used. New blocks stand in the
+    call `frame`.
 
     The compiled loop over plain rows writes into the columns directly and sets the counts.
     """
 
-    def __init__(self, rows: int, words: int):
+    def __init__(self) -> None:
         self.blocks = 0
         self.events = 0
         self.refusals = 0
-        self.block = BlockColumns.of_size(rows)
-        self.event = EventColumns.of_size(rows)
-        self.refused_word = np.empty(words, dtype=np.int64)  # found by the compiled loop
+        self.frame = 0
+        self.block = BlockColumns.of_size(0)
+        self.event = EventColumns.of_size(0)
+        self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
+
+    def begin(self, words: int) -> None:
+        """Be ready for a chunk of so many words."""
+        self.refusals = 0
+        self.refused_word = np.empty(words, dtype=np.int64)
 
     def make_room(self, rows: int) -> None:
         """Make sure that `rows` more blocks and `rows` more events fit."""
@@ -89,11 +99,12 @@ class Store:
         block.line[k] = line
         block.path_control[k] = state.path_control
         block.tolerance[k] = state.tolerance
+        block.frame[k] = self.frame
         self.blocks += 1
 
-    def add_arc(self, arc: Arc, line: int, state: State) -> None:
-        """Append an arc that ends at the state's position."""
-        self.arcs.append((self.blocks, arc.centre, state.normal, arc.sweep))
+    def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
+        """Append an arc about a normal axis that ends at the state's position."""
+        self.arcs.append((self.blocks, arc.centre, normal, arc.sweep))
         self.add(Kind.ARC, line, state)
 
     def add_dwell(self, seconds: float, line: int, state: State) -> None:
@@ -111,8 +122,13 @@ class Store:
         event.value[k] = value
         self.events += 1
 
-    def finish(self, source: str, notes: Sequence[str]) -> Program:
-        """The program read so far; the arrays are cut to size, so that the spare room is given back."""
+    def finish(
+        self, source: str, notes: Sequence[str], frames: Sequence[Frame] = (), reading: Reading = AS_USUAL
+    ) -> Program:
+        """The program read so far; the arrays are cut to size, so that the spare room is given back.
+
+        frames : the calls that the blocks stand in, for an expanded program
+        """
         used, seen = slice(0, self.blocks), slice(0, self.events)
         dwell = np.zeros(self.blocks)
         for block, seconds in self.dwells:
@@ -139,6 +155,9 @@ class Store:
                 value=self.event.value[seen].copy(),
             ),
             notes=tuple(notes),
+            reading=reading,
+            frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
+            frames=tuple(frames),
         )
 
 

@@ -6,13 +6,15 @@ See solver.py.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.feedrate.jerk.layout import ProblemColumns, Room
+from planner.feedrate.jerk.columns import ProblemColumns
+from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.start import envelope
 from planner.feedrate.jerk.window import ScaledWindow, Window
@@ -44,33 +46,39 @@ DIVISION = 5
 INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 
 
-class Chain:
-    """The profile of the points first..last of a problem as it grows, window by window, from rest at the first.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Task:
+    """The points first..last of a problem, to be solved from rest to rest.
 
-    profile : of all points of the problem; this chain's points are written
+    profile : of all points of the problem; these points are written
     tell    : called with the number of points that are new; may end the work by an exception
+    """
+
+    solver: JerkLimited
+    columns: ProblemColumns
+    profile: Profile
+    first: int
+    last: int
+    tell: Callable[[int], None]
+
+
+class Chain:
+    """The profile of a task as it grows, window by window, from rest at its first point.
+
     at      : up to which point there is a profile
     rest    : what the last window knows of the way ahead, down to its stop
     stops   : points where the profile rests because nothing better was found
     """
 
-    def __init__(
-        self,
-        solver: JerkLimited,
-        columns: ProblemColumns,
-        profile: Profile,
-        first: int,
-        last: int,
-        tell: Callable[[int], None],
-    ):
-        self.solver, self.columns, self.profile = solver, columns, profile
-        self.at, self.first, self.last = first, first, last
+    def __init__(self, task: Task):
+        self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
+        self.at, self.first, self.last = task.first, task.first, task.last
         self.rest: Window | None = None
         self.stops: list[int] = []
         self.iterations = 0
-        # windows solved; how often not from the first start, not with the first end, and divided into smaller ones
-        self.windows = self.other_starts = self.other_ends = self.divided = 0
-        self._tell = tell
+        # windows solved; how often not from the first start, and divided into smaller ones
+        self.windows = self.other_starts = self.divided = 0
+        self._tell = task.tell
         self._room = Room()
 
     def run(self, room: Room, until: int) -> None:
@@ -79,7 +87,7 @@ class Chain:
         size, divided = self.solver.window, False
         while self.at < min(until, self.last):
             begin = self.at
-            end = self._window_end(begin, size)
+            end = self._smaller_end(begin, size) if divided else self._window_end(begin, size)
             found = self._solve_window(begin, end)
             if found is None:
                 if end - begin > SMALLEST_WINDOW and self.profile.x[begin] == 0.0:
@@ -115,10 +123,20 @@ class Chain:
         earliest = int(needed[np.argmin(of_each)])
         if self.rest is not None and self.profile.x[begin] > 0.0:
             earliest = max(earliest, begin + len(self.rest.x) - 1)
-        beyond = earliest + 1 + int(END_SHARE * size)
-        if beyond >= self.last:
+        return self._finest(earliest, earliest + int(END_SHARE * size))
+
+    def _smaller_end(self, begin: int, size: int) -> int:
+        """The last point of a window of no more than so many intervals."""
+        if self.last - begin <= size + INTERVALS_MIN:
             return self.last
-        return earliest + int(np.argmin(s[earliest + 1 : beyond + 1] - s[earliest - 1 : beyond - 1]))
+        return self._finest(begin + size - int(END_SHARE * size), begin + size)
+
+    def _finest(self, first: int, last: int) -> int:
+        """The point among these where the grid is finest, or the last one of all."""
+        if last + 1 >= self.last:
+            return self.last
+        s = self.columns.s
+        return first + int(np.argmin(s[first + 1 : last + 2] - s[first - 1 : last]))
 
     @cached_property
     def _braking(self) -> FloatArray:

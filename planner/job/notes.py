@@ -47,7 +47,9 @@ def _tolerance_notes(toolpath: Toolpath) -> list[str]:
         return []
     moved = ~toolpath.rapid if not toolpath.rapid.all() else np.ones(len(toolpath), bool)
     arc = toolpath.arc[moved & (toolpath.arc >= 0)]
-    points = np.vstack([toolpath.start[moved], toolpath.end[moved]])
+    points = np.vstack(
+        [toolpath.start[moved], toolpath.end[moved], toolpath.curves.points.reshape(-1, len(toolpath.axes))]
+    )
     swept = np.minimum(2.0 * toolpath.arcs.radius[arc], toolpath.length[moved & (toolpath.arc >= 0)])
     part = float(max(np.ptp(points, axis=0).max(), swept.max(initial=0.0)))
     joint = int(toolpath.tolerance.argmax())

@@ -13,14 +13,35 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.constraints import normal_limit
 from planner.corners.allocation import error_rate
-from planner.geometry.toolpath import Toolpath
+from planner.corners.smooth import curvature_jumps
+from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
 AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
 PHASES = 7  # a jerk-limited move from rest to rest
+
+
+def block_moves(toolpath: Toolpath) -> Array:
+    """(N+1,) first segment of each move from rest to rest, and M: a block, or a part of a spline between kinks and jumps of its
+    curvature, at which a motion cannot go on without a jump of its acceleration."""
+    curve, joint = toolpath.curve >= 0, np.arange(len(toolpath) + 1)
+    if not curve.any():
+        return joint
+    on = np.zeros(len(joint), bool)
+    on[1:-1] = (
+        curve[1:] & (toolpath.block[1:] == toolpath.block[:-1]) & (toolpath.joint[1:-1] == Joint.SMOOTH)
+    )
+    return np.flatnonzero(~on | curvature_jumps(toolpath, joint))
+
+
+def stop_times(toolpath: Toolpath, machine: Machine) -> FloatArray:
+    """(N,) times of the N moves of `block_moves` from rest to rest [s]."""
+    first = block_moves(toolpath)[:-1]
+    limits = (np.minimum.reduceat(limit, first) for limit in block_limits(toolpath, machine))
+    return rest_to_rest_times(np.add.reduceat(toolpath.length, first), *limits)
 
 
 def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> FloatArray:
@@ -64,7 +85,8 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest axis limit must hold
     for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with
     kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a/sqrt2 <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
-    (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well.
+    (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve
+    kappa changes, and a bound of |r'''| takes the place of kappa^2.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
@@ -72,8 +94,10 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
         (machine.limits(q, axes) / np.maximum(direction, AT_REST)).min(axis=1)
         for q in ("velocity", "acceleration", "jerk")
     )
-    curved = toolpath.arc >= 0
+    curved = ~toolpath.straight
     kappa = toolpath.curvature[curved]
+    twist, on_curve = kappa**2, toolpath.curve[curved] >= 0
+    twist[on_curve] = np.maximum(twist[on_curve], toolpath.curves.twist[toolpath.curve[curved][on_curve]])
     v_all, a_all, j_all = (machine.limits(q, axes).min() for q in ("velocity", "acceleration", "jerk"))
     half = np.sqrt(0.5)
     budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
@@ -82,7 +106,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
         [
             np.full(len(kappa), v_all),
             np.sqrt(across / kappa),
-            np.cbrt(half * j_all / (2 * kappa**2)),
+            np.cbrt(half * j_all / (2 * twist)),
             j_all / (3 * kappa * a_all),
         ],
         axis=0,

@@ -84,7 +84,7 @@ def read_block(words: Words, row: int, report: Report) -> Block | None:
                 return None
         elif letter in "GM":
             block.partial |= _add_code(block, letter, value, word, report)
-        elif letter in codes.LETTERS_REFUSED:
+        elif letter in codes.LETTERS_REFUSED and letter != "L":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
         elif letter in block.value:
@@ -130,11 +130,14 @@ def _check_used(block: Block, report: Report) -> None:
     interpreter looks."""
     one_shot, motion = block.g.get("one-shot"), block.g.get("motion", block.g.get("cycle end"))
     path, arc = block.g.get("path control"), motion in (20, 30)
+    if "L" in block.value and motion not in (None, 52):
+        report(block.at["L"], str(codes.LETTERS_REFUSED["L"]))
+        del block.value["L"]
     used = {
-        "P": arc or motion is None or one_shot == 40 or path == 640,
-        "Q": path == 640,
+        "P": arc or motion in (None, 50, 52, 62) or one_shot == 40 or path == 640,
+        "Q": path == 640 or motion in (None, 50),
         "H": block.g.get("tool length") == 430,
-        **dict.fromkeys(_ARC_LETTERS, arc or motion is None),
+        **dict.fromkeys(_ARC_LETTERS, arc or motion in (None, 50, 51, 62)),
     }
     for letter, allowed in used.items():
         if letter in block.value and not allowed:

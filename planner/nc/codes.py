@@ -26,7 +26,7 @@ class Refusal:
 
 
 G_GROUP: dict[int, str] = {
-    **dict.fromkeys((0, 10, 20, 30), "motion"),
+    **dict.fromkeys((0, 10, 20, 30, 50, 51, 52, 53, 62), "motion"),
     **dict.fromkeys((40, 280, 300, 530, 920, 921, 922, 923), "one-shot"),
     **dict.fromkeys((170, 180, 190), "plane"),
     **dict.fromkeys((200, 210), "units"),
@@ -59,7 +59,6 @@ M_EVENTS = frozenset((30, 40, 50, 70, 80, 90, 480, 490))
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
 _POST = "choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
 _CYCLE = Refusal("a canned cycle is", _STRAIGHT, True)
-_SPLINE = Refusal("a spline is", _STRAIGHT, True)
 _PROBE = Refusal(
     "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
 )
@@ -72,7 +71,6 @@ _OFFSETS = Refusal(
 )
 
 G_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys((50, 51, 52, 53), _SPLINE),
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
     70: _LATHE,
     100: _OFFSETS,
@@ -134,12 +132,13 @@ LETTERS_REFUSED: dict[str, Refusal] = {
 
 # Letters that only some words use: "I word without G2 or G3".
 LETTER_NEEDS = {
-    "I": "G2 or G3",
-    "J": "G2 or G3",
-    "K": "G2 or G3",
-    "R": "G2 or G3",
-    "P": "G4, G64, G2 or G3",
-    "Q": "G64",
+    "I": "G2, G3, G5 or G5.1",
+    "J": "G2, G3, G5 or G5.1",
+    "K": "G2, G3 or G6.2",
+    "R": "G2, G3 or G6.2",
+    "P": "G4, G64, G2, G3, G5, G5.2 or G6.2",
+    "Q": "G64 or G5",
+    "L": "G5.2",
     "H": "G43",
 }
 

@@ -24,7 +24,8 @@ from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
-from planner.nc.program import Frame, Kind, PathControl, Program
+from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
+from planner.nc.splines import SPLINE_CODES, SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
@@ -52,6 +53,7 @@ class Interpreter:
         self.state = self.setup.start()
         self.store = Store()
         self.ended = False
+        self._splines = SplineReader()
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
@@ -79,7 +81,7 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(words, row, self.state, self.store)
+            after = row if self._splines.open else run_plain(words, row, self.state, self.store)
             self._begun |= after > row
             if after < rows:
                 self.store.frame = int(words.frame[after])
@@ -92,6 +94,7 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
+        self._splines.keep(words)
         self._keep_faults(words)
 
     def note_what_follows(self, words: Words) -> None:
@@ -107,7 +110,7 @@ class Interpreter:
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self._found)
+        return FaultList(self._found + self._splines.faults())
 
     def _keep_faults(self, words: Words) -> None:
         """Keep the chunk's faults in the order of its words."""
@@ -127,7 +130,7 @@ class Interpreter:
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
-        moves = np.flatnonzero(self.store.block.kind[: self.store.blocks] <= Kind.ARC)
+        moves = np.flatnonzero(np.isin(self.store.block.kind[: self.store.blocks], MOVES))
         if len(moves) and (self._units_at is None or moves[0] < self._units_at):
             self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
 
@@ -303,13 +306,17 @@ class Interpreter:
     def _motion(self, block: Block) -> None:
         state, one_shot = self.state, block.g.get("one-shot")
         if "motion" in block.g:
-            state.motion = block.g["motion"] // 10
+            code = block.g["motion"]
+            state.motion = code if code in SPLINE_CODES else code // 10
         elif "cycle end" in block.g:
             state.motion = NO_MOTION
         if one_shot in (280, 300, 920):
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
+        if state.motion in SPLINE_CODES or (self._splines.open and "motion" in block.g):
+            self._spline(block)
+            return
         if state.motion not in (2, 3):
             moves.check_no_arc_words(state, block)
         if not moves.is_move(state, block):
@@ -329,3 +336,19 @@ class Interpreter:
         finally:
             state.position[:] = target
         self.store.add_arc(arc, block.line, state)
+
+    def _spline(self, block: Block) -> None:
+        """A line of a spline."""
+        state = self.state
+        if not is_spline_line(block):
+            return
+        found = self._splines.read(state, block, self.store.blocks)
+        if found is None:
+            return
+        if not state.feed > 0:
+            raise WordFault(
+                block.motion_word(), "a spline without a feed; write an F word on its first line or before it"
+            )
+        (points, weights), line = found
+        state.position[:] = points[-1, -1]
+        self.store.add_spline(points, weights, line, state)

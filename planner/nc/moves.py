@@ -110,9 +110,11 @@ def check_machine_coordinates(state: State, block: Block) -> None:
 def check_no_arc_words(state: State, block: Block) -> None:
     """I J K R, and a P that no G4 or G64 uses, need an arc. Raises WordFault."""
     taken = block.g.get("one-shot") == 40 or block.g.get("path control") == 640
-    for letter in "IJKR" if taken else "IJKRP":
+    for letter in "IJKRL" if taken else "IJKRLPQ":
         if letter in block.value and state.motion != REFUSED_MOTION and not block.partial:
-            raise WordFault(block.at[letter], unused(letter))
+            raise WordFault(
+                block.at[letter], str(codes.LETTERS_REFUSED["L"]) if letter == "L" else unused(letter)
+            )
 
 
 def unused(letter: str) -> str:

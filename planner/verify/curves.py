@@ -41,7 +41,7 @@ def curve_counts(points: FloatArray, weight: FloatArray, angle: float) -> Array:
     curves = len(points)
     row, u = np.repeat(np.arange(curves), PLACES), np.tile(np.linspace(0.0, 1.0, PLACES), curves)
     rate = curve_points(points[row], weight[row], u)[1]
-    tangent = (rate / np.linalg.norm(rate, axis=1)[:, None]).reshape(curves, PLACES, -1)
+    tangent = (rate / np.linalg.norm(rate, axis=1)[:, None]).reshape(curves, PLACES, points.shape[2])
     turned = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(np.diff(tangent, axis=1), axis=2), 1.0)).sum(
         axis=1
     )

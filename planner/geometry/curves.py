@@ -202,18 +202,24 @@ def _quintic(b1, b2, b3, b4, t):
 
 
 @njit(cache=True, error_model="numpy")
-def curve_point(p0, p1, p2, p3, w1, w2, length, x, out):
-    """Point [mm] and three x-derivatives of a curve at x [mm] (module text), into out (4, A).
-
-    p0, p1, p2, p3 : (A,) control points [mm]; w1, w2 : weights of the inner two
-    """
+def _parameter(p0, p1, p2, p3, w1, w2, length, x):
+    """u and three derivatives by t at x = length t (module text)."""
     rate, along = _at_end(p0, p1, p2, w1, w2)
     b1 = length / (5.0 * rate)
     b2 = 2.0 * b1 - length * length * along / (20.0 * rate**4)
     rate, along = _at_end(p3, p2, p1, w2, w1)
     b4 = length / (5.0 * rate)
     b3 = 2.0 * b4 - length * length * along / (20.0 * rate**4)
-    u, u1, u2, u3 = _quintic(b1, b2, 1.0 - b3, 1.0 - b4, x / length)
+    return _quintic(b1, b2, 1.0 - b3, 1.0 - b4, x / length)
+
+
+@njit(cache=True, error_model="numpy")
+def curve_point(p0, p1, p2, p3, w1, w2, length, x, out):
+    """Point [mm] and three x-derivatives of a curve at x [mm] (module text), into out (4, A).
+
+    p0, p1, p2, p3 : (A,) control points [mm]; w1, w2 : weights of the inner two
+    """
+    u, u1, u2, u3 = _parameter(p0, p1, p2, p3, w1, w2, length, x)
     u1, u2, u3 = u1 / length, u2 / length**2, u3 / length**3
     v = 1.0 - u
     q1, q2 = w1 - 1.0, w2 - 1.0  # weights over those of the ends
@@ -232,6 +238,20 @@ def curve_point(p0, p1, p2, p3, w1, w2, length, x, out):
         out[1, k] = ra * u1
         out[2, k] = rb * u1 * u1 + ra * u2
         out[3, k] = rc * u1**3 + 3.0 * rb * u1 * u2 + ra * u3
+
+
+@njit(cache=True, error_model="numpy")
+def curve_tangent(p0, p1, p2, p3, w1, w2, length, x, out):
+    """First x-derivative of a curve at x [mm], into out (A,); the others as of `curve_point`."""
+    u, u1, _, _ = _parameter(p0, p1, p2, p3, w1, w2, length, x)
+    v = 1.0 - u
+    q1, q2 = w1 - 1.0, w2 - 1.0
+    w = 1.0 + 3.0 * u * v * (q1 * v + q2 * u)
+    wa = 3.0 * (q1 * v * v + 2.0 * (q2 - q1) * u * v - q2 * u * u)
+    for k in range(len(out)):
+        a1, a2, a3 = w1 * (p1[k] - p0[k]), w2 * (p2[k] - p0[k]), p3[k] - p0[k]
+        r = (3.0 * u * v * (a1 * v + a2 * u) + a3 * u**3) / w
+        out[k] = (3.0 * (a1 * v * v + 2.0 * (a2 - a1) * u * v + (a3 - a2) * u * u) - wa * r) / w * u1 / length
 
 
 @njit(cache=True, error_model="numpy")

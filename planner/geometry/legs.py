@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
-from planner.geometry.curves import curve_point
+from planner.geometry.curves import curve_point, curve_tangent
 from planner.geometry.toolpath import Joint, Toolpath
 
 # Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
@@ -101,13 +101,6 @@ def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _curve_point(data, x, out):
-    """`leg_point` of a curve's record."""
-    p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
-    curve_point(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
-
-
-@njit(cache=True, error_model="numpy")
 def leg_point(legs, leg, x, out):
     """Point [mm] and first three x-derivatives of a leg at x [mm], into out (4, A); legs: records of `leg_dtype`."""
     data = legs[leg]
@@ -120,7 +113,8 @@ def leg_point(legs, leg, x, out):
             out[3, k] = 0.0
         return
     if data.curve:
-        _curve_point(data, x, out)
+        p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
+        curve_point(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
         return
     rate, radius = data.rate, data.radius
     cos, sin = np.cos(rate * x), np.sin(rate * x)
@@ -142,10 +136,8 @@ def leg_tangent(legs, leg, x, out):
             out[k] = data.direction[k]
         return
     if data.curve:
-        point = np.empty((4, len(out)))
-        _curve_point(data, x, point)
-        for k in range(len(out)):
-            out[k] = point[1, k]
+        p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
+        curve_tangent(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
         return
     across = data.radius * data.rate
     cos, sin = across * np.cos(data.rate * x), across * np.sin(data.rate * x)

@@ -69,6 +69,7 @@ LAYERS = (
     "planner.optimal",
     "planner.methods",
     "planner.report",
+    "planner.control_files",
     "planner.commands",
     "planner.cli",
     "planner.__main__",
@@ -191,6 +192,7 @@ NOT_OF_A_PLAN = {
     "scipy.optimize",
     "numba.np.arraymath",
     "planner.report",
+    "planner.control_files",
     "planner.tube",
     "planner.nc.hpgl.plotter",
 }

@@ -7,10 +7,12 @@ from typing import Annotated
 import typer
 
 from planner.commands.compare import compare_command
+from planner.commands.export import export_command
 from planner.commands.info import info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
 from planner.commands.pulses import pulses_command
+from planner.commands.report import report_command
 from planner.commands.verify import verify_command
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
@@ -48,6 +50,8 @@ for name, command in {
     "verify": verify_command,
     "info": info_command,
     "pulses": pulses_command,
+    "export": export_command,
+    "report": report_command,
 }.items():
     app.command(name)(command)
 

@@ -16,8 +16,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, QuietOption, ToleranceOption
+from planner.commands.options import (
+    DEFAULT_MACHINE,
+    Job,
+    JsonOption,
+    QuietOption,
+    ToleranceOption,
+    takes_reading,
+)
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
     from planner.machine import Machine
@@ -25,6 +33,7 @@ if TYPE_CHECKING:
 
 
 @guarded
+@takes_reading
 def verify_command(
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
@@ -49,6 +58,8 @@ def verify_command(
     ] = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.geometry.build import toolpath_from_program
@@ -68,7 +79,8 @@ def verify_command(
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)
     taken = says.tolerance if machine is None and tolerance is None else None
-    toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance if taken is None else taken)
+    program = read_program(job, limits, reading)
+    toolpath = toolpath_from_program(program, limits, tolerance if taken is None else taken)
     if not len(toolpath):
         raise InputError("the program moves nothing: there is nothing to judge", source=str(job))
     motion, given, fitted = fit_axes(read.trajectory, read.given, toolpath)

@@ -5,8 +5,8 @@ acceleration at every switch. It is assumed from the time in which a drive build
 
     jerk = acceleration / ramp time
 
-`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one where the frame rings: a ramp
-excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step would.
+`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one where the frame rings: a
+ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step would.
 
 Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in machines for such controls.
 """

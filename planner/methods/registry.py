@@ -28,6 +28,7 @@ from planner.job.trace import Log
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.nc.reading import AS_USUAL, Reading
 
 DEFAULT_MACHINE = "mill"
 
@@ -45,6 +46,7 @@ def plan(
     shaped: bool = False,
     limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
+    reading: Reading = AS_USUAL,
     progress: Progress | None = None,
     log: Log | None = None,
 ) -> Plan:
@@ -67,6 +69,7 @@ def plan(
     limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order" keep them,
                 the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
+    reading   : what is refused, left out and assumed in a program file
     progress  : called with the stage's name and the fraction done (0 to 1)
     log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
@@ -102,12 +105,14 @@ def plan(
     if limits:
         machine = machine.with_own((*machine.own, *limits))
     if isinstance(program, Program):
+        if reading != AS_USUAL:
+            raise InputError("reading: the program is read already; give the settings to read_program")
         return method.plan(program, machine, tolerance, progress, log)
-    reading = Stages(progress)
-    with reading.stage("read"):
-        program = read_program(program, machine)
+    stages = Stages(progress)
+    with stages.stage("read"):
+        program = read_program(program, machine, reading)
     made = method.plan(program, machine, tolerance, progress, log)
-    return dataclasses.replace(made, timings=reading.timings | made.timings)
+    return dataclasses.replace(made, timings=stages.timings | made.timings)
 
 
 def make_method(

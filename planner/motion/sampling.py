@@ -46,18 +46,6 @@ REFINE_STEPS = 60
 CUBE_ROOT_ROUNDING = 4e-5
 
 
-class Law(NamedTuple):
-    """The fields of `TimeLaw`."""
-
-    t: FloatArray
-    s: FloatArray
-    feed: FloatArray
-    acc_s: FloatArray
-    jerk_s: FloatArray
-    run: Array
-    end: float
-
-
 class Grid(NamedTuple):
     """The fields of `PathSamples` that say where its intervals are on the elements of the path; and where its joints are on the
     programmed one."""
@@ -264,6 +252,7 @@ def sample(table, law, grid, inverse, times, axes):
     """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that each lies at; an interval
     of a span may cover several.
 
+    law     : `TimeLaw.columns`
     inverse : (P, 8), from `inverses`
     """
     legs, _, spans = table

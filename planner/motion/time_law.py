@@ -44,6 +44,11 @@ class TimeLaw:
             freeze(self, name, np.float64, (pieces,))
         freeze(self, "run", np.int64, (pieces,))
 
+    @property
+    def columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, Array, float]:
+        """The fields in their order, for compiled functions."""
+        return self.t, self.s, self.feed, self.acc_s, self.jerk_s, self.run, float(self.end)
+
 
 def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw:
     """The time law of a solution of any order, dwells included. Raises NotSolvedError without a solution."""

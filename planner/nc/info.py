@@ -20,6 +20,7 @@ from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
 from planner.nc.program import FEED_MOVES, MOVES, Kind, Program
 from planner.nc.reader import interpret, load
+from planner.nc.reading import AS_USUAL, Reading
 
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
@@ -70,14 +71,14 @@ class ProgramInfo:
 
 
 def inspect_program(
-    path: str | Path, machine: Machine | None = None, *, block_delete: bool = True
+    path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL
 ) -> ProgramInfo:
     """Read a program as far as it can be read and describe it.
 
     Raises InputError only if the file cannot be read, is empty or is not a text.
     """
     data = load(path)
-    program, faults = interpret(data, machine, source=str(path), block_delete=block_delete)
+    program, faults = interpret(data, machine, reading, source=str(path))
     return describe(program, lines=len(data.splitlines()), unsupported=tuple(faults))
 
 

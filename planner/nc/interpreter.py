@@ -1,7 +1,7 @@
 """Executing blocks in the order of RS274NGC, as LinuxCNC's interpreter has it:
 
-    F, S, T, M6, M3-M9, M48/M49, G4, plane, units, G40, tool length, work offset, path control, distance modes, G28/G30/G92,
-    motion, M0/M1/M60/M2/M30
+    feed mode, F, S, T, M62-M68, M6, M61, M3-M9, M48/M49, G4, plane, units, G7/G8, G40-G42, tool length, work offset, path control,
+    distance modes, G98/G99, G10/G28/G30/G52/G92, motion, M0/M1/M60/M2/M30
 
 Two consequences surprise. F is read in the units in force *before* a G20 or G21 on its line. M3 and M8 act before the line's move
 and M0 after it. G53 holds for its line only; a motion code alone on a line moves nothing.
@@ -16,21 +16,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.base.units import SECONDS_PER_MINUTE
+from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc import codes, moves
+from planner.nc import codes, drilling, feeds, homing, moves, offsets, signals, threads
+from planner.nc.assumed import Assumed
 from planner.nc.block import Block, read_block
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
 from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
-from planner.nc.splines import SPLINE_CODES, SplineReader, is_spline_line
+from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
+_COVET_AXES = (100, 280, 300, 520, 920)
 _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-_ROWS_AT_ONCE = 2  # blocks that one line can give beyond one per line (G28 through an intermediate point, a dwell, M6, M0)
+# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
+# make room for themselves.
+_ROWS_AT_ONCE = 4
+_SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
 
 
 _WHY_NO_MOTION = {
@@ -47,11 +53,13 @@ class Interpreter:
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
-    def __init__(self, machine: Machine | None, source: str):
-        self.source = source
+    def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
+        self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
         self.store = Store()
+        self.assumed = Assumed(reading)
+        self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.ended = False
         self._splines = SplineReader()
         self._begun = False
@@ -65,15 +73,16 @@ class Interpreter:
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
-        return self.store.finish(self.source, self.notes, frames)
+        return self.store.finish(self.source, self.notes, frames, self.reading)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed, each once, with its first line and how often."""
-        found = sorted(self._notes.items(), key=lambda note: note[1][0])
-        return tuple(
-            f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}" for text, (line, times) in found
-        )
+        found = [
+            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
+            for text, (line, times) in self._notes.items()
+        ]
+        return tuple(text for _, text in sorted(found + self.assumed.notes(), key=lambda note: note[0]))
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
@@ -81,11 +90,11 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = row if self._splines.open else run_plain(words, row, self.state, self.store)
+            after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
                 self.store.frame = int(words.frame[after])
-                block = read_block(words, after, self.report)
+                block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
                 elif block is not None:
@@ -94,6 +103,7 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
+        self.assumed.count_letters(words, row)
         self._splines.keep(words)
         self._keep_faults(words)
 
@@ -143,40 +153,26 @@ class Interpreter:
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
-        self._feed(block)
+        feeds.set_feed(self.state, block, self.note)
         self._events(block)
         if block.g.get("one-shot") == 40:
             self._dwell(block)
         self._modes(block)
         if not block.foreign:
+            self._check_parked(block)
+            homing.go_to_switches(self.state, self.store, block, self.note)
             self._one_shot(block)
             self._motion(block)
         stop = block.m.get("stopping")
-        if stop in (0, 10, 600):
+        if stop == 600:
+            self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
     # --- what is said before anything moves -------------------------------------------------------------------------------
-
-    def _feed(self, block: Block) -> None:
-        if "F" not in block.value:
-            return
-        feed = block.value["F"]
-        if not feed > 0:
-            raise WordFault(
-                block.at["F"],
-                "a feed must be positive; write the feed of the moves that follow, such as F1000",
-            )
-        self.state.feed = feed * self.state.unit / SECONDS_PER_MINUTE
-        code = block.g.get("units")
-        if code is not None and (code == 200) != (self.state.unit != 1.0):
-            unit = "mm" if self.state.unit == 1.0 else "inch"
-            self.note(
-                f"F{feed:g} is {unit} per minute: F acts before G{codes.number(code)} on the same line",
-                block.line,
-            )
 
     def _events(self, block: Block) -> None:
         state, store, line = self.state, self.store, block.line
@@ -186,22 +182,42 @@ class Interpreter:
                     block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
                 )
             store.add_event("S", block.value["S"], line)
+            state.spindle.speed = block.value["S"]
         if "T" in block.value:
             state.tool_selected = integer(block, "T", 0)
             store.add_event("T", state.tool_selected, line)
+        if "signals" in block.m:
+            signals.signal(self.store, block)
+        if "tool number" in block.m:
+            if "Q" not in block.value:
+                raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
+            state.tool_loaded = integer(block, "Q", 0)
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
             store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop that takes no time", line)
-        for group in ("spindle", "coolant", "override"):
+            self.note("a tool change is a full stop that takes no time and moves nothing", line)
+        for letter, value in block.events:
+            store.add_event(letter, value, line)
+        for group in ("spindle", "spindle orientation", "coolant", "override"):
             if group in block.m:
                 store.add_event("M", block.m[group] / 10, line)
+        state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
+        if "spindle mode" in block.g:
+            state.spindle.surface_speed = block.g["spindle mode"] == 960
+            if state.spindle.surface_speed and "S" not in block.value:
+                raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
         for code in block.g.values():
             if code in codes.G_EVENTS:
                 store.add_event("G", code / 10, line)
 
     def _dwell(self, block: Block) -> None:
         seconds = block.value.get("P")
+        if seconds is not None and self.assumed.printer:
+            seconds *= MILLISECOND
+            self.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        elif seconds is None and not self.assumed.strict and (self.assumed.printer or "S" in block.value):
+            seconds = block.value.get("S", 0.0)
+            self.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
         if seconds is None or seconds < 0:
             word = block.at["one-shot"] if seconds is None else block.at["P"]
             raise WordFault(
@@ -217,11 +233,13 @@ class Interpreter:
             set_units(state, g["units"])
             if self._units_at is None:
                 self._units_at = self.store.blocks
+        if "lathe diameter mode" in g:
+            state.diameters = g["lathe diameter mode"] == 70
         if "tool length" in g:
-            state.tool_length = self._tool_length(block) if g["tool length"] == 430 else 0.0
+            offsets.set_tool_offset(state, block, self.note)
         if "work offset" in g:
             state.system = g["work offset"]
-            if state.system not in self.setup.systems and state.system != 540:
+            if state.system not in state.systems and state.system != 540:
                 self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0", block.line)
         if "path control" in g:
             self._path_control(block)
@@ -229,13 +247,9 @@ class Interpreter:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
             state.absolute_centre = g["arc centre mode"] == 901
-        self.setup.apply_offsets(state)
-
-    def _tool_length(self, block: Block) -> float:
-        tool = integer(block, "H", 0) if "H" in block.value else self.state.tool_loaded
-        if tool not in self.setup.tools and tool != 0:
-            self.note(f"tool {tool} has no length in the machine file: 0", block.line)
-        return self.setup.tools.get(tool, 0.0)
+        if "retract mode" in g:
+            state.to_level, state.retract_given = g["retract mode"] == 980, True
+        state.apply_offsets()
 
     def _path_control(self, block: Block) -> None:
         state = self.state
@@ -257,98 +271,114 @@ class Interpreter:
         code = block.g.get("one-shot")
         if code is None or code in (40, 530):
             return
-        covets_axes = code in (280, 300, 920)
         motion = block.g.get("motion")
-        if covets_axes and motion is not None:
+        if code in _COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
             )
         if code in (280, 300):
-            self._go_home(block, code)
+            homing.go_home(self.state, self.store, block, self.note)
+        elif code in (281, 301):
+            offsets.store_position(self.state, code)
+        elif code == 100:
+            offsets.set_data(self.state, block, self.note)
         else:
-            self._shift_origin(block, code)
+            offsets.shift_origin(self.state, block)
 
-    def _go_home(self, block: Block, code: int) -> None:
-        """G28, G30: through the intermediate point, if there is one, to the machine's position (of the axes given)."""
-        state, name = self.state, f"G{codes.number(code)}"
-        if code not in self.setup.positions:
-            self.note(f"{name} has no position in the machine file: machine zero", block.line)
-        home = self.setup.positions.get(code, np.zeros(3))
-        if block.has("XYZ"):
-            state.position[:] = moves.target(self.state, block)
-            self.store.add(Kind.RAPID, block.line, state)
-        for axis, letter in enumerate("XYZ"):
-            if letter in block.value or not block.has("XYZ"):
-                state.position[axis] = home[axis]
-        self.store.add(Kind.RAPID, block.line, state)
-
-    def _shift_origin(self, block: Block, code: int) -> None:
-        """G92 makes the current position have the given coordinates; G92.1, G92.2 take that back, G92.3 brings it again."""
-        state = self.state
-        if code == 920:
-            if not block.has("XYZ"):
-                raise WordFault(
-                    block.at["one-shot"],
-                    "G92 needs at least one of X, Y and Z: the coordinates to give to this place",
-                )
-            for axis, letter in enumerate("XYZ"):
-                if letter in block.value:
-                    without = state.offset[axis] - state.g92[axis]
-                    state.g92[axis] = state.position[axis] - block.value[letter] * state.unit - without
-            state.g92_saved = state.g92.copy()
-        else:
-            state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
-            if code == 921:
-                state.g92_saved = np.zeros(3)
-        self.setup.apply_offsets(state)
+    def _check_parked(self, block: Block) -> None:
+        """Report words of axes that are not planned and would move."""
+        for letter in codes.PARKABLE:
+            if letter in block.value and not self.assumed.may_stand(
+                letter, block.value[letter], absolute=self.state.absolute
+            ):
+                self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
 
     def _motion(self, block: Block) -> None:
         state, one_shot = self.state, block.g.get("one-shot")
         if "motion" in block.g:
             code = block.g["motion"]
-            state.motion = code if code in SPLINE_CODES else code // 10
+            state.motion = code // 10 if code <= 30 else code
         elif "cycle end" in block.g:
-            state.motion = NO_MOTION
-        if one_shot in (280, 300, 920):
+            state.motion, state.series = NO_MOTION, None
+        if one_shot in _COVET_AXES or self._gives_offsets(block):
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
-        if state.motion in SPLINE_CODES or (self._splines.open and "motion" in block.g):
+        moves.check_words(state, block)
+        if state.motion in codes.SPLINES or (self._splines.open and "motion" in block.g):
             self._spline(block)
             return
-        if state.motion not in (2, 3):
-            moves.check_no_arc_words(state, block)
         if not moves.is_move(state, block):
+            if "motion" in block.g and state.motion > 3:
+                found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
+                raise WordFault(block.at["motion"], found)
             return
         if state.motion < 0:
             raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
-        if state.motion > 0 and not state.feed > 0:
-            found = f"G{state.motion} moves without a feed; write an F word on this line or before it"
-            raise WordFault(block.motion_word(), found)
-        target = moves.target(state, block)
-        if state.motion < 2:
-            state.position[:] = target
-            self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
+        if not self.assumed.strict:
+            self._take_default_feed(block)
+        if state.motion not in codes.CYCLES:
+            state.series = None
+        if state.in_thread and state.motion not in codes.THREADS:
+            threads.stop(state, self.store, block.line)
+        if state.motion in codes.THREADS:
+            threads.thread(state, self.store, block, self.note)
+        elif state.motion == codes.THREADING:
+            threads.cut_thread(state, self.store, block, self.note)
+        elif state.motion in codes.CYCLES:
+            feeds.check_feed(state, block)
+            drilling.drill(state, self.store, block, self.note)
+        else:
+            self._move(block)
+
+    def _take_default_feed(self, block: Block) -> None:
+        """The machine's feed for a feed move before the first F word."""
+        state, default = self.state, self.setup.feed_default
+        if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
             return
-        try:
-            arc = moves.arc(state, block, target)
-        finally:
-            state.position[:] = target
-        self.store.add_arc(arc, block.line, state)
+        state.feed = default
+        feed = default * SECONDS_PER_MINUTE / state.unit
+        self.note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
+
+    def _move(self, block: Block) -> None:
+        """G0, G1, G2, G3."""
+        state = self.state
+        target = moves.target(state, block)
+        if state.motion in (2, 3):
+            try:
+                feeds.check_feed(state, block)
+                arc, normal = moves.arc(state, block, target)
+                feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
+            finally:
+                state.position[:] = target
+            self.store.add_arc(arc, normal, block.line, state)
+            return
+        if state.motion == 1:
+            feeds.check_feed(state, block)
+            feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+        state.position[:] = target
+        self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
 
     def _spline(self, block: Block) -> None:
-        """A line of a spline."""
+        """A line of a spline; the curve is a block of its first line."""
         state = self.state
         if not is_spline_line(block):
             return
+        state.series = None
+        if state.in_thread:
+            threads.stop(state, self.store, block.line)
         found = self._splines.read(state, block, self.store.blocks)
         if found is None:
             return
-        if not state.feed > 0:
-            raise WordFault(
-                block.motion_word(), "a spline without a feed; write an F word on its first line or before it"
-            )
+        if not self.assumed.strict:
+            self._take_default_feed(block)
+        feeds.check_feed(state, block)
         (points, weights), line = found
         state.position[:] = points[-1, -1]
         self.store.add_spline(points, weights, line, state)
+
+    @staticmethod
+    def _gives_offsets(block: Block) -> bool:
+        """Whether the axis words are those of G43.1 or G43.2."""
+        return block.g.get("tool length") in (431, 432) and "motion" not in block.g

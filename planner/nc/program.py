@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.nc.reading import AS_USUAL, Reading
 
 
 class Kind(IntEnum):
@@ -61,6 +62,22 @@ class Frame:
     source: str
     line: int
     caller: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expansion:
+    """What was expanded to make a program of one that computes.
+
+    dialect : whose language it is: "linuxcnc" or "fanuc"
+    calls   : subprograms in the order of their first call, and how often each was called
+    turns   : turns of loops, jumps and calls
+    rows    : lines executed, each as often as it was
+    """
+
+    dialect: str
+    calls: tuple[tuple[str, int], ...]
+    turns: int
+    rows: int
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -116,6 +133,8 @@ class Program:
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
+    expansion    : what was expanded; None where nothing was
+    reading      : the settings it was read with
     """
 
     source: str
@@ -137,6 +156,8 @@ class Program:
     notes: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     frames: tuple[Frame, ...] = ()
+    expansion: Expansion | None = None
+    reading: Reading = AS_USUAL
 
     def __post_init__(self) -> None:
         axes = len(self.axes)

@@ -13,33 +13,35 @@ from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise
 from planner.nc.faults import Fault, require_none
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.detect import dialect_of
 from planner.nc.lexer import split_words
 from planner.nc.program import Program
+from planner.nc.reading import AS_USUAL, Reading
 
 
-def read_program(path: str | Path, machine: Machine | None = None, *, block_delete: bool = True) -> Program:
+def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
     """Read an NC program or a plotter file.
 
-    machine      : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
-                   None for zeros and blending
-    block_delete : leave out the lines that start with "/"
+    machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
+              None for zeros and blending
+    reading : what is refused, left out and assumed
 
     Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.
     """
-    return parse_program(load(path), machine, source=str(path), block_delete=block_delete)
+    return parse_program(load(path), machine, reading, source=str(path))
 
 
 def parse_program(
-    text: bytes | str, machine: Machine | None = None, *, source: str = "<text>", block_delete: bool = True
+    text: bytes | str, machine: Machine | None = None, reading: Reading = AS_USUAL, *, source: str = "<text>"
 ) -> Program:
     """Read an NC program given as text; like `read_program`."""
-    program, faults = interpret(text, machine, source=source, block_delete=block_delete)
+    program, faults = interpret(text, machine, reading, source=source)
     require_none(faults, source)
     return program
 
 
 def interpret(
-    text: bytes | str, machine: Machine | None, *, source: str, block_delete: bool
+    text: bytes | str, machine: Machine | None, reading: Reading = AS_USUAL, *, source: str
 ) -> tuple[Program, Sequence[Fault]]:
     """Run a program to its end, past everything that is not supported.
 
@@ -52,12 +54,17 @@ def interpret(
     if is_plotter_file(data, source):
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
-        return read_drawing(data, machine, source)
+        return read_drawing(data, machine, source, reading)
     foreign = recognise(data)
-    words = split_words(b"" if foreign else data, block_delete=block_delete)
+    words = split_words(b"" if foreign else data, block_delete=reading.block_delete)
     if not foreign and not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    interpreter = Interpreter(machine, source)
+    interpreter = Interpreter(machine, source, reading)
+    dialect = dialect_of(words, reading)
+    if dialect is not None:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+
+        return expand(interpreter, words, dialect)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
     return interpreter.program(), [foreign] if foreign else interpreter.faults()

@@ -21,12 +21,11 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc.bezier import cubic_pieces, homogeneous, raised
 from planner.nc.block import Block
+from planner.nc.codes import CUBIC, NURBS, NURBS_END, NURBS_WITH_KNOTS, QUADRATIC
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, target
 from planner.nc.state import State
 
-G5, G5_1, G5_2, G5_3, G6_2 = 50, 51, 52, 53, 62
-SPLINE_CODES = (G5, G5_1, G5_2, G5_3, G6_2)
 ORDERS = (2, 3, 4)
 # A first control point this near is where the machine stands [mm]: the least digit of metric programs.
 SAME_PLACE = 1e-3
@@ -39,7 +38,7 @@ class OpenSpline:
     """A curve of several lines, as far as it was read.
 
     line, word : where it begins
-    code       : G5_2 or G6_2
+    code       : NURBS or NURBS_WITH_KNOTS
     order      : degree plus one
     blocks     : of the program before it
     points     : control points (3,) [mm]
@@ -59,12 +58,12 @@ class OpenSpline:
     @property
     def ended(self) -> bool:
         """Whether a G6.2 curve has all of its knots."""
-        return self.code == G6_2 and len(self.knots) >= len(self.points) + self.order
+        return self.code == NURBS_WITH_KNOTS and len(self.knots) >= len(self.points) + self.order
 
     @property
     def unfinished(self) -> str:
         """What is said of a curve that is left before its end."""
-        if self.code == G5_2:
+        if self.code == NURBS:
             return f"the spline of line {self.line} does not end; write G5.3 after its last control point"
         return (
             f"the spline of line {self.line} has {len(self.points)} control points and {len(self.knots)} knots; order P{self.order} "
@@ -97,9 +96,9 @@ class SplineReader:
                 )
             if self.open is not None and _leaves(self.open, block):
                 raise WordFault(_any_word(block), self.open.unfinished)
-            if code in (G5, G5_1):
-                return (self._cubic if code == G5 else _quadratic)(state, block, blocks), block.line
-            if code == G6_2:
+            if code in (CUBIC, QUADRATIC):
+                return (self._cubic if code == CUBIC else _quadratic)(state, block, blocks), block.line
+            if code == NURBS_WITH_KNOTS:
                 return self._fanuc(state, block, blocks)
             return self._nurbs(state, block, blocks)
         except WordFault:
@@ -140,7 +139,7 @@ class SplineReader:
     def _nurbs(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
         """A line of G5.2, or G5.3."""
         opened, now = self.open, block.g.get("motion")
-        if now == G5_3:
+        if now == NURBS_END:
             if opened is None:
                 raise WordFault(
                     block.at["motion"],
@@ -149,13 +148,13 @@ class SplineReader:
             self.open = None
             return _even_knots(opened, block), opened.line
         if opened is None:
-            if now != G5_2:
+            if now != NURBS:
                 raise WordFault(
                     _any_word(block),
                     "control points of a spline after its G5.3; write G5.2, or another motion code",
                 )
             opened = OpenSpline(
-                block.line, block.at["motion"], G5_2, 3, blocks, [state.position.copy()], [1.0]
+                block.line, block.at["motion"], NURBS, 3, blocks, [state.position.copy()], [1.0]
             )
             self.open = opened
             if "P" in block.value and not block.has("XY"):
@@ -175,13 +174,13 @@ class SplineReader:
         """A line of G6.2."""
         opened = self.open
         if opened is None:
-            if block.g.get("motion") != G6_2:
+            if block.g.get("motion") != NURBS_WITH_KNOTS:
                 raise WordFault(
                     _any_word(block),
                     "words of a spline after its last knot; write G6.2, or another motion code",
                 )
             order = _order(block, "P") if "P" in block.value else 4
-            opened = self.open = OpenSpline(block.line, block.at["motion"], G6_2, order, blocks)
+            opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS_WITH_KNOTS, order, blocks)
         elif "P" in block.value:
             raise WordFault(block.at["P"], "the order P of a spline stands in its first line")
         first = not opened.points
@@ -216,9 +215,9 @@ def is_spline_line(block: Block) -> bool:
 def _leaves(opened: OpenSpline, block: Block) -> bool:
     """Whether the block's motion code leaves the open curve, or begins another one."""
     code = block.g.get("motion")
-    if opened.code == G5_2:
-        return code not in (None, G5_2, G5_3)
-    return code not in (None, G6_2)
+    if opened.code == NURBS:
+        return code not in (None, NURBS, NURBS_END)
+    return code not in (None, NURBS_WITH_KNOTS)
 
 
 def _any_word(block: Block) -> int:
@@ -259,7 +258,8 @@ def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
 
 def _offset(state: State, block: Block, letters: str) -> FloatArray:
     """(3,) the vector of two words [mm]."""
-    return np.array([block.value.get(letter, 0.0) * state.unit for letter in letters] + [0.0])
+    given = np.array([block.value.get(letter, 0.0) * state.unit for letter in letters] + [0.0])
+    return state.work_system().turn(given)
 
 
 def _weight(block: Block, letter: str) -> float:
@@ -280,10 +280,10 @@ def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray
     """(3,) the control point of a line of G6.2 [mm]; coordinates that it does not name are those of the point before."""
     if not state.absolute:
         raise WordFault(_any_word(block), "control points of G6.2 with G91 are not read; write G90 before it")
-    point = (opened.points[-1] if opened.points else state.position).copy()
-    for axis, letter in enumerate("XYZ"):
-        if letter in block.value:
-            point[axis] = block.value[letter] * state.unit + state.offset[axis]
+    here = state.position
+    state.position = opened.points[-1] if opened.points else here
+    point = target(state, block)
+    state.position = here
     if opened.points:
         return point
     away = float(np.linalg.norm(point - state.position))

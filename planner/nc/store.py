@@ -12,6 +12,7 @@ from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
 from planner.nc.program import FEED_MOVES, Frame, Kind, Program, Splines
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
 
@@ -102,9 +103,9 @@ class Store:
         block.frame[k] = self.frame
         self.blocks += 1
 
-    def add_arc(self, arc: Arc, line: int, state: State) -> None:
-        """Append an arc that ends at the state's position."""
-        self.arcs.append((self.blocks, arc.centre, state.normal, arc.sweep))
+    def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
+        """Append an arc about a normal axis that ends at the state's position."""
+        self.arcs.append((self.blocks, arc.centre, normal, arc.sweep))
         self.add(Kind.ARC, line, state)
 
     def add_spline(self, points: FloatArray, weights: FloatArray, line: int, state: State) -> None:
@@ -127,7 +128,9 @@ class Store:
         event.value[k] = value
         self.events += 1
 
-    def finish(self, source: str, notes: Sequence[str], frames: Sequence[Frame] = ()) -> Program:
+    def finish(
+        self, source: str, notes: Sequence[str], frames: Sequence[Frame] = (), reading: Reading = AS_USUAL
+    ) -> Program:
         """The program read so far; the arrays are cut to size, so that the spare room is given back.
 
         frames : the calls that the blocks stand in, for an expanded program
@@ -163,6 +166,7 @@ class Store:
                 value=self.event.value[seen].copy(),
             ),
             notes=tuple(notes),
+            reading=reading,
             frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
             frames=tuple(frames),
         )

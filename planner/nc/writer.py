@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.nc.lexer import Words, split_words
+from planner.nc.lexer import NUMBER, Words, split_words
 from planner.nc.program import FEED_MOVES, Program
 
 SIGNIFICANT = 4  # digits of a feed
@@ -29,18 +29,17 @@ FEED_MIN = 0.01
 SAME_FEED = 1e-6
 
 _F, _G = ord("F"), ord("G")
-_NUMBER = re.compile(rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*")
+_NUMBER = re.compile(NUMBER)
 
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
 
-def retimed(source: bytes, program: Program, feeds: FloatArray, *, block_delete: bool = True) -> bytes:
+def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
     """The program `source` with new feeds.
 
-    program      : what the reader made of `source`
-    feeds        : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
-                   never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
-    block_delete : as the program was read
+    program : what the reader made of `source`, with the settings that it was read with
+    feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
+              never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
@@ -50,7 +49,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, *, block_delete:
         raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
     if (asked < 0).any():
         raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
-    words = split_words(source, block_delete=block_delete)
+    words = split_words(source, block_delete=program.reading.block_delete)
     row = _rows(words, program.line[moving])
     unit = _unit_before(words)
     f_word = _f_words(words)

@@ -116,7 +116,7 @@ def _finite(feeds: FloatArray) -> FloatArray:
 def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
     """Whether a program's motion is the one of the plan's program, with or without its feeds."""
     try:
-        program = parse_program(text, plan.machine, source=plan.program.source)
+        program = parse_program(text, plan.machine, plan.program.reading, source=plan.program.source)
     except InputError:
         return False
     return _same(program, plan.program, (*_MOTION, "feed") if feeds else _MOTION)

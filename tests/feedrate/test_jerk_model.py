@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.random_paths import random_path
+from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import (
     BY_P,
     BY_U,
@@ -32,7 +33,7 @@ from planner.feedrate.jerk.layout import (
 )
 from planner.feedrate.jerk.riccati import forward, offsets, riccati
 from planner.feedrate.jerk.rows import PASSING, linearise
-from planner.feedrate.jerk.window import ScaledWindow, columns_of
+from planner.feedrate.jerk.window import ScaledWindow
 
 STEP_SIZE = 1e-6  # of the differences, share of each quantity's size
 N = LANES + 9  # one full block and a part of a second one

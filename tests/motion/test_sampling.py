@@ -8,7 +8,7 @@ from whole_plans import smooth_path
 
 from benchmarks import problems
 from planner.corners.elements import element_length, element_point
-from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, Law, inverses, sample
+from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses, sample
 from planner.nc.reader import parse_program
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
@@ -51,7 +51,7 @@ def test_samples_lie_where_their_arc_length_says(name):
     h = grid_of.s[interval + 1] - grid_of.s[interval]
     run = np.repeat(np.arange(len(grid_of.piece) - 1), np.diff(grid_of.piece))
     one = np.ones(len(grid_of.s))
-    law = Law(grid_of.s, grid_of.s, one, 0.0 * one, 0.0 * one, run, float(grid_of.s[-1]) + 1.0)
+    law = (grid_of.s, grid_of.s, one, 0.0 * one, 0.0 * one, run, float(grid_of.s[-1]) + 1.0)
     times = (grid_of.s[interval, None] + h[:, None] * SHARES).ravel()
     position, velocity, *_, s, _, _ = sample(table, law, grid, inverse, times, axes)
     np.testing.assert_allclose(s, times, rtol=1e-14)

@@ -13,6 +13,7 @@ from planner.machine import Machine
 from planner.nc.lexer import split_words
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.reader import parse_program
+from planner.nc.reading import Reading
 
 FIELDS = (
     "kind", "end", "feed", "dwell", "line", "path_control", "tolerance",
@@ -111,7 +112,7 @@ def test_order_of_words_does_not_matter() -> None:
 def test_byte_order_mark_and_block_delete() -> None:
     text = "\ufeffG0 X1\n/G0 X2\n / G0 X3\nG0 X4"
     assert ends(text) == [[1, 0, 0], [4, 0, 0]]
-    assert len(parse_program(text, block_delete=False)) == 4
+    assert len(parse_program(text, reading=Reading(block_delete=False))) == 4
 
 
 def test_percent_starts_and_ends() -> None:

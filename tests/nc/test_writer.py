@@ -24,6 +24,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
+from planner.nc.reading import Reading
 from planner.nc.writer import FEED_MIN, SAME_FEED, SIGNIFICANT, retimed, round_down
 
 # What one F word may take away at most by rounding down [-], and the rounding of units (25.4, 60) beside it.
@@ -176,8 +177,8 @@ def test_what_does_not_belong_together_is_refused() -> None:
 
 def test_deleted_blocks_that_are_read_are_written() -> None:
     source = b"F6000 G1 X1\n/X9\n"
-    program = parse_program(source, block_delete=False)
-    assert retimed(source, program, np.full(2, 10.0), block_delete=False) == b"F600 G1 X1\n/X9\n"
+    program = parse_program(source, reading=Reading(block_delete=False))
+    assert retimed(source, program, np.full(2, 10.0)) == b"F600 G1 X1\n/X9\n"
 
 
 # --- any program, in any spelling ----------------------------------------------------------------------------------------

@@ -6,11 +6,13 @@ See solver.py.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.feedrate.jerk.layout import ProblemColumns, Room
+from planner.feedrate.jerk.columns import ProblemColumns
+from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.window import ScaledWindow, Window
 
@@ -40,33 +42,39 @@ DIVISION = 5
 INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 
 
-class Chain:
-    """The profile of the points first..last of a problem as it grows, window by window, from rest at the first.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Task:
+    """The points first..last of a problem, to be solved from rest to rest.
 
-    profile : of all points of the problem; this chain's points are written
+    profile : of all points of the problem; these points are written
     tell    : called with the number of points that are new; may end the work by an exception
+    """
+
+    solver: JerkLimited
+    columns: ProblemColumns
+    profile: Profile
+    first: int
+    last: int
+    tell: Callable[[int], None]
+
+
+class Chain:
+    """The profile of a task as it grows, window by window, from rest at its first point.
+
     at      : up to which point there is a profile
     rest    : what the last window knows of the way ahead, down to its stop
     stops   : points where the profile rests because nothing better was found
     """
 
-    def __init__(
-        self,
-        solver: JerkLimited,
-        columns: ProblemColumns,
-        profile: Profile,
-        first: int,
-        last: int,
-        tell: Callable[[int], None],
-    ):
-        self.solver, self.columns, self.profile = solver, columns, profile
-        self.at, self.last = first, last
+    def __init__(self, task: Task):
+        self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
+        self.at, self.last = task.first, task.last
         self.rest: Window | None = None
         self.stops: list[int] = []
         self.iterations = 0
-        # windows solved; how often not from the first start, not with the first end, and divided into smaller ones
-        self.windows = self.other_starts = self.other_ends = self.divided = 0
-        self._tell = tell
+        # windows solved; how often not from the first start, and divided into smaller ones
+        self.windows = self.other_starts = self.divided = 0
+        self._tell = task.tell
         self._room = Room()
 
     def run(self, room: Room, until: int) -> None:

@@ -36,17 +36,18 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
 from planner.base.threads import side_by_side, threads
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.chain import INTERVALS_MIN
+from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
+from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.piece import Piece
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
-from planner.feedrate.jerk.window import columns_of
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
@@ -114,7 +115,6 @@ class JerkLimited:
                 "windows": sum(chain.windows for chain in chains)
                 + sum(len(piece.joined) for piece in pieces),
                 "other starts": sum(chain.other_starts for chain in chains),
-                "other ends": sum(chain.other_ends for chain in chains),
                 "joined": sum(piece.met for piece in pieces),
                 "divided": sum(chain.divided for chain in chains),
                 "standstills": len(stops),
@@ -131,8 +131,17 @@ class JerkLimited:
         most."""
         columns, counted = columns_of(problem), _Counted(len(problem), progress)
         pieces = [
-            Piece(self, columns, profile, int(first), int(beyond) - 1, counted.add)
-            for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True)
+            Piece(
+                Task(
+                    solver=self,
+                    columns=columns,
+                    profile=profile,
+                    first=first,
+                    last=beyond - 1,
+                    tell=counted.add,
+                )
+            )
+            for first, beyond in pairwise(problem.piece.tolist())
         ]
         # The longest first, so that none is left to one core at the end.
         order = sorted(pieces, key=lambda piece: piece.first - piece.last)

@@ -14,8 +14,8 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
+from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.layout import (
     DS,
     LAM_LOW,
@@ -26,7 +26,6 @@ from planner.feedrate.jerk.layout import (
     X_END,
     Blocks,
     P,
-    ProblemColumns,
     Room,
     X,
     profile,
@@ -38,7 +37,6 @@ from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 from planner.feedrate.jerk.track import track
-from planner.feedrate.lagrangian import acceleration_limits
 
 # A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
 START_ROOM = 0.9
@@ -55,22 +53,6 @@ DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [
 
 
 Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
-
-
-def columns_of(problem: FeedrateProblem) -> ProblemColumns:
-    """What the kernel needs to know of a problem."""
-    return ProblemColumns(
-        unit=float(problem.acceleration[: problem.machine_axes].max()),
-        s=problem.s,
-        x_max=problem.feed_sq_limit,
-        d1=problem.d1,
-        d2_left=problem.d2_left,
-        d2_right=problem.d2_right,
-        d3_left=problem.d3_left,
-        d3_right=problem.d3_right,
-        acceleration=acceleration_limits(problem),
-        jerk=problem.jerk_limit,
-    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -13,6 +13,7 @@ A fault is recorded and reading goes on with the next instruction, so that `info
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 
@@ -25,6 +26,7 @@ from planner.nc.hpgl.instructions import ALLOWED, FORMS, IGNORED, PAGE_ENDS, REF
 from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError
 from planner.nc.program import Kind, Program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import Setup
 
 MM_PER_CM = 10.0
@@ -38,7 +40,9 @@ class _NotDrawn(Exception):
     """The instruction cannot be executed; the text says why."""
 
 
-def read_drawing(data: bytes, machine: Machine | None, source: str) -> tuple[Program, Sequence[Fault]]:
+def read_drawing(
+    data: bytes, machine: Machine | None, source: str, reading: Reading = AS_USUAL
+) -> tuple[Program, Sequence[Fault]]:
     """Read a plotter file past everything that is not supported; the faults in the order of the file.
 
     Raises InputError for a file without any instruction.
@@ -53,7 +57,8 @@ def read_drawing(data: bytes, machine: Machine | None, source: str) -> tuple[Pro
             "the plotter file is empty: there is no instruction in it", source=source, line=1, column=1
         )
     control = Setup.of(machine).path_control
-    return run.drawing.finish(data, source, control, run.all_notes()), run.faults()
+    program = run.drawing.finish(data, source, control, run.all_notes())
+    return dataclasses.replace(program, reading=reading), run.faults()
 
 
 class _Run:

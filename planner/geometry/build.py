@@ -4,7 +4,7 @@ A joint is a full stop at both ends of the program, at a dwell or program stop, 
 or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
 tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
 
-A block along a spline becomes several segments (geometry/curves.py). Between them the motion goes on as at smooth joints, in exact stop
+A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them the motion goes on as at smooth joints, in exact stop
 mode too; where the spline itself has a kink there is a corner.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
-from planner.geometry.curves import CurveSegments, curve_segments
+from planner.geometry.curves import CHORD_SHARE, CurveSegments, curve_segments
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import Machine
 from planner.nc.bezier import homogeneous
@@ -40,7 +40,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     tolerance : contour tolerance [mm] that takes precedence over G64 P of the program and over the machine; None to use those
 
     Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis that moves and that the machine lacks,
-    coordinates beyond `COORDINATE_MAX`, and a spline with an infinite curvature.
+    and coordinates beyond `COORDINATE_MAX`.
     """
     if tolerance is not None and not (0 < tolerance < np.inf):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
@@ -55,7 +55,9 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     arc_of_block[program.arc_block] = np.arange(len(program.arc_block))
     chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
     moves = np.isin(program.kind, MOVES)
-    splines = _curves_of(program)
+    of_block = np.full(len(program), tolerance) if tolerance is not None else program.tolerance
+    of_block = np.where(np.isnan(of_block), machine.tolerance, of_block)
+    splines = _curves_of(program, of_block)
     spline_block = program.splines.block[splines.owner]
     count = np.where(program.kind == Kind.SPLINE, 0, chord > ZERO_LENGTH).astype(np.int64)
     count[program.arc_block] = 1
@@ -79,9 +81,10 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     tangent_start, tangent_end = _tangents(start, end, length, arc, arcs)
     tangent_start[is_curve], tangent_end[is_curve] = splines.ends[:, 0, 1], splines.ends[:, 1, 1]
     curvature = np.zeros(len(block))
-    curvature[is_arc], curvature[is_curve] = _curvature_bound(arcs), splines.curvature
+    curvature[is_arc] = _curvature_bound(arcs)
+    curvature[is_curve] = np.where(splines.chord, 0.0, splines.curvature)
     curve = np.full(len(block), -1, dtype=np.int64)
-    curve[is_curve] = np.arange(len(splines.length))
+    curve[is_curve] = np.where(splines.chord, -1, np.arange(len(splines.length)))
 
     theta = np.zeros(len(block) + 1)
     theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
@@ -105,7 +108,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         curvature=curvature,
         joint=joint,
         theta=theta,
-        tolerance=_tolerances(program, machine, block, tolerance),
+        tolerance=of_block[np.append(block[:1], block)],
         dwell=dwell,
         zero_length=np.flatnonzero(moves & ~real),
     )
@@ -150,19 +153,12 @@ def _check_coordinates(program: Program) -> None:
         )
 
 
-def _curves_of(program: Program) -> CurveSegments:
-    """The segments of all splines; pieces that go nowhere are left out."""
+def _curves_of(program: Program, tolerance: FloatArray) -> CurveSegments:
+    """The segments of all splines, for tolerances (B,) of the blocks [mm]; pieces that go nowhere are left out."""
     splines = program.splines
     goes = np.flatnonzero(np.ptp(splines.points, axis=1).max(axis=1, initial=0.0) > ZERO_LENGTH)
-    found, bad = curve_segments(homogeneous(splines.points[goes], splines.weights[goes]))
-    if len(bad):
-        block = int(splines.block[goes[bad[0]]])
-        raise InputError(
-            "the spline comes to a standstill, at a control point that stands on an end of it or at a cusp, and its curvature is "
-            "infinite there; move the control point, or write the spline as lines",
-            source=program.source,
-            line=int(program.line[block]),
-        )
+    near = CHORD_SHARE * tolerance[splines.block[goes]]
+    found = curve_segments(homogeneous(splines.points[goes], splines.weights[goes]), near)
     return found._replace(owner=goes[found.owner])
 
 
@@ -225,15 +221,6 @@ def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
         cut = program.kind[block] != Kind.RAPID
         feed[cut] = np.minimum(feed[cut], machine.feed_max)
     return feed
-
-
-def _tolerances(program: Program, machine: Machine, block: Array, tolerance: float | None) -> FloatArray:
-    """Budget at each joint: that of the block that ends there."""
-    if tolerance is not None:
-        return np.full(len(block) + 1, tolerance)
-    own = program.tolerance[block]
-    own = np.where(np.isnan(own), machine.tolerance, own)
-    return np.concatenate([own[:1], own])
 
 
 def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray) -> tuple[Array, FloatArray]:

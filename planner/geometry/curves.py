@@ -7,6 +7,9 @@ A segment of length L is C(u), u in [0, 1], of nc/bezier.py with 1 for its outer
 
 which changes nothing of the curve. Between the ends |dp/dx| differs from 1; the curves of a program are halved until it does by less
 than `UNEVEN`, and until they turn by less than `TURN_MAX`. At their ends p'' is the curvature vector.
+
+Where C' = 0, at a control point that stands on an end of the curve or at a cusp, the curvature is infinite and no halving helps. What is
+left there, within `CHORD_SHARE` of the tolerance of its chord, is run as that chord.
 """
 
 from __future__ import annotations
@@ -29,8 +32,10 @@ PLACES, BETWEEN = 33, 1.02
 BEND_MIN = 1e-9
 # Control points off their chord by less than this fraction of it are on it [-]: the rounding of coordinates.
 STRAIGHT = 1e-12
-# A curve whose halves do not become even after so many halvings stands still somewhere: there the curvature is infinite.
-HALVINGS = 40
+NOWHERE = 1e-9  # a chord shorter than this is none [mm]: the rounding of coordinates around 1e3 mm
+# What is not even after so many halvings becomes a chord if it is near enough to it; of seven curves of papers no segment needs as many.
+HALVINGS_EVEN, HALVINGS_MOST = 8, 60
+CHORD_SHARE = 0.01  # of the tolerance [-]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,6 +71,7 @@ class CurveSegments(NamedTuple):
     """The segments (n,) that the curves of a program are divided into, in order.
 
     owner     : (n,) row of the program's piece
+    chord     : (n,) True for what is run as a chord; then the rest is that of a straight curve
     curves    : the segments
     length    : (n,) arc length [mm]
     curvature : (n,) bound of |d2p/dx2| and of the curvature [1/mm]
@@ -73,6 +79,7 @@ class CurveSegments(NamedTuple):
     """
 
     owner: Array
+    chord: Array
     curves: Curves
     length: FloatArray
     curvature: FloatArray
@@ -84,57 +91,75 @@ def no_curves(axes: int) -> Curves:
     return Curves(points=np.zeros((0, 4, axes)), weight=np.zeros((0, 2)), twist=np.zeros(0))
 
 
-def curve_segments(pieces: FloatArray) -> tuple[CurveSegments, Array]:
-    """Divide rational cubics (K, 4, A+1), homogeneous as in nc/bezier.py, until each has a parameter like its arc length.
+def curve_segments(pieces: FloatArray, near: FloatArray) -> CurveSegments:
+    """Divide rational cubics until each has a parameter like its arc length.
 
-    Also returned: (m,) rows of pieces that stand still somewhere and have an infinite curvature there; the segments are then of no use.
+    pieces : (K, 4, A+1) homogeneous, as in nc/bezier.py
+    near   : (K,) largest distance of a chord from what it stands for [mm], > 0
     """
     axes = pieces.shape[2] - 1
     owner, rank, open_ = np.arange(len(pieces)), np.zeros(len(pieces)), evenly_weighted(_straightened(pieces))
-    done: list[tuple[Array, FloatArray, FloatArray]] = []
-    for halving in range(HALVINGS + 1):
+    done: list[tuple[Array, FloatArray, FloatArray, Array]] = []
+    for halving in range(HALVINGS_MOST + 1):
         good = _even(open_)
-        done.append((owner[good], rank[good], open_[good]))
+        chord = np.zeros(len(good), bool)
+        if halving >= HALVINGS_EVEN:
+            chord = ~good & ((_off_chord(open_) <= near[owner]) | (halving == HALVINGS_MOST))
+            open_ = np.where(chord[:, None, None], _chords(open_), open_)
+        good |= chord
+        done.append((owner[good], rank[good], open_[good], chord[good]))
         owner, rank, open_ = owner[~good], rank[~good], open_[~good]
         if not len(owner):
             break
         left, right = halves(open_)
         owner = np.concatenate([owner, owner])
         rank = np.concatenate([rank, rank + 0.5 ** (halving + 1)])
-        open_ = evenly_weighted(np.concatenate([left, right]))
-    found, where, even = (np.concatenate(column) for column in zip(*done, strict=True))
+        open_ = evenly_weighted(_straightened(np.concatenate([left, right])))
+    found, where, even, chord = (np.concatenate(column) for column in zip(*done, strict=True))
     order = np.lexsort([where, found])
-    found, even = found[order], even[order]
+    order = order[~chord[order] | (np.ptp(even[order][..., :-1], axis=1).max(axis=1, initial=0.0) > NOWHERE)]
+    found, even, chord = found[order], even[order], chord[order]
     length, curves = lengths(even), _curves(even, np.zeros(len(even)))
     x = np.linspace(0.0, 1.0, PLACES)
     row = np.repeat(np.arange(len(even)), PLACES)
     p = curves.at(row, length[row], (length[:, None] * x).ravel()).reshape(-1, PLACES, 4, axes)
     second, twist = _bounds(p)
-    segments = CurveSegments(
+    return CurveSegments(
         owner=found,
+        chord=chord,
         curves=_curves(even, BETWEEN * twist),
         length=length,
         curvature=np.maximum(BETWEEN * second, BEND_MIN),
         ends=p[:, [0, -1]],
     )
-    return segments, np.unique(owner)
 
 
 def _straightened(pieces: FloatArray) -> FloatArray:
     """The same pieces (K, 4, A+1), straight ones with their control points a third apart: many have them at the ends, where the
     parameter then stands still although the curve goes on."""
     points = pieces[..., :-1] / pieces[..., -1:]
-    off = points - points[:, :1]
+    chord = points[:, 3] - points[:, 0]
+    size = np.linalg.norm(chord, axis=1)
+    along = np.einsum("kpa,ka->kp", points, chord)
+    straight = (np.diff(along, axis=1) >= 0.0).all(axis=1) & (_off_chord(pieces) <= STRAIGHT * size)
+    return np.where(straight[:, None, None], _chords(pieces), pieces)
+
+
+def _off_chord(pieces: FloatArray) -> FloatArray:
+    """(K,) largest distance of the control points, and so of the curve, from the chord [mm]."""
+    off = pieces[..., :-1] / pieces[..., -1:] - pieces[:, :1, :-1] / pieces[:, :1, -1:]
     chord = off[:, 3]
     size_sq = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
-    along = np.einsum("kpa,ka->kp", off, chord) / size_sq[:, None]
-    aside = np.linalg.norm(off - along[..., None] * chord[:, None], axis=2).max(axis=1, initial=0.0)
-    in_order = (np.diff(along, axis=1) >= 0.0).all(axis=1)
-    straight = in_order & (aside <= STRAIGHT * np.sqrt(size_sq))
-    out, thirds = pieces.copy(), np.arange(4)[:, None] / 3.0
-    out[straight, :, :-1] = points[straight, :1] + thirds * chord[straight, None]
-    out[straight, :, -1] = 1.0
-    return out
+    along = np.clip(np.einsum("kpa,ka->kp", off, chord) / size_sq[:, None], 0.0, 1.0)
+    return np.asarray(np.linalg.norm(off - along[..., None] * chord[:, None], axis=2).max(axis=1, initial=0.0))
+
+
+def _chords(pieces: FloatArray) -> FloatArray:
+    """(K, 4, A+1) the chords of pieces, as cubics."""
+    first, last = (pieces[:, k, :-1] / pieces[:, k, -1:] for k in (0, 3))
+    thirds = np.arange(4)[:, None] / 3.0
+    points = first[:, None] + thirds * (last - first)[:, None]
+    return np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2)
 
 
 def _curves(even: FloatArray, twist: FloatArray) -> Curves:

@@ -8,8 +8,8 @@ A segment of length L is C(u), u in [0, 1], of nc/bezier.py with 1 for its outer
 which changes nothing of the curve. Between the ends |dp/dx| differs from 1; the curves of a program are halved until it does by less
 than `UNEVEN`, and until they turn by less than `TURN_MAX`. At their ends p'' is the curvature vector.
 
-Where C' = 0, at a control point that stands on an end of the curve or at a cusp, the curvature is infinite and no halving helps. What is
-left there, within `CHORD_SHARE` of the tolerance of its chord, is run as that chord.
+Where C' = 0, at a control point that stands on an end of the curve or at a cusp, the curvature is infinite and no halving helps; where
+it is all but 0 many would be needed. What is left there, within `CHORD_SHARE` of the tolerance of its chord, is run as that chord.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ BEND_MIN = 1e-9
 # Control points off their chord by less than this fraction of it are on it [-]: the rounding of coordinates.
 STRAIGHT = 1e-12
 NOWHERE = 1e-9  # a chord shorter than this is none [mm]: the rounding of coordinates around 1e3 mm
-# What is not even after so many halvings becomes a chord if it is near enough to it; of seven curves of papers no segment needs as many.
+# What is not even after so many halvings becomes a chord if it is near enough to it. The seven curves of papers need four at most.
 HALVINGS_EVEN, HALVINGS_MOST = 8, 60
 CHORD_SHARE = 0.01  # of the tolerance [-]
 
@@ -151,7 +151,9 @@ def _off_chord(pieces: FloatArray) -> FloatArray:
     chord = off[:, 3]
     size_sq = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(np.einsum("kpa,ka->kp", off, chord) / size_sq[:, None], 0.0, 1.0)
-    return np.asarray(np.linalg.norm(off - along[..., None] * chord[:, None], axis=2).max(axis=1, initial=0.0))
+    return np.asarray(
+        np.linalg.norm(off - along[..., None] * chord[:, None], axis=2).max(axis=1, initial=0.0)
+    )
 
 
 def _chords(pieces: FloatArray) -> FloatArray:

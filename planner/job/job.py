@@ -24,7 +24,7 @@ from planner.job.plan import Plan
 from planner.job.records import NO_TABLES, GridHistory, Tables
 from planner.job.stages import Stages
 from planner.job.trace import Tell
-from planner.lookahead.rest_to_rest import stop_times
+from planner.lookahead.stop_moves import stop_time
 from planner.machine import Machine
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.shaping import ShapedMotion
@@ -111,7 +111,7 @@ class Job:
     def stop_time(self) -> float:
         """Cycle time if every block ran from rest to rest [s], dwells included: the baseline of the plan."""
         machine, toolpath = self.real
-        return float(stop_times(toolpath, machine).sum() + np.sum(toolpath.dwell))
+        return stop_time(toolpath, machine)
 
     def behind_filters(self, motion: TimedT) -> TimedT:
         """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""

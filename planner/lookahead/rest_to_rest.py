@@ -13,35 +13,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.constraints import normal_limit
 from planner.corners.allocation import error_rate
-from planner.corners.smooth import curvature_jumps
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
 AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
 PHASES = 7  # a jerk-limited move from rest to rest
-
-
-def block_moves(toolpath: Toolpath) -> Array:
-    """(N+1,) first segment of each move from rest to rest, and M: a block, or a part of a spline between kinks and jumps of its
-    curvature, at which a motion cannot go on without a jump of its acceleration."""
-    curve, joint = toolpath.curve >= 0, np.arange(len(toolpath) + 1)
-    if not curve.any():
-        return joint
-    on = np.zeros(len(joint), bool)
-    on[1:-1] = (
-        curve[1:] & (toolpath.block[1:] == toolpath.block[:-1]) & (toolpath.joint[1:-1] == Joint.SMOOTH)
-    )
-    return np.flatnonzero(~on | curvature_jumps(toolpath, joint))
-
-
-def stop_times(toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """(N,) times of the N moves of `block_moves` from rest to rest [s]."""
-    first = block_moves(toolpath)[:-1]
-    limits = (np.minimum.reduceat(limit, first) for limit in block_limits(toolpath, machine))
-    return rest_to_rest_times(np.add.reduceat(toolpath.length, first), *limits)
 
 
 def rest_to_rest_times(length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray) -> FloatArray:

@@ -52,8 +52,8 @@ def _spline_notes(program: Program, toolpath: Toolpath) -> list[str]:
         return []
     return [
         f"line {toolpath.line[chords[0]]}: the spline all but stands still, at a control point on its end or at a cusp, where its "
-        f"curvature has no bound; a chord of {toolpath.length[chords[0]]:.3g} mm stands for it there, within {CHORD_SHARE:.0%} of the tolerance "
-        f"({len(chords):,} chords)"
+        f"curvature has no bound; a chord of {toolpath.length[chords[0]]:.3g} mm stands for it there, within {CHORD_SHARE:.0%} of the "
+        f"tolerance ({len(chords):,} chords)"
     ]
 
 

@@ -82,7 +82,7 @@ REFUSED = [
     ("G1 X1", 1, 1, ["G1", "without a feed"]),
     ("G1\nX1", 2, 1, ["X1", "without a feed"]),
     ("G0 X1\nG2 X2 I0.5", 2, 1, ["G2", "without a feed"]),
-    ("G28 G0 X1", 1, 1, ["G28", "G28 and G0", "two lines"]),
+    ("G28 G1 F1 X1", 1, 1, ["G28", "G28 and G1", "two lines"]),
     ("G92 G1 F1 X1", 1, 1, ["G92", "two lines"]),
     ("G92", 1, 1, ["G92", "at least one of X, Y and Z"]),
     ("G53 G2 X1 Y1 R1 F10", 1, 1, ["G53", "G0 or G1 only"]),
@@ -133,6 +133,7 @@ STRICTLY = [
     ("TEXT\n%\nG0 X1", 1, 1, ["T", "without a number"]),
     ("G15", 1, 1, ["G15", "does not know"]),
     ("G50 S1600", 1, 1, ["G50"]),
+    ("G28 G0 X1", 1, 1, ["G28", "G28 and G0", "two lines"]),
     ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
 ]
 

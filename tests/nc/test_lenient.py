@@ -54,6 +54,8 @@ HARMLESS = [
     ("G92 S1600", "1 largest spindle speed"),
     ("G15\nG69", "2 G codes that set the control or cancel what this reader does not have"),
     ("G5.1 Q1", "1 G code that sets the control"),
+    ("G10\nG11", "2 retractions of an extruder (G10, G11): they take no time in this plan; first G10 line 2"),
+    ("M21", "1 M code that this reader does not know"),
     ("G187 P3 E0.01", "1 G code that sets the control"),
     ("G8 P1", "1 G code that sets the control"),
     ("$X", "1 command to the control ($): assumed not to move anything; first $X line 2"),
@@ -101,6 +103,8 @@ def test_events_of_what_is_not_known_are_kept() -> None:
     [
         ("M777 X5", "2:1: M777"),  # a setting or a move: nobody knows
         ("M96 P100", "2:1: M96"),
+        ("M198 P5", "2:1: M198"),
+        ("G10 X5", "2:1: G10"),
         ("M290 Z0.1", "2:1: M290"),
         ("G29", "2:1: G29"),
         ("G50 X5 Z3", "2:1: G50"),
@@ -109,6 +113,7 @@ def test_events_of_what_is_not_known_are_kept() -> None:
         ("$TPW", "2:1: $"),
         ("G1 X2 E5 F60", "2:7: E5"),
         ("G1 X2 R5 F60", "2:7: R5"),
+        ("G1 X2 F60 ,R5", "2:11: ,: corner roundings"),
         ("G28 X1 Y", "2:8: Y"),
     ],
 )
@@ -138,6 +143,17 @@ def test_homing_and_changes_are_said() -> None:
         assert part in said
     there = parse_program("G0 X5\n$HX", machine(positions={"g28": {"x": 7.0}}))
     assert there.end[-1].tolist() == [7, 0, 0]
+
+
+def test_a_rapid_beside_g28_is_the_way_of_g28() -> None:
+    where = machine(positions={"g28": {"x": 9.0, "z": 90.0}})
+    program = parse_program("G21 G1 X1 Z2 F600\nG0 G91 G28 Z0\nG90 X3", where)
+    assert same_motion(program, parse_program("G21 G1 X1 Z2 F600\nG91 G28 Z0\nG90 G0 X3", where))
+    assert "line 2: the words beside G0 G28 are those of G28" in program.notes
+    with pytest.raises(InputError, match="two lines"):
+        parse_program("G0 G28 X0", reading=STRICT)
+    with pytest.raises(InputError, match="two lines"):
+        parse_program("G1 F60 G28 X0")
 
 
 # --- axes that stand still ------------------------------------------------------------------------------------------------

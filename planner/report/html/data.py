@@ -156,8 +156,8 @@ def _longest(at: Array, samples: Samples, rows: int) -> Array:
 
 
 def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArray:
-    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc and curve; every so many where they are more
-    than `most`."""
+    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc and curve; every so many where they are
+    more than `most`."""
     linear = [k for k, axis in enumerate(toolpath.axes) if axis in LINEAR_AXES]
     if not len(toolpath):
         return np.zeros((0, 3))

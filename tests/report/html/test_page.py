@@ -132,7 +132,7 @@ def test_distances_from_curves() -> None:
     shares = rng.random(len(segment))
     on = toolpath.curves.at(
         toolpath.curve[segment], toolpath.length[segment], shares * toolpath.length[segment]
-    )
+    )[:, 0]
     assert distance_near(toolpath, on, segment).max() < 1e-6
     off = on + np.array([0.0, 0.0, 0.3])
     np.testing.assert_allclose(distance_near(toolpath, off, segment), 0.3, atol=1e-9)

@@ -16,11 +16,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc import codes, drilling, feeds, homing, moves, offsets, signals, threads
+from planner.nc import codes, compensation, drilling, feeds, homing, moves, offsets, signals, threads
 from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block, read_block
+from planner.nc.cutter import Cutter, CutterFault
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
@@ -63,6 +65,8 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
+        self._cutter: Cutter | None = None
+        self._words: Words | None = None  # of the last chunk
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
@@ -74,7 +78,17 @@ class Interpreter:
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
+        self._end_compensation()
         return self.store.finish(self.source, self.notes, frames, self.reading)
+
+    def _end_compensation(self) -> None:
+        """Settle the last move, if the program just ends while compensation is on."""
+        if self._cutter is None or self._words is None:
+            return
+        try:
+            self._cutter.fix()
+        except CutterFault as fault:
+            self._found.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -87,7 +101,7 @@ class Interpreter:
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
-        row, rows = 0, len(words.line)
+        row, rows, self._words = 0, len(words.line), words
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
@@ -158,9 +172,15 @@ class Interpreter:
                 self.open_arcs.append((block.line, fault.otherwise))
             self.report(fault.word, fault.message)
             return block.m.get("stopping") in (20, 300)
+        except CutterFault as fault:
+            self.report(min(block.at.values()), str(fault))
+            self._cutter = self.state.actual = None  # what follows is read without compensation
+            return block.m.get("stopping") in (20, 300)
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
+        if self._cutter is not None:
+            compensation.check_words(self.state, block)
         feeds.set_feed(self.state, block, self.note)
         self._events(block)
         if block.g.get("one-shot") == 40:
@@ -172,6 +192,8 @@ class Interpreter:
             self._one_shot(block)
             self._motion(block)
         stop = block.m.get("stopping")
+        if stop is not None and self._cutter is not None:
+            self._cutter.fix()
         if stop == 600:
             self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
         if stop in (0, 10, 600) or block.stops:
@@ -243,6 +265,8 @@ class Interpreter:
                 self._units_at = self.store.blocks
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
+        if "cutter compensation" in g:
+            self._cutter = compensation.switch(state, self.store, block, self._cutter, self.note)
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.note)
         if "work offset" in g:
@@ -334,6 +358,8 @@ class Interpreter:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
             threads.stop(state, self.store, block.line)
+        if self._cutter is not None:
+            compensation.check_motion(state, block)
         if state.motion in codes.THREADS:
             threads.thread(state, self.store, block, self.note)
         elif state.motion == codes.THREADING:
@@ -355,22 +381,38 @@ class Interpreter:
 
     def _move(self, block: Block) -> None:
         """G0, G1, G2, G3."""
-        state = self.state
+        state, cutter = self.state, self._cutter
         target = moves.target(state, block)
-        if state.motion in (2, 3):
-            try:
-                feeds.check_feed(state, block)
-                arc, normal = moves.arc(state, block, target)
-                feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
-            finally:
-                state.position[:] = target
-            self.store.add_arc(arc, normal, block.line, state)
-            return
-        if state.motion == 1:
+        kind = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)[state.motion]
+        if kind != Kind.RAPID:
             feeds.check_feed(state, block)
+        if kind == Kind.ARC:
+            self._arc(block, target)
+            return
+        if kind == Kind.LINE:
             feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
-        state.position[:] = target
-        self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
+        if cutter is not None:
+            cutter.line(target, kind, block.line)
+            return
+        state.position[:], state.actual = target, None
+        self.store.add(kind, block.line, state)
+
+    def _arc(self, block: Block, target: FloatArray) -> None:
+        state = self.state
+        if self._cutter is None and state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
+            )
+        try:
+            arc, normal = moves.arc(state, block, target)
+            feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
+            if self._cutter is not None:
+                self._cutter.arc(target, arc, block.line)
+        finally:
+            state.position[:] = target
+        if self._cutter is None:
+            self.store.add_arc(arc, normal, block.line, state)
 
     @staticmethod
     def _gives_offsets(block: Block) -> bool:

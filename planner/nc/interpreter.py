@@ -67,11 +67,8 @@ class Interpreter:
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
         self._cutter: Cutter | None = None
-<<<<<<< HEAD
         self._words: Words | None = None  # of the last chunk
-=======
         self._splines = SplineReader()
->>>>>>> main
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21

@@ -18,7 +18,7 @@ from planner.machine import Machine
 from planner.nc.arcs import IN_PLANE
 from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
-from planner.nc.program import Kind, Program
+from planner.nc.program import Expansion, Kind, Program
 from planner.nc.reader import interpret, load
 from planner.nc.reading import AS_USUAL, Reading
 
@@ -47,6 +47,7 @@ class ProgramInfo:
     dwell            : sum of all dwells [s]
     tools            : tool numbers in the order of their T words
     notes            : what the reader assumed
+    expansion        : what was expanded: calls, turns of loops, lines executed; None where nothing was
     unsupported      : every construct that is not supported or not valid
     """
 
@@ -67,6 +68,7 @@ class ProgramInfo:
     dwell: float
     tools: tuple[int, ...]
     notes: tuple[str, ...]
+    expansion: Expansion | None
     unsupported: Sequence[Fault]
 
 
@@ -112,6 +114,7 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
         dwell=float(program.dwell.sum()),
         tools=tuple(int(event.text[1:]) for event in program.events if event.text[0] == "T"),
         notes=program.notes,
+        expansion=program.expansion,
         unsupported=unsupported,
     )
 

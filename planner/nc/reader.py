@@ -5,7 +5,7 @@ and what to do. The content of a text says which of the two it is, and its name 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
@@ -13,10 +13,11 @@ from planner.base.files import require_ending
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, recognise, refuse_models
 from planner.nc.faults import Fault, require_none
+from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import dialect_of
 from planner.nc.leader import without_leader
-from planner.nc.lexer import split_words
+from planner.nc.lexer import Words, split_words
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, Reading
 
@@ -58,22 +59,31 @@ def interpret(
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
-    foreign = recognise(data)
+    foreign = recognise(data) if reading.dialect == AUTO else None
     if foreign:
         return Interpreter(machine, source, reading).program(), [foreign]
-    run, program, faults = _run(data, machine, reading, source)
+    run, program, faults = execute(data, machine, reading, source)
     if reading.arc_centres == AUTO and not reading.strict and run.all_arcs_close_otherwise:
         absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
-        other, as_absolute, found = _run(data, machine, absolute, source)
+        other, as_absolute, found = execute(data, machine, absolute, source)
         if not other.open_arcs:
             return _with_note(as_absolute, run.open_arcs), found
     return program, faults
 
 
-def _run(
-    data: bytes, machine: Machine | None, reading: Reading, source: str
+def execute(
+    data: bytes,
+    machine: Machine | None,
+    reading: Reading,
+    source: str,
+    tee: Callable[[Words], None] | None = None,
 ) -> tuple[Interpreter, Program, Sequence[Fault]]:
-    """Execute a program. Raises InputError if there is no word in it."""
+    """Execute a program once, as `reading` says.
+
+    tee : gets the expanded rows of a program that computes, chunk by chunk
+
+    Raises InputError if there is no word in it.
+    """
     data, leader = (data, "") if reading.strict else without_leader(data)
     words = split_words(data, block_delete=reading.block_delete)
     if not len(words.line):
@@ -82,10 +92,12 @@ def _run(
     if leader:
         interpreter.note(f"the text before the first % is not read ({leader!r})", 1)
     dialect = dialect_of(words, reading)
+    integers = integers_of(machine, dialect)
+    words = integers.applied(words)
     if dialect is not None:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
-        return interpreter, *expand(interpreter, words, dialect)
+        return interpreter, *expand(interpreter, words, dialect, integers, tee)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
     return interpreter, interpreter.program(), interpreter.faults()

@@ -175,6 +175,7 @@ def info_summary(info: ProgramInfo) -> dict[str, Any]:
     Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
     """
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
+    fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
     fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
     fields["unsupported_places"] = len(info.unsupported)
     return plain(fields)

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from planner.job.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
+    from planner.nc.program import Expansion
     from planner.verify import CornerCheck, Ringing, Verdict
 
+CALLS_SHOWN = 10  # subprograms that `info` names
 CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.corners` has them all
 FAULTS_SHOWN = 8
 NOTES_SHOWN = 8
@@ -140,10 +142,22 @@ def info_table(info: ProgramInfo) -> Group:
         table.add_row("tools", ", ".join(f"T{tool}" for tool in info.tools))
     if info.events:
         table.add_row("other words", _counts(info.events))
+    if info.expansion is not None:
+        table.add_row("expanded", _expanded(info.expansion))
     notes = [Text(f"note: {note}") for note in info.notes]
     if not info.unsupported:
         return _titled(title, table, *notes, Text("every construct is supported", style="green"))
     return _titled(title, table, *notes, *_unsupported(info.unsupported))
+
+
+def _expanded(expansion: Expansion) -> str:
+    """What was expanded, most called subprograms first."""
+    calls = sorted(expansion.calls, key=lambda call: -call[1])
+    shown = ", ".join(f"{name} {times:,} times" for name, times in calls[:CALLS_SHOWN])
+    more = f" and {len(calls) - CALLS_SHOWN:,} more" if len(calls) > CALLS_SHOWN else ""
+    called = f"called {shown}{more}; " if calls else ""
+    turns = f"{expansion.turns:,} turns of loops, jumps and calls; " if expansion.turns else ""
+    return f"as {expansion.dialect}: {called}{turns}{expansion.rows:,} lines executed"
 
 
 def _unsupported(faults: Sequence[Fault]) -> list[Text]:

@@ -27,8 +27,9 @@ from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
-from planner.nc.program import Frame, Kind, PathControl, Program
+from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
@@ -67,6 +68,7 @@ class Interpreter:
         self.ended = False
         self._cutter: Cutter | None = None
         self._words: Words | None = None  # of the last chunk
+        self._splines = SplineReader()
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
@@ -105,7 +107,7 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(words, row, self.state, self.store, self.assumed)
+            after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
                 self.store.frame = int(words.frame[after])
@@ -118,6 +120,7 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
+        self._splines.keep(words)
         self._keep_faults(words)
         self.assumed.count_letters(words, row)
 
@@ -139,7 +142,7 @@ class Interpreter:
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self._found)
+        return FaultList(self._found + self._splines.faults())
 
     def _keep_faults(self, words: Words) -> None:
         """Keep the chunk's faults in the order of its words."""
@@ -160,7 +163,7 @@ class Interpreter:
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
-        moves = np.flatnonzero(self.store.block.kind[: self.store.blocks] <= Kind.ARC)
+        moves = np.flatnonzero(np.isin(self.store.block.kind[: self.store.blocks], MOVES))
         if len(moves) and (self._units_at is None or moves[0] < self._units_at):
             self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
 
@@ -345,6 +348,9 @@ class Interpreter:
         if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
             self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
+        if state.motion in codes.SPLINES or (self._splines.open and "motion" in block.g):
+            self._spline(block)
+            return
         if not moves.is_move(state, block):
             if "motion" in block.g and state.motion > 3:
                 found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
@@ -413,6 +419,26 @@ class Interpreter:
             state.position[:] = target
         if self._cutter is None:
             self.store.add_arc(arc, normal, block.line, state)
+
+    def _spline(self, block: Block) -> None:
+        """A line of a spline; the curve is a block of its first line."""
+        state = self.state
+        if not is_spline_line(block):
+            return
+        if self._cutter is not None:
+            raise WordFault(block.motion_word(), "a spline under cutter radius compensation; write G40 before it")
+        state.series = None
+        if state.in_thread:
+            threads.stop(state, self.store, block.line)
+        found = self._splines.read(state, block, self.store.blocks)
+        if found is None:
+            return
+        if not self.assumed.strict:
+            self._take_default_feed(block)
+        feeds.check_feed(state, block)
+        (points, weights), line = found
+        state.position[:] = points[-1, -1]
+        self.store.add_spline(points, weights, line, state)
 
     @staticmethod
     def _gives_offsets(block: Block) -> bool:

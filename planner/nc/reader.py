@@ -11,15 +11,15 @@ from pathlib import Path
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.machine import Machine
-from planner.nc.dialects import is_plotter_file, recognise, refuse_models
+from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import dialect_of
 from planner.nc.leader import without_leader
-from planner.nc.lexer import Words, split_words
+from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.program import Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, SIEMENS, Reading
 
 
 def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
@@ -48,7 +48,7 @@ def interpret(
 ) -> tuple[Program, Sequence[Fault]]:
     """Run a program to its end, past everything that is not supported.
 
-    Returns the program and the faults, in the order of the lines. A program in another language is one fault, and nothing of it is run.
+    Returns the program and the faults, in the order of the lines.
 
     Raises InputError for an empty or binary text.
     """
@@ -59,9 +59,6 @@ def interpret(
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
-    foreign = recognise(data) if reading.dialect == AUTO else None
-    if foreign:
-        return Interpreter(machine, source, reading).program(), [foreign]
     run, program, faults = execute(data, machine, reading, source)
     if reading.arc_centres == AUTO and not reading.strict and run.all_arcs_close_otherwise:
         absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
@@ -84,18 +81,26 @@ def execute(
 
     Raises InputError if there is no word in it.
     """
-    data, leader = (data, "") if reading.strict else without_leader(data)
+    interpreter = Interpreter(machine, source, reading)
+    language = language_of(data) if reading.dialect == AUTO else reading.dialect
+    if language == HEIDENHAIN:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+
+        return interpreter, *expand(
+            interpreter, text_alone(data), HEIDENHAIN, integers_of(machine, HEIDENHAIN), tee
+        )
+    if language != SIEMENS and not reading.strict:
+        data, leader = without_leader(data)
+        if leader:
+            interpreter.note(f"the text before the first % is not read ({leader!r})", 1)
     words = split_words(data, block_delete=reading.block_delete)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    interpreter = Interpreter(machine, source, reading)
-    if leader:
-        interpreter.note(f"the text before the first % is not read ({leader!r})", 1)
-    dialect = dialect_of(words, reading)
+    dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
     integers = integers_of(machine, dialect)
     words = integers.applied(words)
     if dialect is not None:
-        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+        from planner.nc.language.expand import expand
 
         return interpreter, *expand(interpreter, words, dialect, integers, tee)
     interpreter.execute(words)

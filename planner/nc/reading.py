@@ -18,8 +18,8 @@ AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
 ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
 REFUSE, IGNORE = "refuse", "ignore"
 EXTRUDERS = (REFUSE, IGNORE)
-LINUXCNC, FANUC = "linuxcnc", "fanuc"
-DIALECTS = (AUTO, LINUXCNC, FANUC)
+LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
+DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
 
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?")

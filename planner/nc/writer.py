@@ -21,7 +21,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.leader import without_leader
 from planner.nc.lexer import NUMBER, Words, split_words
-from planner.nc.program import Kind, Program
+from planner.nc.program import FEED_MOVES, Program
 
 SIGNIFICANT = 4  # digits of a feed
 # The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
@@ -44,7 +44,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
-    moving = np.flatnonzero((program.kind == Kind.LINE) | (program.kind == Kind.ARC))
+    moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES))
     asked = np.asarray(feeds, dtype=np.float64)
     if asked.shape != (len(program),):
         raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")

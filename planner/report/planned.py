@@ -149,7 +149,15 @@ def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
 
 
 def _same(one: Program, other: Program, names: tuple[str, ...]) -> bool:
-    return len(one) == len(other) and all(
-        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name == "tolerance")
-        for name in names
+    splines = all(
+        np.array_equal(getattr(one.splines, n), getattr(other.splines, n))
+        for n in ("block", "points", "weights")
+    )
+    return (
+        splines
+        and len(one) == len(other)
+        and all(
+            np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name == "tolerance")
+            for name in names
+        )
     )

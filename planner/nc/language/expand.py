@@ -15,13 +15,17 @@ from planner.nc.interpreter import Interpreter
 from planner.nc.language import fanuc, linuxcnc
 from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked
 from planner.nc.language.compiled import ProgramFault, compile_procedures
+from planner.nc.language.heidenhain import text as heidenhain_text
+from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
 from planner.nc.language.rows import Rows
 from planner.nc.language.run import Run
+from planner.nc.language.siemens import text as siemens_text
+from planner.nc.language.siemens.parser import Parser as SiemensParser
 from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
-from planner.nc.reading import FANUC, LINUXCNC
+from planner.nc.reading import FANUC, HEIDENHAIN, LINUXCNC, SIEMENS
 
 ENTRIES_MAX = 10_000  # files and folders that are looked at for a called file
 FILE_MAX = 100_000_000  # bytes of a called file
@@ -78,6 +82,10 @@ _FRONTS = {
         linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
     ),
     FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
+    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, Asked, HeidenhainParser, lambda name: frozenset()),
+    SIEMENS: _Front(
+        siemens_text.LANGUAGE, siemens_text.SiemensAsked, SiemensParser, lambda name: frozenset()
+    ),
 }
 
 

@@ -66,18 +66,6 @@ def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw
     )
 
 
-def law_of_phases(samples: PathSamples, duration: FloatArray, jerk_s: FloatArray) -> TimeLaw:
-    """The time law of moves from rest to rest, one per piece of the path, dwells included.
-
-    duration : (G, F) durations of the F phases of each move [s]
-    jerk_s   : (G, F) jerk along the path in each phase [mm/s3]
-    """
-    moves = len(duration)
-    return law_of_moves(
-        samples, np.arange(moves), samples.s[samples.piece[:-1]], np.zeros(moves), duration, jerk_s
-    )
-
-
 def law_of_moves(
     samples: PathSamples,
     run: Array,

@@ -50,9 +50,9 @@ def splined_with_stops(
         at = lost_joints(rounded, shape, fence=again == STOP_ROUNDS - 1)
         if not len(at):
             break
-        stopping = rounded.toolpath.with_joints(at, Joint.STOP)
+        stopping, legs = rounded.toolpath.with_joints(at, Joint.STOP), rounded.legs
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
-        shape = spline_shape(rounded, machine)
+        shape = spline_shape(rounded, machine, shape if len(rounded.legs) == len(legs) else None)
         _tell_of(shape, tell, len(at))
     return rounded, shape
 

@@ -30,17 +30,20 @@ from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than the first of these [-], and not for long: the first round gains 3e-3 of the
+# Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 3e-3 of the
 # time, the second 7e-5, a third gained 1e-6 (means over 345 plans, benchmarks/retries.py). For jobs of more grid points, where the
-# time it takes counts, it is done once, above the second: that leaves less than half of the excess.
-TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 2, 50_000
+# time it takes counts, it is done while slowing down costs more than the last [share of the time].
+TIGHTENED_EXCESS = 1e-5
+TIGHTENING_ROUNDS, TIGHTENED_POINTS, TIGHTENED_LOSS = 2, 50_000, 2e-4
 # What is slowed down is slowed down by this much more [-]: of 928 motions none needed it twice (benchmarks/retries.py). Less is
 # rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
+# Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places
+# of its own, and finds up to 2.4e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
+SEEN_BEFORE = 1.0 + 1e-5
 ORDER = {limit.name: limit.order for limit in LIMITS}
 
 
@@ -157,8 +160,9 @@ def within_limits(
     tell("between points", found=least, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
-    for _ in range(1 if large else TIGHTENING_ROUNDS):
-        if factor.max() <= 1.0 + TIGHTENED_EXCESS[large]:
+    unslowed = motion.end
+    for _ in range(TIGHTENING_ROUNDS):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS or (large and least < (1.0 + TIGHTENED_LOSS) * unslowed):
             break
         room *= np.maximum(factor, 1.0)
         problem = tightened(planned.problem, room)
@@ -172,7 +176,8 @@ def within_limits(
         if end < least:
             best, least = (tighter, motion, factor), end
     planned, motion, factor = best
-    return planned, slowed(motion, toolpath, machine, factor)
+    motion = slowed(motion, toolpath, machine, factor)
+    return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:

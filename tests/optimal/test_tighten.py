@@ -18,10 +18,13 @@ from planner.feedrate.solution import ratios_by_limit
 from planner.geometry.build import toolpath_from_program
 from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion, sample_motion
+from planner.optimal import tighten
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import ThirdOrder
 from planner.optimal.tighten import (
+    SEEN_BEFORE,
     SLOWING_MORE,
+    TIGHTENED_LOSS,
     excess,
     slowed,
     slower,
@@ -155,3 +158,13 @@ def test_a_joint_that_is_an_axis_has_its_excess(coarse):
     of_joint = excess(motion, toolpath, without.with_own((AlongX(),)))
     assert of_axis.max() > 1.0 + 1e-3  # else this test shows nothing
     np.testing.assert_allclose(of_joint, of_axis, rtol=1e-9)
+
+
+def test_long_jobs_are_tightened_while_it_pays_and_slowed_for_what_the_verifier_may_find(coarse, monkeypatch):
+    planned, _, toolpath, before = coarse
+    assert before > 1.0 + TIGHTENED_LOSS
+    _, short = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
+    monkeypatch.setattr(tighten, "TIGHTENED_POINTS", 10)
+    _, long = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
+    assert short.end <= long.end <= short.end * (1.0 + TIGHTENED_LOSS) * SEEN_BEFORE
+    assert excess(long, toolpath, MACHINE).max() <= 1.0 - 0.9 * (SEEN_BEFORE - 1.0)

@@ -37,6 +37,9 @@ END_OF_FILE = "File ended with no percent sign"  # LinuxCNC wants M2, M30 or %; 
 # Programs that LinuxCNC refuses and the reader accepts, with the reason. (None so far.)
 ONLY_HERE: dict[str, str] = {}
 
+# Programs that cut threads: the oracle does not say at which feed.
+THREADS = ("LinuxCNC__linuxcnc__lathe-g76.ngc",)
+
 ORACLE_MISSING = None
 if shutil.which("rs274") is None:
     ORACLE_MISSING = "rs274 (Debian package linuxcnc-uspace) is not installed"
@@ -142,7 +145,7 @@ def test_real_programs_agree(tmp_path: Path) -> None:
             assert canon.error, f"{path.name}: LinuxCNC reads it by now; take it off the list"
             continue
         assert not canon.error or END_OF_FILE in canon.error, f"{path.name}: {canon.error}"
-        assert_same_motion(program, canon, centre=1e-6)
+        assert_same_motion(program, canon, centre=1e-6, feeds=path.name not in THREADS)
 
 
 # --- small programs made by chance, over the modes -------------------------------------------------------------------------

@@ -186,7 +186,7 @@ class Parser:
                 self.faults.append(ProgramFault(place, fault.message))
             except ProgramFault as fault:
                 self.faults.append(fault)
-        for left in self.open[:1]:
+        for left in self.open[:1] if not self.faults else ():
             self.faults.append(
                 ProgramFault(
                     left.place, f"this {left.kind} has no end; write o{left.label} {_end_of(left.kind)}"

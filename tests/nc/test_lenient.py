@@ -164,6 +164,9 @@ def test_an_axis_may_be_named_while_it_stands(letter: str, value: str) -> None:
 
 def test_an_incremental_word_that_is_not_zero_moves() -> None:
     assert len(parse_program("G21 G0 A90 X1\nG91 A0 X1\nG90 A90 X1")) == 3
+    for by_the_interpreter in ("G2 X3 I1 F60 A91", "M8 G0 A91", "G90 X2 A0", "G28 A91"):
+        with pytest.raises(InputError, match="that moves"):
+            parse_program(f"G21 G0 A90 X1\n{by_the_interpreter}")
     for moving in ("G91 A90 X1", "G91\nG0 A90 X1", "G91 A1"):
         with pytest.raises(InputError, match="that moves"):
             parse_program(f"G21 G0 A90 X1\n{moving}")

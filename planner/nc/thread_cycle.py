@@ -98,7 +98,7 @@ def passes(thread: Thread) -> Iterator[Cut]:
 
 
 def read_thread(state: State, block: Block, end: float) -> Thread:
-    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that are missing or impossible."""
+    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that are missing or wrong."""
     word, value = block.motion_word(), block.value
     for letter, what in _NEEDED.items():
         if letter not in value:

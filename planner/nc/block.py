@@ -16,7 +16,7 @@ from planner.nc import codes
 from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
 from planner.nc.commands import MESSAGE, command, homed
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
-from planner.nc.settings import EVERYTHING, EXTRUDER_MODES, TEXTS, setting
+from planner.nc.settings import ALWAYS_READ, EVERYTHING, EXTRUDER_MODES, TEXTS, setting
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
@@ -115,7 +115,9 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
                 return None
         elif letter in "GM":
             owned = ""
-            taken = _settle(words, word, (first, last), block, assumed)
+            taken = None
+            if value * 10.0 not in ALWAYS_READ[letter] or assumed.reading.ignore:
+                taken = _settle(words, word, (first, last), block, assumed)
             if taken is not None:
                 owned = taken
             else:

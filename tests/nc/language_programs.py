@@ -1,7 +1,6 @@
 """Programs made by chance over LinuxCNC's language: parameters, expressions, O words, calls, questions about the state.
 
-Every program ends: loops count, recursion has a depth, and words are kept small by MOD. Some programs fail on the way (division by zero,
-an unknown name); whoever compares must then find the same moves before it.
+Every program ends: loops count, and words are kept small by MOD. With `risky`, programs may fail on the way (division by zero).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Parameters, expressions, O words and macros: against LinuxCNC's interpreter, against programs written out, and where they fail.
 
-LinuxCNC differs on purpose from this reader in three places, which the random programs leave out: it computes the conditions of branches
-and the results of subprograms that it passes over; a number divided by 0 with MOD, or 0 to a negative power, is an error there only if
-the result reaches a word; break and continue lose count in loops around and after them.
+LinuxCNC differs from this reader in three places, which the random programs leave out: it computes the conditions of branches and the
+results of subprograms that it passes over; a number divided by 0 with MOD, or 0 to a negative power, is an error there only if the
+result reaches a word; after break and continue some loops around and behind them make other numbers of turns.
 """
 
 from __future__ import annotations
@@ -29,14 +29,17 @@ EXAMPLES = [
     "#1=0\no100 while [#1 LT 3]\n#2=0\no101 while [#2 LT 2]\n#[10+#1]=[#1*#2]\nG0 X[#1*10] Y[#2*5]\nG1 Z-1\nG0 Z#[10+#1]\n"
     "#2=[#2+1]\no101 endwhile\n#1=[#1+1]\no100 endwhile",
     # a circle in chords, from a subprogram with a result
-    "o<chord> sub\nG1 X[#1*COS[#2]] Y[#1*SIN[#2]]\no<chord> endsub [#2+30]\n#<angle>=0\no1 repeat [12]\no<chord> call [7.5] [#<angle>]\n"
+    "o<chord> sub\nG1 X[#1*COS[#2]] Y[#1*SIN[#2]]\no<chord> endsub [#2+30]\n#<angle>=0\no1 repeat [12]\n"
+    "o<chord> call [7.5] [#<angle>]\n"
     "#<angle>=#<_value>\no1 endrepeat",
     # names: local ones are a call's own, those with an underscore are shared
-    "#<a>=1 #<_s>=2\no10 sub\n#<a>=[#1+10]\n#<_s>=[#<_s>+#<a>]\nG1 X#<a> Y#<_s>\no10 endsub\no10 call [3]\no10 call [4]\nG1 X#<a> Y#<_s>",
+    "#<a>=1 #<_s>=2\no10 sub\n#<a>=[#1+10]\n#<_s>=[#<_s>+#<a>]\nG1 X#<a> Y#<_s>\no10 endsub\no10 call [3]\n"
+    "o10 call [4]\nG1 X#<a> Y#<_s>",
     # a call within a call keeps #1 to #30 apart
     "o20 sub\nG1 X#1 Y#2\no21 call [#2] [#1]\nG1 X#1 Y#2\no20 endsub\no21 sub\n#1=[#1+100]\nG1 Z#1\no21 endsub\no20 call [1] [2]",
     # return with a value from the middle
-    "o30 sub\no31 if [#1 GT 2]\no30 return [#1*2]\no31 endif\nG1 Z5\no30 endsub [-1]\no30 call [3]\nG1 X#<_value>\no30 call [1]\nG1 X#<_value>",
+    "o30 sub\no31 if [#1 GT 2]\no30 return [#1*2]\no31 endif\nG1 Z5\no30 endsub [-1]\no30 call [3]\nG1 X#<_value>\n"
+    "o30 call [1]\nG1 X#<_value>",
     # recursion
     "o40 sub\nG1 X#1\no41 if [#1 GT 0]\no40 call [#1-1]\no41 endif\nG1 Y#1\no40 endsub\no40 call [4]",
     # assignments of a line take effect after it
@@ -45,11 +48,13 @@ EXAMPLES = [
     "G1 X[2**3**2] Y[-2**2] Z[7 MOD 3]\nX[-7 MOD 3] Y[1 EQ 1.00005] Z[1 EQ 1.0002]\nX[2+3*4-6/2] Y[1 LT 2 EQ 1] Z-#5420\n"
     "X[1 OR 0 AND 0] Y[ROUND[-2.5]] Z[FIX[-2.3]]\nX[FUP[-2.3]] Y[ATAN[1]/[-1]] Z--3",
     # what the control knows
-    "G20 G1 X1 F10\nG21 X#<_x> Y#<_feed> Z#<_metric>\nG92 X5\nX#5420 Y#<_coord_system>\nM3 S500\nX#<_rpm> Y#<_spindle_on>\nG91 X1\nX#<_incremental>",
+    "G20 G1 X1 F10\nG21 X#<_x> Y#<_feed> Z#<_metric>\nG92 X5\nX#5420 Y#<_coord_system>\nM3 S500\n"
+    "X#<_rpm> Y#<_spindle_on>\nG91 X1\nX#<_incremental>",
     # saved modes
     "G20 G91 F5\nM70\nG21 G90 F100\nG1 X25.4\nM72\nG1 X1\no50 sub\nM73\nG21 G90 G1 X50.8\no50 endsub\no50 call\nG1 X1",
     # blanks and case mean nothing, EXISTS, break of a do loop
-    "#< A b >=3\nG 1 X [ # <ab> * 1 . 5 ] y[exists[#<Ab>]+exists[#<no>]]\n#1=0\nO 7 DO\n#1=[#1+1]\no8 if [#1 EQ 3]\no7 break\nO8 ENDIF\n"
+    "#< A b >=3\nG 1 X [ # <ab> * 1 . 5 ] y[exists[#<Ab>]+exists[#<no>]]\n#1=0\nO 7 DO\n#1=[#1+1]\no8 if [#1 EQ 3]\n"
+    "o7 break\nO8 ENDIF\n"
     "x#1\no7 while [#1 LT 9]",
     # elseif, else, repeat of a rounded number
     "#1=0\no1 repeat [3.4]\n#1=[#1+1]\no2 if [#1 EQ 1]\nG1 X1\no2 elseif [#1 EQ 2]\nG1 Y2\no2 else\nG1 Z3\no2 endif\no1 endrepeat",
@@ -60,10 +65,12 @@ EXAMPLES = [
 # Lines on which both agree whether they are read. (True: read.)
 VERDICTS = {
     "G1 X[1/0]": False, "G1 X[SQRT[-1]]": False, "G1 X[ASIN[1.1]]": False, "G1 X[LN[0]]": False, "G1 X[[-2]**0.5]": False,
-    "G1 X#<a>": False, "G1 X#0": False, "G1 X#5602": False, "#5420=1": False, "#<_x>=1": False, "#1.5=1": False, "#1=1.5\nG1 X##1": False,
+    "G1 X#<a>": False, "G1 X#0": False, "G1 X#5602": False, "#5420=1": False, "#<_x>=1": False, "#1.5=1": False,
+    "#1=1.5\nG1 X##1": False,
     "#1=1.00001\nG1 X##1": True, "#1=#2+1": False, "G1 X[1": False, "G1 X1]": False, "G1 X[]": False, "G1 X#": False,
     "o1 while [1 EQ 0]": False, "o1 endwhile": False, "o1 if [0]\no1 else\no1 endif": True,
-    "o1 sub\no1 endsub\no1 call [1] 2": False, "o1 call": False, "M72": False, "o1 foo": False, "G1 X[2 FOO 3]": False, "N#1 G1 X1": False,
+    "o1 sub\no1 endsub\no1 call [1] 2": False, "o1 call": False, "M72": False, "o1 foo": False, "G1 X[2 FOO 3]": False,
+    "N#1 G1 X1": False,
     "G#1 X1": True, "#1=1\nG#1 X1": True, "G1 X+#2": True, "G1 X[1 2]": True, "G1 X-[-#2]": True, "#1": False, "G1 X[NO[1]]": False,
 }  # fmt: skip
 
@@ -82,7 +89,7 @@ def test_examples_agree(tmp_path: Path) -> None:
     for text, job, canon in zip(EXAMPLES, jobs, ask_oracle(jobs, tmp_path), strict=True):
         assert not canon.error, f"{canon.error}\n{text}"
         program = read_program(job["path"], reading=Reading(dialect="linuxcnc"))
-        assert len(program) > 3
+        assert len(program) > 2
         try:
             assert_same_motion(program, canon, centre=1e-6)
         except AssertionError as fault:

@@ -62,8 +62,8 @@ class Cut:
 
 def depths(thread: Thread) -> Iterator[float]:
     """Depths of the passes, spring passes included."""
-    depth, number = thread.first, 1
-    while depth < thread.depth:
+    depth, number, peak = thread.first, 1, abs(thread.peak)
+    while peak + depth < peak + thread.depth:  # rounded as LinuxCNC rounds, which counts from the drive line
         yield depth
         number += 1
         depth = thread.first * number ** (1.0 / thread.degression)

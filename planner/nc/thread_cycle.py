@@ -74,7 +74,7 @@ def depths(thread: Thread) -> Iterator[float]:
 def passes(thread: Thread) -> Iterator[Cut]:
     """The moves of the thread, all passes."""
     inwards = math.copysign(1.0, thread.peak)
-    ahead = math.copysign(1.0, thread.end - thread.start[1])
+    ahead = 1.0 if thread.end > thread.start[1] else -1.0
     slope = math.tan(math.radians(thread.angle))
     tapered = thread.tapered if thread.taper > 0 else 0
     aslant = thread.pitch * math.hypot(thread.depth, thread.taper) / thread.taper if tapered else 0.0

@@ -426,7 +426,9 @@ class Interpreter:
         if not is_spline_line(block):
             return
         if self._cutter is not None:
-            raise WordFault(block.motion_word(), "a spline under cutter radius compensation; write G40 before it")
+            raise WordFault(
+                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
+            )
         state.series = None
         if state.in_thread:
             threads.stop(state, self.store, block.line)

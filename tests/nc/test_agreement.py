@@ -22,6 +22,8 @@ from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH
 from planner.machine import Machine
+from planner.nc.bezier import at as bezier_at
+from planner.nc.bezier import homogeneous
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
 from planner.nc.reading import Reading
@@ -85,13 +87,14 @@ def assert_same_motion(
     for k in np.flatnonzero(move[:, 0] == 3):
         move[k, 2:5] = move[k - 1, 2:5] if k else 0.0
     move = move[moving(move[:, 0], move[:, 2:5], (move[:, 0] == 2) | ((move[:, 0] == 3) & (move[:, 5] > 0)))]
-    keep = moving(program.kind, program.end, np.isin(program.kind, (Kind.ARC, Kind.DWELL)))
+    keep = moving(program.kind, program.end, np.isin(program.kind, (Kind.ARC, Kind.DWELL, Kind.SPLINE)))
+    move = with_splines_whole(program, np.flatnonzero(keep), move)
     kind, line, end = program.kind[keep], program.line[keep], program.end[keep]
 
     np.testing.assert_array_equal(kind, move[:, 0])
     np.testing.assert_array_equal(line, move[:, 1])
     np.testing.assert_allclose(end, move[:, 2:5], rtol=1e-12, atol=NOWHERE)
-    feed_moves = np.isin(kind, (Kind.LINE, Kind.ARC)) & feeds
+    feed_moves = np.isin(kind, (Kind.LINE, Kind.ARC, Kind.SPLINE)) & feeds
     np.testing.assert_allclose(program.feed[keep][feed_moves] * 60, move[feed_moves, 5], rtol=1e-12)
     np.testing.assert_allclose(
         program.dwell[keep][kind == Kind.DWELL], move[kind == Kind.DWELL, 5], rtol=1e-12
@@ -109,6 +112,35 @@ def assert_same_motion(
         np.ceil(np.abs(program.arc_sweep) / (2 * np.pi) - 1e-6), np.abs(arcs[:, 10])
     )
     assert_sweeps_reach_ends(program)
+
+
+def with_splines_whole(program: Program, blocks: Array, move: Array) -> Array:
+    """LinuxCNC's moves with one row for each spline, where it makes lines between points of the curve that are evenly apart in its
+    parameter: all of them are on the program's curve at those parameters.
+
+    blocks : of the program, as many as moves where a spline counts once
+    """
+    out, at = [], 0
+    for block in blocks:
+        assert at < len(move)
+        if program.kind[block] != Kind.SPLINE:
+            out.append(move[at])
+            at += 1
+            continue
+        rows = program.splines.block == block
+        pieces = homogeneous(program.splines.points[rows], program.splines.weights[rows])
+        count = int(np.argmax(np.append(move[at:, 1] != move[at, 1], True)))
+        u = len(pieces) * np.arange(1, count + 1) / count
+        piece = np.minimum(u.astype(int), len(pieces) - 1)
+        points = [
+            bezier_at(pieces[k : k + 1], np.array([x - k]))[0][0, 0] for k, x in zip(piece, u, strict=True)
+        ]
+        np.testing.assert_allclose(move[at : at + count, 2:5], points, rtol=1e-12, atol=NOWHERE)
+        out.append(move[at + count - 1].copy())
+        out[-1][[0, 1]] = Kind.SPLINE, program.line[block]
+        at += count
+    assert at == len(move)
+    return np.array(out).reshape(-1, move.shape[1])
 
 
 def assert_sweeps_reach_ends(program: Program) -> None:
@@ -242,6 +274,49 @@ def random_program(rng: np.random.Generator) -> str:
     return "\n".join(lines) + "\nM2\n"
 
 
+def random_splines(rng: np.random.Generator) -> str:
+    """G5, G5.1 and G5.2 in series, in both units, absolute and incremental."""
+    lines = [rng.choice(["G20", "G21"]), "G0 X1 Y2 Z3", "F120"]
+
+    def number() -> str:
+        return f"{rng.uniform(-20, 20):.{rng.integers(1, 5)}f}"
+
+    for _ in range(rng.integers(1, 6)):
+        choice = rng.integers(4)
+        if choice == 0:
+            lines.append(rng.choice(["G90", "G91"]))
+            lines.append(f"G5 X{number()} Y{number()} I{number()} J{number()} P{number()} Q{number()}")
+            lines += [f"G5 X{number()} Y{number()} P{number()} Q{number()}"] * int(rng.integers(2))
+        elif choice == 1:
+            lines.append(f"{rng.choice(['G90', 'G91'])} G5.1 X{number()} Y{number()} I{number()} J{number()}")
+        elif choice == 2:
+            order = rng.integers(3, 5)
+            lines.append(f"G90 G5.2 P{rng.uniform(0.3, 3):.3f} L{order}")
+            lines += [
+                f"X{number()} Y{number()} P{rng.uniform(0.3, 3):.3f}" for _ in range(order + rng.integers(4))
+            ]
+            lines.append("G5.3")
+        else:
+            lines.append(f"G90 G1 X{number()} Z{number()} F{rng.uniform(1, 900):.2f}")
+    return "\n".join(lines) + "\nM2\n"
+
+
+@pytest.mark.slow
+@needs_oracle
+def test_random_splines_agree(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    texts = [random_splines(rng) for _ in range(60)]
+    for k, text in enumerate(texts):
+        (tmp_path / f"{k}.ngc").write_text(text)
+    jobs = [{"path": str(tmp_path / f"{k}.ngc")} for k in range(len(texts))]
+    for text, canon in zip(texts, ask_oracle(jobs, tmp_path), strict=True):
+        assert not canon.error, f"{canon.error}\n{text}"
+        try:
+            assert_same_motion(parse_program(text), canon)
+        except (AssertionError, InputError) as fault:
+            raise AssertionError(f"{text}\n{fault}") from fault
+
+
 @pytest.mark.slow
 @needs_oracle
 def test_random_programs_agree(tmp_path: Path) -> None:
@@ -275,6 +350,11 @@ VERDICTS = {
     "g01x1f10": True, "G00.0 X1": True, "G0.00001 X1": True, "G1.1 X1": False, "G0 X1 (a(b)": False,
     "G0 X1 (a": False, "G0 (a) X1 (b) Y2 ; c": True, "G0 X1 )": False, "; (h\nG0 X1": True, "%1\nG0 X1": False,
     "G0 N1 X1": False, "N1 N2 G0 X1": False, "G0 /X1": False, "N1 /G0 X1": False, "G61 G64": False, "G15": False,
+    "F1 G5 X4 I1 J1 P0 Q1": True, "F1 G5 X4 I1 J1 P0": False, "F1 G5 X4 I1 P0 Q1": False, "F1 G5 I1 J1 P0 Q1": False,
+    "F1 G5 X4 Z1 I1 J1 P0 Q1": False, "F1 G18 G5 X4 I1 J1 P0 Q1": False, "F1 G5.1 X4 I1 J1": True, "F1 G5.1 X4": False,
+    "F1 G5.1 X4 I1": False, "G5 X4 I1 J1 P0 Q1": False, "G5.3": False,
+    "F1 G5.2 X1 Y1 P1 L3\nX2 Y0 P1\nX3 Y3 P2\nG5.3": True, "F1 G5.2 X1 Y1 P1 L3\nX2 P1": False,
+    "F1 G5.2 X1 Y1 P1 L4\nG5.3": False, "F1 G5.2 X1 Y1 P1 L3\nX2 Y2 P1\nG1 X3\nG5.3": False, "F1 G1 X1 L2": False,
     "M48": True, "G8": True, "G97 S1": True, "G98": True, "G40 D1": False, "G0 X1.2.3": False, "G0 X1 @": False,
 }  # fmt: skip
 

@@ -6,6 +6,7 @@ parameters of its shape, what it uses of the tolerance, and the normal accelerat
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -134,6 +135,18 @@ class SmoothPath:
     def theta(self) -> FloatArray:
         """(R+1,) turning angle at each joint [rad]."""
         return self.toolpath.theta[self.legs.first]
+
+    def part(self, pieces: Array) -> SmoothPath:
+        """Some pieces (G,) between full stops one after the other, of a path without splines."""
+        if len(self.spline):
+            raise ValueError("SmoothPath.part: of a path without splines only")
+        stop = np.flatnonzero(self.joint == Joint.STOP)
+        legs = np.repeat(pieces, np.diff(stop))
+        joints = np.append(True, legs)  # with the joint behind each leg
+        toolpath = self.toolpath.part(np.repeat(legs, np.diff(self.legs.first)))
+        columns = {name: getattr(self, name)[joints] for name in ("joint", "d", "params", "scale")}
+        columns |= {name: getattr(self, name)[joints] for name in ("tol", "tol_ap", "normal_max")}
+        return dataclasses.replace(self, toolpath=toolpath, legs=legs_of(toolpath), **columns)
 
 
 def round_corners(

@@ -198,7 +198,7 @@ def in_order(chain, point, feed):
     return True, link, crossed
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _forward(chain, before, point, feed, fresh, low, high, cost):
     """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh` if there is none before.
 

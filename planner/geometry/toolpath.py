@@ -18,6 +18,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -158,3 +159,16 @@ class Toolpath:
         joint = self.joint.copy()
         joint[at] = how
         return dataclasses.replace(self, joint=joint)
+
+    def part(self, kept: Array) -> Toolpath:
+        """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of it: where some are left out,
+        the path jumps at a full stop."""
+        joints = np.append(
+            True, kept
+        )  # with the joint behind each segment; the first is a full stop, like all that begin a part
+        columns: dict[str, Any] = {}
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray) and field.name != "zero_length":
+                columns[field.name] = value[kept if len(value) == len(self) else joints]
+        return dataclasses.replace(self, **columns)

@@ -46,7 +46,7 @@ class TimeLaw:
 
     @property
     def columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, Array, float]:
-        """The fields in their order, for compiled functions."""
+        """The fields in their order, arrays (L,), for compiled functions."""
         return self.t, self.s, self.feed, self.acc_s, self.jerk_s, self.run, float(self.end)
 
 

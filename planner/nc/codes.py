@@ -112,13 +112,17 @@ M_REFUSED: dict[int, Refusal] = {
 }
 
 
-def unknown(letter: str, code: int) -> Refusal:
-    """The refusal of a code that no table names."""
+def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
+    """The refusal of a code that no table names; one that is not refused by `strict` alone may move."""
+    if letter == "M" and not strict:
+        what = "an M code that this reader does not know, and that may move with its words or by itself, is"
+        return Refusal(what, f"write G0 or G1, or give --ignore M{number(code)} if nothing moves", True)
     if letter == "M":
         if 1000 <= code <= 1990:
             return Refusal("a command that each machine defines for itself is", "remove it if nothing moves")
         return Refusal("an M code that RS274NGC does not know is", "remove it if nothing moves")
-    return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
+    what, remedy = "a G code that RS274NGC does not know is", "write it with the codes of RS274NGC"
+    return Refusal(what, f"{remedy}, or give --ignore G{number(code)} if nothing moves", True)
 
 
 # Letters that no supported code uses.
@@ -160,6 +164,7 @@ CHARACTERS: dict[str, str] = {
     "^": "polar coordinates are not supported; write x and y",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
+    ",": "corner roundings and chamfers (,R and ,C) are not supported; write the arc or the line",
     "!": "a comment starts with ( or ;",
 }
 

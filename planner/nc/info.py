@@ -7,6 +7,7 @@ tangents; moves of length zero are passed over, and a rapid, dwell or stop betwe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,12 +19,13 @@ from planner.nc.arcs import IN_PLANE
 from planner.nc.bezier import at, homogeneous, lengths
 from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
-from planner.nc.program import FEED_MOVES, MOVES, Kind, Program
+from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program
 from planner.nc.reader import interpret, load
 from planner.nc.reading import AS_USUAL, Reading
 
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
+PLACES_SHOWN = 100  # of what is not supported, in tables and summaries; the others are counted
 SPLINE_PLACES = 513  # on a piece of a spline, at which its extent is looked at: good to 5e-7 of its size
 _NOWHERE = 1e-9  # a move shorter than this turns no corner [mm]: the rounding of coordinates around 1e3 mm
 
@@ -47,6 +49,7 @@ class ProgramInfo:
     dwell            : sum of all dwells [s]
     tools            : tool numbers in the order of their T words
     notes            : what the reader assumed
+    expansion        : what was expanded: calls, turns of loops, lines executed; None where nothing was
     unsupported      : every construct that is not supported or not valid
     """
 
@@ -67,7 +70,8 @@ class ProgramInfo:
     dwell: float
     tools: tuple[int, ...]
     notes: tuple[str, ...]
-    unsupported: tuple[Fault, ...]
+    expansion: Expansion | None
+    unsupported: Sequence[Fault]
 
 
 def inspect_program(
@@ -79,10 +83,10 @@ def inspect_program(
     """
     data = load(path)
     program, faults = interpret(data, machine, reading, source=str(path))
-    return describe(program, lines=len(data.splitlines()), unsupported=tuple(faults))
+    return describe(program, lines=len(data.splitlines()), unsupported=faults)
 
 
-def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = ()) -> ProgramInfo:
+def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ()) -> ProgramInfo:
     """The figures of a program that has been read."""
     start = np.vstack([program.start, program.end])[:-1]
     length = _lengths(program, start)
@@ -117,6 +121,7 @@ def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = (
         dwell=float(program.dwell.sum()),
         tools=tuple(int(event.text[1:]) for event in program.events if event.text[0] == "T"),
         notes=program.notes,
+        expansion=program.expansion,
         unsupported=unsupported,
     )
 

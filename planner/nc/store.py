@@ -92,10 +92,10 @@ class Store:
             self.event = EventColumns(*(_grown(column, self.events + rows) for column in self.event))
 
     def add(self, kind: Kind, line: int, state: State) -> None:
-        """Append a block that ends at the state's position."""
+        """Append a block that ends where the tool is."""
         block, k = self.block, self.blocks
         block.kind[k] = kind
-        block.end[k] = state.position
+        block.end[k] = state.place
         block.feed[k] = state.feed if kind in FEED_MOVES else np.inf
         block.line[k] = line
         block.path_control[k] = state.path_control
@@ -104,7 +104,7 @@ class Store:
         self.blocks += 1
 
     def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
-        """Append an arc about a normal axis that ends at the state's position."""
+        """Append an arc about a normal axis that ends where the tool is."""
         self.arcs.append((self.blocks, arc.centre, normal, arc.sweep))
         self.add(Kind.ARC, line, state)
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.nc.leader import without_leader
 from planner.nc.lexer import NUMBER, Words, split_words
 from planner.nc.program import FEED_MOVES, Program
 
@@ -49,7 +50,9 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
         raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
     if (asked < 0).any():
         raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
-    words = split_words(source, block_delete=program.reading.block_delete)
+    reading = program.reading
+    read = source if reading.strict else without_leader(source)[0]
+    words = split_words(read, block_delete=reading.block_delete)
     row = _rows(words, program.line[moving])
     unit = _unit_before(words)
     f_word = _f_words(words)

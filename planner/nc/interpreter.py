@@ -429,6 +429,11 @@ class Interpreter:
             raise WordFault(
                 block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
             )
+        if state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
+            )
         state.series = None
         if state.in_thread:
             threads.stop(state, self.store, block.line)

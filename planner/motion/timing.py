@@ -22,8 +22,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.search import nearest
+from planner.motion.lots import sample
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.motion.sampling import Grid, inverses, sample
+from planner.motion.sampling import Grid, inverses
 from planner.motion.time_law import TimeLaw
 from planner.motion.trajectory import Trajectory
 from planner.path.samples import PathSamples

@@ -97,8 +97,8 @@ def compile_procedures(
 
 @dataclass
 class _End:
-    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves the function. With `computed`
-    it goes to the label of the program whose number that text gives.
+    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves the function.
+    With `computed` it goes to the label of the program whose number that text gives.
     """
 
     place: Place
@@ -215,12 +215,14 @@ class _Function:
         if words:
             self._put(f"S({self.rows.add_row(line.place.line, words)})", line.place)
         for (target, _), value in zip(line.assignments, values, strict=True):
-            self._put(self._assign(target, value), line.place)
+            self._put(self._assign(target, value, line.place), line.place)
         if any(letter == ord("M") and number in (None, *ENDS) for letter, _, number in words):
             self._put("run.turns+=n;n=0;run.flush()", line.place)
 
-    def _assign(self, target: Parameter, value: str) -> str:
+    def _assign(self, target: Parameter, value: str, place: Place) -> str:
         if isinstance(target, Named):
+            if target.shared and target.name in self.language.asked_names:
+                raise ProgramFault(place, f"the control sets #<{target.name}> itself; it can only be read")
             return f"{'G' if target.shared else 'L'}[{target.name!r}]={value}"
         if isinstance(target.index, Number) and self._stored(target.index.value):
             return f"P[{int(target.index.value)}]={value}"

@@ -9,6 +9,7 @@ calls, with a sentence that names the line.
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
@@ -21,7 +22,7 @@ from planner.nc.language.tree import Language, Place, ProgramFault
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
-TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: more than a minute of computing
+TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: some ten seconds of computing
 ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
 DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
 ROWS_AT_ONCE = 100_000  # rows that are executed together
@@ -236,9 +237,8 @@ class Run:
         return number
 
     def _function(self, name: str, word: str) -> Callable[..., float | None]:
-        if name not in self.functions:
-            if not self.load(name) or name not in self.functions:
-                raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
+        if name not in self.functions and (not self.load(name) or name not in self.functions):
+            raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
         return self.functions[name]
 
     def _frame_of(self, place: tuple[int, int, int], name: str) -> int:
@@ -261,10 +261,8 @@ class Run:
                 message += " ..."
                 break
             frame = self.frames[frame].caller
-        try:
+        with contextlib.suppress(Ended, NotFinite):
             self.flush()
-        except (Ended, NotFinite):
-            pass
         return ProgramFault(fault.place, message)
 
     def _place(self, traceback: TracebackType | None) -> Place:

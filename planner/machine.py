@@ -88,6 +88,12 @@ class ToolData(_Record):
     diameter: NotNegative = 0.0
 
 
+class DialectData(_Record):
+    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit."""
+
+    least_increment: Positive | None = None
+
+
 class Machine(_Record):
     """A machine. The template explains every key.
 
@@ -114,6 +120,7 @@ class Machine(_Record):
     fir: Fir | None = None
     modes: tuple[Mode, ...] = ()
     plotter: Plotter | None = None
+    dialect: DialectData | None = None
     tools: dict[str, ToolData] = {}
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}

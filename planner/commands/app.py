@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from planner.commands.compare import compare_command
+from planner.commands.expand import expand_command
 from planner.commands.export import export_command
 from planner.commands.info import info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
@@ -49,6 +50,7 @@ for name, command in {
     "compare": compare_command,
     "verify": verify_command,
     "info": info_command,
+    "expand": expand_command,
     "pulses": pulses_command,
     "export": export_command,
     "report": report_command,

@@ -169,7 +169,7 @@ def round_corners(
     at = legs.first
     joint = toolpath.joint[at].copy()
     if blend_tangents:
-        joint[(joint == Joint.SMOOTH) & _curvature_jumps(toolpath, at)] = Joint.CORNER
+        joint[(joint == Joint.SMOOTH) & curvature_jumps(toolpath, at)] = Joint.CORNER
     blend = joint == Joint.CORNER
     theta, tol = toolpath.theta[at], toolpath.tolerance[at]
     sin_half = np.sin(theta / 2)
@@ -229,9 +229,9 @@ def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
     return scale
 
 
-def _curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
+def curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
     """(R+1,) True where the curvature vector differs across the joints `at`."""
-    arcs = toolpath.arcs
+    arcs, curve = toolpath.arcs, np.flatnonzero(toolpath.curve >= 0)
     size = arcs.radius * arcs.rate**2
     angle = arcs.rate * toolpath.length[toolpath.arc >= 0]
     vectors = np.zeros((2, *toolpath.start.shape))  # at the start and at the end of every segment
@@ -240,6 +240,9 @@ def _curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
     vectors[1, curved] = -size[:, None] * (
         np.cos(angle)[:, None] * arcs.e1 + np.sin(angle)[:, None] * arcs.e2
     )
+    row, length = toolpath.curve[curve], toolpath.length[curve]
+    vectors[0, curve] = toolpath.curves.at(row, length, np.zeros(len(row)))[:, 2]
+    vectors[1, curve] = toolpath.curves.at(row, length, length)[:, 2]
     before, after = _neighbours(at, len(toolpath))
     jump = np.linalg.norm(vectors[0, after] - vectors[1, before], axis=1)
     return jump > SAME_CURVATURE * np.maximum(toolpath.curvature[before], toolpath.curvature[after])

@@ -37,6 +37,7 @@ class Assumed:
 
     treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT` or `PARKED` by letter
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
+    moved     : letters of axes that are not planned and were refused, because they move
     printer   : the program is one for a 3-D printer: it has M82 or M83
     """
 
@@ -49,6 +50,7 @@ class Assumed:
         for letter in LETTERS_REFUSED:
             self.treatment[ord(letter)] = self._treatment(letter)
         self._counted: dict[Assumption, _Counted] = {}
+        self.moved: set[str] = set()
         self._used: dict[str, int] = {}
 
     def _treatment(self, letter: str) -> int:
@@ -84,7 +86,7 @@ class Assumed:
         times = np.bincount(letter, minlength=256)
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
             times[code] -= self._used.pop(chr(code), 0)
-            if times[code] > 0:
+            if times[code] > 0 and chr(code) not in self.moved:
                 word = int(np.argmax(letter == code))
                 line = int(words.line[words.row(word)])
                 self.count(self._of_letter(chr(code)), words.text(word), line, int(times[code]))

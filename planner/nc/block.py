@@ -27,6 +27,8 @@ _ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code besid
 
 Report = Callable[[int, str], None]
 
+NAME_SHOWN = 20  # characters of a name in a note
+PROGRAM_NAME = codes.Assumption("program name", "program names", "nothing is done with them")
 PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, nothing is done with them")
 OFFSET_NUMBER = codes.Assumption(
     "number of an offset (D, H) without a code that uses it",
@@ -97,9 +99,12 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
             return None
         letter = chr(code)
         if letter == "%":
-            if word > first:
+            name = words.rest(word).partition("(")[0].partition(";")[0].strip()
+            if word > first or (name and assumed.strict):
                 report(word, "a % stands alone on its line: it starts and ends a program")
                 return None
+            if name:
+                assumed.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
             block.ended = True
         elif letter == "O":
             if not _program_number(words, word, last, block, report, assumed):
@@ -114,13 +119,13 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
             if taken is not None:
                 owned = taken
             else:
-                block.partial |= _add_code(block, letter, value, word, report)
+                block.partial |= _add_code(block, letter, value, word, report, assumed)
         elif letter in owned or (assumed.treatment[code] == LEFT_OUT and letter != "E"):
             continue
         elif assumed.treatment[code] == REFUSED and letter != "E":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
-        elif letter in block.value and block.value[letter] != value:
+        elif letter in block.value and (assumed.strict or block.value[letter] != value):
             report(word, f"a second {letter} word on this line; write one")
             return None
         elif abs(value) > NUMBER_MAX:
@@ -157,14 +162,15 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed
     if abs(value * 10.0 - code) > 10.0 * _CODE_ROUNDING:
         return None
     name = f"{letter}{codes.number(code)}"
+    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
+    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
     if assumed.ignores(name):
         assumed.count(LEFT_OUT_BY_USER, name, block.line)
         block.events.append((letter, code / 10))
         block.partial = True
         block.foreign |= letter == "G"
-        return ""
-    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
-    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
+        alone = letter == "M" and code not in codes.M_GROUP and not before
+        return found.own if found else EVERYTHING if alone else ""
     if found is None or assumed.strict:
         return None
     assumed.count(found.what, words.text(word), block.line)
@@ -183,20 +189,20 @@ def _behind(words: Words, word: int, last: int) -> str:
     return re.split("[GM]", _letters(words, word, last), maxsplit=1)[0]
 
 
-def _add_code(block: Block, letter: str, value: float, word: int, report: Report) -> bool:
+def _add_code(block: Block, letter: str, value: float, word: int, report: Report, assumed: Assumed) -> bool:
     """Put a G or M code into its group; True if it was reported instead."""
     code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
     known, refused = (codes.G_GROUP, codes.G_REFUSED) if letter == "G" else (codes.M_GROUP, codes.M_REFUSED)
     exact = abs(value * 10.0 - code) <= 10.0 * _CODE_ROUNDING
     if not exact or code not in known:
         refusal = refused.get(code) if exact else None
-        refusal = refusal or codes.unknown(letter, code)
+        refusal = refusal or codes.unknown(letter, code, strict=assumed.strict or not exact)
         report(word, str(refusal))
         block.foreign |= refusal.takes_axes
         block.refused_motion |= refusal.takes_axes and 330 <= code <= 890
         return True
     group, groups = known[code], block.g if letter == "G" else block.m
-    if groups.get(group) == code:  # said twice
+    if groups.get(group) == code and not assumed.strict:  # said twice
         return False
     if group in groups:
         report(

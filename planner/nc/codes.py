@@ -36,6 +36,7 @@ class Assumption:
 
 G_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 30), "motion"),
+    **dict.fromkeys((50, 51, 52, 53, 62), "motion"),
     **dict.fromkeys((330, 331, 730, 740, 760, *range(810, 900, 10)), "motion"),
     **dict.fromkeys((40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923), "one-shot"),
     **dict.fromkeys((170, 180, 190), "plane"),
@@ -57,6 +58,8 @@ G_GROUP: dict[int, str] = {
 G_EVENTS = frozenset((960, 970))
 
 ARCS = frozenset((20, 30))
+CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS = 50, 51, 52, 53, 62
+SPLINES = frozenset((CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS))
 THREADS = frozenset((330, 331))
 THREADING = 760  # the cycle of many passes
 CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
@@ -64,6 +67,7 @@ CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
 # Words beside X Y Z F S T N that a code uses, by its group letter and tenths.
 WORDS: dict[tuple[str, int], str] = {
     **{("G", code): "IJKRP" for code in ARCS},
+    ("G", 50): "IJPQ", ("G", 51): "IJ", ("G", 52): "PL", ("G", 62): "PKR",
     ("G", 40): "P", ("G", 100): "LPRQIJ", ("G", 640): "PQ", ("G", 430): "H", ("G", 432): "H", ("G", 960): "D",
     **{("G", code): "D" for code in (410, 420)}, **{("G", code): "DL" for code in (411, 421)},
     ("G", 330): "K", ("G", 331): "KI", ("G", 760): "PIJKRQHEL",
@@ -87,13 +91,11 @@ M_GROUP: dict[int, str] = {
 
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
 _POST = "choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
-_SPLINE = Refusal("a spline is", _STRAIGHT, True)
 _PROBE = Refusal(
     "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
 )
 
 G_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys((50, 51, 52, 53), _SPLINE),
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
     **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
     500: Refusal("presetting coordinates with G50 is", "write G92", True),
@@ -110,13 +112,17 @@ M_REFUSED: dict[int, Refusal] = {
 }
 
 
-def unknown(letter: str, code: int) -> Refusal:
-    """The refusal of a code that no table names."""
+def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
+    """The refusal of a code that no table names; one that is not refused by `strict` alone may move."""
+    if letter == "M" and not strict:
+        what = "an M code that this reader does not know, and that may move with its words or by itself, is"
+        return Refusal(what, f"write G0 or G1, or give --ignore M{number(code)} if nothing moves", True)
     if letter == "M":
         if 1000 <= code <= 1990:
             return Refusal("a command that each machine defines for itself is", "remove it if nothing moves")
         return Refusal("an M code that RS274NGC does not know is", "remove it if nothing moves")
-    return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
+    what, remedy = "a G code that RS274NGC does not know is", "write it with the codes of RS274NGC"
+    return Refusal(what, f"{remedy}, or give --ignore G{number(code)} if nothing moves", True)
 
 
 # Letters that no supported code uses.
@@ -134,15 +140,15 @@ PARKABLE = "ABCUVW"
 
 # Letters that only some words use: "I word without G2 or G3".
 LETTER_NEEDS = {
-    "I": "G2, G3, G10, G33.1, G76 or G87",
-    "J": "G2, G3, G10, G76 or G87",
-    "K": "G2, G3, G33, G33.1, G76 or G87",
-    "R": "G2, G3, G10 or a canned cycle",
-    "P": "G4, G10, G64, G2, G3, a canned cycle that dwells or M62 to M66",
-    "Q": "G10, G64, G73, G76, G83, M61 or M66 to M68",
+    "I": "G2, G3, G5, G5.1, G10, G33.1, G76 or G87",
+    "J": "G2, G3, G5, G5.1, G10, G76 or G87",
+    "K": "G2, G3, G6.2, G33, G33.1, G76 or G87",
+    "R": "G2, G3, G6.2, G10 or a canned cycle",
+    "P": "G4, G10, G64, G2, G3, G5, G5.2, G6.2, a canned cycle that dwells or M62 to M66",
+    "Q": "G5, G10, G64, G73, G76, G83, M61 or M66 to M68",
     "H": "G43, G43.2 or G76",
     "D": "G41, G42 or G96",
-    "L": "G10, G41.1, G42.1, M66 or a canned cycle",
+    "L": "G5.2, G10, G41.1, G42.1, M66 or a canned cycle",
     "E": "G76 or M66 to M68",
 }
 
@@ -158,6 +164,7 @@ CHARACTERS: dict[str, str] = {
     "^": "polar coordinates are not supported; write x and y",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
+    ",": "corner roundings and chamfers (,R and ,C) are not supported; write the arc or the line",
     "!": "a comment starts with ( or ;",
 }
 

@@ -6,8 +6,8 @@ the series of cycles (R), from R (the depth) and from the depth (K):
     X Y Z   the hole and its depth           R   where the feed begins        L   how many holes, one increment apart in G91
     Q       depth of a peck (G73, G83)       P   dwell [s]                    I J K   offset and counterbore of G87
 
-They stay in force while the same code does. The tool goes to the hole at the height where it is, or at the one it will retract to if that
-is below R; then fast to R, makes the hole, and retracts to R (G99) or to the level before the series (G98), if that is higher.
+They stay in force while the same code does. The tool goes to the hole at the height where it is if that is above R, else at the one it will
+retract to; then fast to R, makes the hole, and retracts to R (G99) or to the level before the series (G98), if that is higher.
 
     G81 drill            feed down
     G82 spot             feed down, dwell

@@ -20,6 +20,7 @@ Note = Callable[[str, int], None]
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3
+_ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
 _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 
@@ -65,7 +66,7 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
                 length = _length(state, block.value, axis)
                 here[axis] = length + (0.0 if state.absolute else here[axis])
         place = (float(here[a]), float(here[b]))
-        height = float(here[normal]) if here[normal] >= clear else retract
+        height = float(here[normal]) if here[normal] > clear + _ROUNDING else retract
         _to(state, store, block.line, Step(Kind.RAPID, (*place, height)))
         _to(state, store, block.line, Step(Kind.RAPID, (*place, clear)))
         hole = Hole(
@@ -156,8 +157,8 @@ def _to(state: State, store: Store, line: int, step: Step) -> None:
         a, b = IN_PLANE[state.normal]
         point[[a, b, state.normal]] = step.place
         end = state.machine(point * state.unit)
-        if step.kind == Kind.LINE or (end != state.position).any():
-            state.position[:] = end
+        if step.kind == Kind.LINE or (end != state.place).any():
+            state.position[:], state.actual = end, None
             store.add(step.kind, line, state)
 
 

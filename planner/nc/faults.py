@@ -58,5 +58,5 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
     first, more = faults[0], len(faults) - 1
     text = str(first)
     if more:
-        text += f" ({more} more in this program; 'planner info' lists them all)"
+        text += f" ({more} more in this program; 'planner info' shows them)"
     raise InputError(text, source=first.source or source, line=first.line, column=first.column)

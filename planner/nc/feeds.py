@@ -21,7 +21,9 @@ from planner.nc.state import FeedMode, State
 Note = Callable[[str, int], None]
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
-_SLOWEST = 0.1  # feed of a block under G93, at least [programmed units per minute]: as LinuxCNC has it, and never 0
+_SLOWEST = (
+    0.1  # feed of a block under G93, at least [programmed units per minute]: as LinuxCNC has it, and never 0
+)
 
 
 def set_feed(state: State, block: Block, note: Note) -> None:

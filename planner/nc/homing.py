@@ -21,6 +21,9 @@ def go_home(state: State, store: Store, block: Block, note: Note) -> None:
     code = block.g["one-shot"]
     if code not in state.homes:
         note(f"G{codes.number(code)} has no position in the machine file: machine zero", block.line)
+    if state.actual is not None:  # cutter radius compensation ends here
+        state.actual = None
+        store.add(Kind.RAPID, block.line, state)
     home = state.homes.get(code, np.zeros(3))
     if not block.has("XYZ"):
         state.position[:] = home

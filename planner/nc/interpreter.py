@@ -16,17 +16,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc import codes, drilling, feeds, homing, moves, offsets, signals, threads
+from planner.nc import codes, compensation, drilling, feeds, homing, moves, offsets, signals, threads
 from planner.nc.assumed import Assumed
-from planner.nc.block import Block, read_block
+from planner.nc.block import OFFSET_NUMBER, Block, read_block
+from planner.nc.cutter import Cutter, CutterFault
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
-from planner.nc.program import Frame, Kind, PathControl, Program
+from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
@@ -49,6 +52,7 @@ class Interpreter:
 
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
+    open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -58,8 +62,12 @@ class Interpreter:
         self.state = self.setup.start()
         self.store = Store()
         self.assumed = Assumed(reading)
+        self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
+        self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
+        self._cutter: Cutter | None = None
+        self._splines = SplineReader()
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
@@ -88,7 +96,7 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(words, row, self.state, self.store, self.assumed)
+            after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
                 self.store.frame = int(words.frame[after])
@@ -101,8 +109,9 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
-        self.assumed.count_letters(words, row)
+        self._splines.keep(words)
         self._keep_faults(words)
+        self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
         """Say it if the last chunk, `words`, goes on after the end of the program."""
@@ -111,18 +120,24 @@ class Interpreter:
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
 
+    @property
+    def all_arcs_close_otherwise(self) -> bool:
+        """Whether there are arcs that do not close, and all of them would with their centres read the other way."""
+        return bool(self.open_arcs) and all(otherwise for _, otherwise in self.open_arcs)
+
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
         self._reports.append((word, message))
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self._found)
+        return FaultList(self._found + self._splines.faults())
 
     def _keep_faults(self, words: Words) -> None:
         """Keep the chunk's faults in the order of its words."""
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         for word, message in sorted(found + self._reports):
             key = (int(words.at[word]), message)
@@ -137,7 +152,7 @@ class Interpreter:
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
-        moves = np.flatnonzero(self.store.block.kind[: self.store.blocks] <= Kind.ARC)
+        moves = np.flatnonzero(np.isin(self.store.block.kind[: self.store.blocks], MOVES))
         if len(moves) and (self._units_at is None or moves[0] < self._units_at):
             self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
 
@@ -145,11 +160,19 @@ class Interpreter:
         try:
             return self._execute(block)
         except WordFault as fault:
+            if isinstance(fault, moves.ArcFault):
+                self.open_arcs.append((block.line, fault.otherwise))
             self.report(fault.word, fault.message)
+            return block.m.get("stopping") in (20, 300)
+        except CutterFault as fault:
+            self.report(min(block.at.values()), str(fault))
+            self._cutter = self.state.actual = None  # what follows is read without compensation
             return block.m.get("stopping") in (20, 300)
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
+        if self._cutter is not None:
+            compensation.check_words(self.state, block)
         feeds.set_feed(self.state, block, self.note)
         self._events(block)
         if block.g.get("one-shot") == 40:
@@ -161,6 +184,8 @@ class Interpreter:
             self._one_shot(block)
             self._motion(block)
         stop = block.m.get("stopping")
+        if stop is not None and self._cutter is not None:
+            self._cutter.fix()
         if stop == 600:
             self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
         if stop in (0, 10, 600) or block.stops:
@@ -232,6 +257,8 @@ class Interpreter:
                 self._units_at = self.store.blocks
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
+        if "cutter compensation" in g:
+            self._cutter = compensation.switch(state, self.store, block, self._cutter, self.note)
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.note)
         if "work offset" in g:
@@ -269,7 +296,11 @@ class Interpreter:
         if code is None or code in (40, 530):
             return
         motion = block.g.get("motion")
-        if code in _COVET_AXES and motion is not None:
+        if code in (280, 300) and motion == 0 and not self.state.strict:
+            self.note(
+                f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
+            )
+        elif code in _COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
@@ -289,6 +320,7 @@ class Interpreter:
             if letter in block.value and not self.assumed.may_stand(
                 letter, block.value[letter], absolute=self.state.absolute
             ):
+                self.assumed.moved.add(letter)
                 self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
 
     def _motion(self, block: Block) -> None:
@@ -302,7 +334,12 @@ class Interpreter:
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
+        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
+        if state.motion in codes.SPLINES or (self._splines.open and "motion" in block.g):
+            self._spline(block)
+            return
         if not moves.is_move(state, block):
             if "motion" in block.g and state.motion > 3:
                 found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
@@ -316,6 +353,8 @@ class Interpreter:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
             threads.stop(state, self.store, block.line)
+        if self._cutter is not None:
+            compensation.check_motion(state, block)
         if state.motion in codes.THREADS:
             threads.thread(state, self.store, block, self.note)
         elif state.motion == codes.THREADING:
@@ -337,22 +376,58 @@ class Interpreter:
 
     def _move(self, block: Block) -> None:
         """G0, G1, G2, G3."""
-        state = self.state
+        state, cutter = self.state, self._cutter
         target = moves.target(state, block)
-        if state.motion in (2, 3):
-            try:
-                feeds.check_feed(state, block)
-                arc, normal = moves.arc(state, block, target)
-                feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
-            finally:
-                state.position[:] = target
-            self.store.add_arc(arc, normal, block.line, state)
-            return
-        if state.motion == 1:
+        kind = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)[state.motion]
+        if kind != Kind.RAPID:
             feeds.check_feed(state, block)
+        if kind == Kind.ARC:
+            self._arc(block, target)
+            return
+        if kind == Kind.LINE:
             feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
-        state.position[:] = target
-        self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
+        if cutter is not None:
+            cutter.line(target, kind, block.line)
+            return
+        state.position[:], state.actual = target, None
+        self.store.add(kind, block.line, state)
+
+    def _arc(self, block: Block, target: FloatArray) -> None:
+        state = self.state
+        if self._cutter is None and state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
+            )
+        try:
+            arc, normal = moves.arc(state, block, target)
+            feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
+            if self._cutter is not None:
+                self._cutter.arc(target, arc, block.line)
+        finally:
+            state.position[:] = target
+        if self._cutter is None:
+            self.store.add_arc(arc, normal, block.line, state)
+
+    def _spline(self, block: Block) -> None:
+        """A line of a spline; the curve is a block of its first line."""
+        state = self.state
+        if not is_spline_line(block):
+            return
+        if self._cutter is not None:
+            raise WordFault(block.motion_word(), "a spline under cutter radius compensation; write G40 before it")
+        state.series = None
+        if state.in_thread:
+            threads.stop(state, self.store, block.line)
+        found = self._splines.read(state, block, self.store.blocks)
+        if found is None:
+            return
+        if not self.assumed.strict:
+            self._take_default_feed(block)
+        feeds.check_feed(state, block)
+        (points, weights), line = found
+        state.position[:] = points[-1, -1]
+        self.store.add_spline(points, weights, line, state)
 
     @staticmethod
     def _gives_offsets(block: Block) -> bool:

@@ -133,6 +133,20 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
     )
 
 
+def text_alone(data: bytes) -> Words:
+    """A text without words, for languages that are not split into words."""
+    none = np.zeros(0, dtype=np.int64)
+    return Words(
+        letter=none.astype(np.uint8),
+        value=np.zeros(0),
+        at=none,
+        line=none.astype(np.int32),
+        first=np.zeros(1, dtype=np.int64),
+        data=data,
+        frame=none.astype(np.int32),
+    )
+
+
 _NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
 _OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
 _LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR = 79, 69, 101, 58, 36

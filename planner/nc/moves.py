@@ -20,6 +20,7 @@ from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_
 from planner.nc.block import Block, unused
 from planner.nc.state import REFUSED_MOTION, State
 
+_CLOSES_IF = "the arc would close if its centre were"
 _ROUNDING = {
     "T": 1e-4,
     "H": 1e-4,
@@ -36,6 +37,14 @@ class WordFault(Exception):
     def __init__(self, word: int, message: str):
         super().__init__(message)
         self.word, self.message = word, message
+
+
+class ArcFault(WordFault):
+    """The words of an arc contradict each other; `otherwise` if it would close with its centre read the other way (G90.1, G91.1)."""
+
+    def __init__(self, word: int, message: str, *, otherwise: bool):
+        super().__init__(word, message)
+        self.otherwise = otherwise
 
 
 def is_move(state: State, block: Block) -> bool:
@@ -83,7 +92,7 @@ def arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
     try:
         return _arc(state, block, end)
     except ArcError as fault:
-        raise WordFault(block.motion_word(), str(fault)) from fault
+        raise ArcFault(block.motion_word(), str(fault), otherwise=_CLOSES_IF in str(fault)) from fault
 
 
 def plane_of(state: State) -> tuple[int, bool]:
@@ -111,7 +120,8 @@ def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
     a, b = IN_PLANE[normal]
     plane = f"{AXES[a]} {AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value else 1
-    if block.value.get("IJK"[normal], 0.0) != 0.0:
+    along = block.value.get("IJK"[normal])  # many programs write K0 in G17
+    if along is not None and (along != 0.0 or state.strict):
         raise ArcError(
             f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
         )
@@ -162,7 +172,7 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
     if not closes(state.position, end, other, normal=normal, unit=state.unit):
         return "correct the centre or the end point"
     way = "incremental: write G91.1" if state.absolute_centre else "absolute: write G90.1"
-    return f"the arc would close if its centre were {way} before it"
+    return f"{_CLOSES_IF} {way} before it"
 
 
 def check_machine_coordinates(state: State, block: Block) -> None:
@@ -173,12 +183,17 @@ def check_machine_coordinates(state: State, block: Block) -> None:
         raise WordFault(block.at["one-shot"], "G53 goes with absolute coordinates only; write G90 before it")
 
 
+def used_in_force(state: State) -> set[str]:
+    """Letters that the motion code in force uses beside the axes."""
+    code = 10 * state.motion if state.motion <= 3 else state.motion
+    return set(codes.WORDS.get(("G", code), ""))
+
+
 def check_words(state: State, block: Block) -> None:
     """Words that neither a code of the line nor the motion code in force uses. Raises WordFault for the first."""
     if state.motion == REFUSED_MOTION or block.partial:
         return
-    code = 10 * state.motion if state.motion <= 3 else state.motion
-    used = block.own | set(codes.WORDS.get(("G", code), ""))
+    used = block.own | used_in_force(state)
     for letter in codes.MOTION_WORDS:
         if letter in block.value and letter not in used:
             raise WordFault(block.at[letter], unused(letter))

@@ -24,6 +24,11 @@ class Kind(IntEnum):
     ARC = 2  # circular or helical (G2, G3)
     DWELL = 3  # stand still (G4)
     STOP = 4  # come to a full stop without a dwell: M0, M1, M2, M30, M6
+    SPLINE = 5  # along a spline (G5, G5.1, G5.2, G6.2)
+
+
+MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.SPLINE)
+FEED_MOVES = MOVES[1:]
 
 
 class PathControl(IntEnum):
@@ -76,6 +81,36 @@ class Expansion:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Splines:
+    """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
+
+    block   : (K,) block of each, not decreasing: a block has one after the other
+    points  : (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is where it ends itself
+    weights : (K, 4) > 0 [-]
+    """
+
+    block: Array
+    points: FloatArray
+    weights: FloatArray
+
+    def __post_init__(self) -> None:
+        pieces, _, axes = np.shape(self.points)
+        freeze(self, "block", np.int64, (pieces,))
+        freeze(self, "points", np.float64, (pieces, 4, axes))
+        freeze(self, "weights", np.float64, (pieces, 4))
+        if not (self.weights > 0).all():
+            raise ValueError("Splines.weights: every weight must be positive")
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+
+def no_splines(axes: int) -> Splines:
+    """The splines of a program that has none, over `axes` axes."""
+    return Splines(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Program:
     """An NC program: B blocks over A axes.
 
@@ -93,6 +128,7 @@ class Program:
     arc_center   : (K, A) centre in the plane; the axial coordinate is that of the start [mm]
     arc_normal   : (K,) index of the axis normal to the plane of the arc: 2 for G17, 1 for G18, 0 for G19
     arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
+    splines      : of the blocks of kind SPLINE
     events       : words without influence on the motion
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
@@ -115,6 +151,7 @@ class Program:
     arc_center: FloatArray
     arc_normal: Array
     arc_sweep: FloatArray
+    splines: Splines = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
@@ -138,6 +175,10 @@ class Program:
         freeze(self, "arc_center", np.float64, (arcs, axes))
         freeze(self, "arc_normal", np.int64, (arcs,))
         freeze(self, "arc_sweep", np.float64, (arcs,))
+        if not len(self.splines):
+            object.__setattr__(self, "splines", no_splines(axes))
+        if self.splines.points.shape[2] != axes:
+            raise ValueError(f"Program.splines: {self.splines.points.shape[2]} axes, expected {axes}")
         freeze(self, "frame", np.int32, (blocks if self.frames else 0,))
         if not (self.feed > 0).all():
             raise ValueError("Program.feed: every feed must be positive")

@@ -6,8 +6,10 @@ axis is counted in a note (planner/nc/assumed.py), and what may move is refused 
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from planner.base.errors import InputError
 from planner.nc.settings import may_be_ignored
@@ -16,8 +18,8 @@ AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
 ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
 REFUSE, IGNORE = "refuse", "ignore"
 EXTRUDERS = (REFUSE, IGNORE)
-LINUXCNC, FANUC = "linuxcnc", "fanuc"
-DIALECTS = (AUTO, LINUXCNC, FANUC)
+LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
+DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
 
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?")
@@ -54,6 +56,29 @@ class Reading:
         if isinstance(self.ignore, str):
             raise InputError(f"ignore = {self.ignore!r} is one text; give a tuple, such as ('M428', 'A')")
         object.__setattr__(self, "ignore", tuple(dict.fromkeys(map(_normal, self.ignore))))
+
+    def changed(self) -> dict[str, Any]:
+        """The settings that are not the usual ones, ready for JSON; `Reading.saved` makes the record of them again."""
+        return {
+            field.name: list(value) if isinstance(value := getattr(self, field.name), tuple) else value
+            for field in dataclasses.fields(self)
+            if getattr(self, field.name) != field.default
+        }
+
+    @classmethod
+    def saved(cls, changed: object) -> Reading:
+        """The settings that a file says; entries that are none are left out."""
+        given = changed if isinstance(changed, dict) else {}
+        settings: dict[str, Any] = {}
+        for field in dataclasses.fields(cls):
+            value = given.get(field.name)
+            value = tuple(value) if isinstance(value, list) else value
+            if isinstance(value, type(getattr(AS_USUAL, field.name))):
+                settings[field.name] = value
+        try:
+            return cls(**settings)
+        except (InputError, AttributeError, TypeError):
+            return AS_USUAL
 
 
 def ignore_list(text: str) -> tuple[str, ...]:

@@ -35,6 +35,11 @@ SPINDLE_LIMIT = Assumption(
     "largest spindle speed", "largest spindle speeds", "they change nothing in the path"
 )
 EXTRUDER_ZERO = Assumption("zero of the extruder", "zeros of the extruder", "left out with its words")
+RETRACTION = Assumption(
+    "retraction of an extruder (G10, G11)",
+    "retractions of an extruder (G10, G11)",
+    "they take no time in this plan",
+)
 G_SETTING = Assumption(
     "G code that sets the control or cancels what this reader does not have",
     "G codes that set the control or cancel what this reader does not have",
@@ -55,14 +60,14 @@ _OF_AXES = frozenset((
     574, 579, 584, 593, 665, 666, 851, 906, 907, 913, 914,
 ))
 _OF_PRINTERS = _OF_AXES | EXTRUDER_MODES | frozenset((
-    20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 31, 42, 73, 75, 76, 77, 78, 80, 81, 85, 86, 87,
+    73,
     *range(104, 112), *range(114, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164, 190, 191,
     220, 221, 240, 250, 280, 300, 302, 303, 305, 400, 412, 413, 420, 486, 500, 501, 502, 503, 504,
     572, 575, 605, 862, 900, 928,
 ))
 # fmt: on
 TEXTS = frozenset((117, 118))  # a message to the end of the line
-MAY_MOVE = frozenset((96, 97, 290, 401, 402))  # jumps, and codes of printers that move
+MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printers that move
 
 # G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates off, polar interpolation off,
 # stored stroke and spindle speed checks, mirror image off, look-ahead of Haas and its smoothness, rotation off.
@@ -94,6 +99,8 @@ def _g_setting(code: int, before: str, behind: str) -> Setting | None:
         return Setting(SPINDLE_LIMIT, "SPQR")
     if code == 500 or code in _G_SETTINGS:
         return Setting(G_SETTING, "DEHLPQRS")
+    if code in (100, 110) and "L" not in behind:
+        return Setting(RETRACTION, "PRS")
     if code == 920 and "E" in behind:
         return Setting(EXTRUDER_ZERO, "")
     # look-ahead of Fanuc controls: G5 P10000, G5.1 Q1, G8 P1

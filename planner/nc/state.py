@@ -101,6 +101,8 @@ class State:
     retract_given : a G98 or G99 was read
     series       : canned cycles in force
     cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
+    actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
+    strict       : nothing is assumed (`Reading.strict`)
     in_thread    : the last block was cut in step with the spindle
     """
 
@@ -132,12 +134,21 @@ class State:
     retract_given: bool = False
     series: Series | None = None
     cycle_dwell: float = 0.0
+    actual: FloatArray | None = None
     in_thread: bool = False
+    strict: bool = False
+
+    @property
+    def place(self) -> FloatArray:
+        """(3,) where the tool is [mm]."""
+        return self.position if self.actual is None else self.actual
 
     @property
     def is_plain(self) -> bool:
         """Whether straight moves need nothing but offsets, units and F: what the compiled loop knows."""
-        return self.feed_mode == "per minute" and not (self.rotated or self.diameters or self.in_thread)
+        return self.feed_mode == "per minute" and not (
+            self.rotated or self.diameters or self.in_thread or self.actual is not None
+        )
 
     def work_system(self, code: int = 0) -> System:
         """A work system by its code, or the one in force."""

@@ -11,7 +11,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
-from planner.nc.program import Frame, Kind, Program
+from planner.nc.program import FEED_MOVES, Frame, Kind, Program, Splines
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
@@ -76,6 +76,7 @@ class Store:
         self.event = EventColumns.of_size(0)
         self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
+        self.splines: list[tuple[int, FloatArray, FloatArray]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
 
     def begin(self, words: int) -> None:
@@ -91,11 +92,11 @@ class Store:
             self.event = EventColumns(*(_grown(column, self.events + rows) for column in self.event))
 
     def add(self, kind: Kind, line: int, state: State) -> None:
-        """Append a block that ends at the state's position."""
+        """Append a block that ends where the tool is."""
         block, k = self.block, self.blocks
         block.kind[k] = kind
-        block.end[k] = state.position
-        block.feed[k] = state.feed if kind in (Kind.LINE, Kind.ARC) else np.inf
+        block.end[k] = state.place
+        block.feed[k] = state.feed if kind in FEED_MOVES else np.inf
         block.line[k] = line
         block.path_control[k] = state.path_control
         block.tolerance[k] = state.tolerance
@@ -103,9 +104,14 @@ class Store:
         self.blocks += 1
 
     def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
-        """Append an arc about a normal axis that ends at the state's position."""
+        """Append an arc about a normal axis that ends where the tool is."""
         self.arcs.append((self.blocks, arc.centre, normal, arc.sweep))
         self.add(Kind.ARC, line, state)
+
+    def add_spline(self, points: FloatArray, weights: FloatArray, line: int, state: State) -> None:
+        """Append a spline that ends at the state's position: control points (K, 4, 3) [mm] and weights (K, 4) of its pieces."""
+        self.splines += [(self.blocks, p, w) for p, w in zip(points, weights, strict=True)]
+        self.add(Kind.SPLINE, line, state)
 
     def add_dwell(self, seconds: float, line: int, state: State) -> None:
         """A dwell; one of no duration is a full stop."""
@@ -148,6 +154,11 @@ class Store:
             arc_center=np.array([arc[1] for arc in self.arcs]).reshape(-1, 3),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
+            splines=Splines(
+                block=np.array([spline[0] for spline in self.splines], dtype=np.int64),
+                points=np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3),
+                weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),
+            ),
             events=EventTable(
                 block=self.event.block[seen].copy(),
                 line=self.event.line[seen].copy(),

@@ -72,7 +72,7 @@ def _cut(state: State, store: Store, line: int, target: FloatArray, feed: float)
     if not state.in_thread:
         stop(state, store, line)
     programmed, state.feed = state.feed, feed
-    state.position[:] = target
+    state.position[:], state.actual = target, None
     store.make_room(1)
     store.add(Kind.LINE, line, state)
     state.feed, state.in_thread = programmed, True
@@ -81,8 +81,8 @@ def _cut(state: State, store: Store, line: int, target: FloatArray, feed: float)
 def _rapid(state: State, store: Store, line: int, place: FloatArray) -> None:
     if state.in_thread:
         stop(state, store, line)
-    if (place != state.position).any():
-        state.position[:] = place
+    if (place != state.place).any():
+        state.position[:], state.actual = place, None
         store.make_room(1)
         store.add(Kind.RAPID, line, state)
 

@@ -19,8 +19,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.nc.leader import without_leader
 from planner.nc.lexer import NUMBER, Words, split_words
-from planner.nc.program import Kind, Program
+from planner.nc.program import FEED_MOVES, Program
 
 SIGNIFICANT = 4  # digits of a feed
 # The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
@@ -43,13 +44,15 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
-    moving = np.flatnonzero((program.kind == Kind.LINE) | (program.kind == Kind.ARC))
+    moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES))
     asked = np.asarray(feeds, dtype=np.float64)
     if asked.shape != (len(program),):
         raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
     if (asked < 0).any():
         raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
-    words = split_words(source, block_delete=program.reading.block_delete)
+    reading = program.reading
+    read = source if reading.strict else without_leader(source)[0]
+    words = split_words(read, block_delete=reading.block_delete)
     row = _rows(words, program.line[moving])
     unit = _unit_before(words)
     f_word = _f_words(words)

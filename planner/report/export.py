@@ -24,6 +24,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
+from planner.nc.info import PLACES_SHOWN
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program
@@ -143,6 +144,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "verdict": verdict_summary(verdict) if verdict is not None else None,
             "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,
             **optimum_summary(plan.grid, plan.prices),
+            "reading": plan.program.reading.changed(),
             "blocks": len(plan.program),
             "grid_points": plan.grid_points,
             "notes": plan.notes,
@@ -168,9 +170,14 @@ def _not_limited(verdict: Verdict) -> list[str]:
 
 
 def info_summary(info: ProgramInfo) -> dict[str, Any]:
-    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`."""
+    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`.
+
+    Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
+    """
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
-    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported]
+    fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
+    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
+    fields["unsupported_places"] = len(info.unsupported)
     return plain(fields)
 
 
@@ -189,6 +196,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "corner": plan.corner,
             "dt_s": trajectory.dt,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
+            "reading": plan.program.reading.changed(),
             "not_limited": _not_limited(plan.verdict) if plan.verdict is not None else [],
             "units": units(trajectory.axes),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),

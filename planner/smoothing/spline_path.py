@@ -188,7 +188,8 @@ def _moving(toolpath: Toolpath) -> Array:
     """(A,) True for axes that a toolpath moves somewhere: the others accelerate nowhere on its splines either."""
     points = np.vstack([toolpath.start, toolpath.end])
     arcs = np.vstack([toolpath.arcs.e1, toolpath.arcs.e2, toolpath.arcs.drift])
-    return np.asarray((np.ptp(points, axis=0) > 0.0) | (arcs != 0.0).any(axis=0))
+    curves = (np.ptp(toolpath.curves.points, axis=1) > 0.0).any(axis=0)
+    return np.asarray((np.ptp(points, axis=0) > 0.0) | (arcs != 0.0).any(axis=0) | curves)
 
 
 def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:

@@ -51,13 +51,18 @@ def cycles(rng: Rng) -> str:
         choice = rng.integers(14)
         if choice < 6:
             code = last if last and rng.random() < 0.5 else codes[rng.integers(len(codes))]
-            if plane != "Z" and code in ("G74", "G84"):  # in G18 and G19 LinuxCNC 2.9 taps elsewhere than at the hole
+            if plane != "Z" and code in (
+                "G74",
+                "G84",
+            ):  # in G18 and G19 LinuxCNC 2.9 taps elsewhere than at the hole
                 code = "G81"
             turning = {"G74": 4, "G84": 3}.get(code, spindle)
             if turning != spindle:
                 lines.append(f"M{turning}")
                 spindle = turning
-            lines.append((code if code != last or rng.random() < 0.5 else "") + " " + hole(code, code != last))
+            lines.append(
+                (code if code != last or rng.random() < 0.5 else "") + " " + hole(code, code != last)
+            )
             last = code
         elif choice == 6:
             lines.append(pick(rng, "G98", "G99"))
@@ -78,7 +83,9 @@ def cycles(rng: Rng) -> str:
             lines += ["G80", ""]
             last = ""
         elif choice == 11:
-            lines.append(pick(rng, "G28", "G4 P1", "G92 Z5", "G92.1", "G55", "G54", "F300", "G28.1", "G30 Z3"))
+            lines.append(
+                pick(rng, "G28", "G4 P1", "G92 Z5", "G92.1", "G55", "G54", "F300", "G28.1", "G30 Z3")
+            )
         elif choice == 12:
             lines.append(pick(rng, "G20", "G21"))
             last = ""
@@ -102,7 +109,9 @@ def offsets(rng: Rng) -> str:
             lines.append(f"G{rng.integers(2)} {some_axes(rng)}")
         elif choice == 4:
             # (turning the system in force under a G92 offset moves the start of LinuxCNC's next move)
-            lines.append(("G92.1\n" if rotated else "") + f"G10 L2 P{rng.integers(0, 10)} {some_axes(rng)}{turn()}")
+            lines.append(
+                ("G92.1\n" if rotated else "") + f"G10 L2 P{rng.integers(0, 10)} {some_axes(rng)}{turn()}"
+            )
         elif choice == 5:
             lines.append(f"G10 L20 P{rng.integers(0, 10)} {some_axes(rng)}")
         elif choice == 6:
@@ -115,7 +124,9 @@ def offsets(rng: Rng) -> str:
             lines.append(pick(rng, "G28", "G30") + (" " + some_axes(rng) if rng.random() < 0.7 else ""))
         elif choice == 10:
             lines.append(pick(rng, "G54", "G55", "G58", "G59", "G59.1", "G59.2", "G59.3"))
-        elif choice == 11:  # (under a rotation LinuxCNC's G43.1 X moves the next move's start, and its G53 Z moves x and y)
+        elif (
+            choice == 11
+        ):  # (under a rotation LinuxCNC's G43.1 X moves the next move's start, and its G53 Z moves x and y)
             lines.append(pick(rng, "G43.1 " + some_axes(rng, letters="Z" if rotated else "XZY"), "G49"))
         elif choice == 12:
             absolute = bool(rng.integers(2))
@@ -145,7 +156,9 @@ def feeds(rng: Rng) -> str:
         choice = rng.integers(5)
         if choice == 0:
             u, v = [(5.0, 5.0), (5.0, -5.0), (10.0, 0.0)][rng.integers(3)]
-            lines.append(f"G91 G{rng.integers(2, 4)} X{u} Y{v} I5{f} Z{number(rng, -3, 3)} P{rng.integers(1, 3)}\nG90")
+            lines.append(
+                f"G91 G{rng.integers(2, 4)} X{u} Y{v} I5{f} Z{number(rng, -3, 3)} P{rng.integers(1, 3)}\nG90"
+            )
         elif choice == 1:
             lines.append(f"G0 {some_axes(rng)}")
         elif choice == 2:
@@ -163,7 +176,9 @@ def lathe(rng: Rng) -> str:
         if choice <= 1:
             lines.append(f"G{rng.integers(2)} {some_axes(rng, 30, 'XZ')}")
         elif choice == 2:
-            lines.append(pick(rng, "G7", "G8", "G90", "G91", "G91 G0 X3\nG90", "G92 X20", "G52 X3 Z1", "G92.1"))
+            lines.append(
+                pick(rng, "G7", "G8", "G90", "G91", "G91 G0 X3\nG90", "G92 X20", "G52 X3 Z1", "G92.1")
+            )
         elif choice == 3:
             lines.append(f"G33 {some_axes(rng, 30, 'ZX')} K{number(rng, 0.5, 3)}")
         elif choice == 4:
@@ -185,4 +200,62 @@ def lathe(rng: Rng) -> str:
     return "\n".join(lines) + "\nM2\n"
 
 
-KINDS = {"cycles": cycles, "offsets": offsets, "feeds": feeds, "lathe": lathe}
+def compensated(rng: Rng) -> str:
+    """Cutter radius compensation on both sides, in G17 and G18, around lines and arcs; some tools do not fit, some paths gouge."""
+    plane = rng.integers(2)
+    a, b = ("XY", "ZX")[plane]
+    i, j = ("IJ", "KI")[plane]
+    c = "ZY"[plane]
+    diameter = rng.uniform(0.5, 4.0)
+    lines = [f"G21 G{17 + plane} G0 X0 Y0 Z0", "F120"]
+    if plane == 0 and rng.random() < 0.3:
+        lines.append(f"G10 L2 P1 R{number(rng, -180, 180)}")
+    lines.append(f"G{rng.integers(41, 43)}.1 D{diameter:.3f}")
+    lines.append(f"G{rng.integers(2)} {a}{number(rng, 10, 20)} {b}{number(rng, -10, 10)} ")
+    heading = rng.uniform(0, 2 * np.pi)
+    for _ in range(rng.integers(2, 14)):
+        choice = rng.integers(12)
+        heading += rng.normal(0.0, 0.9) if rng.random() < 0.7 else 0.0
+        if choice < 6:
+            size = rng.uniform(2, 15)
+            code = (
+                ""
+                if rng.random() < 0.2 and lines[-1].startswith("G91 G1")
+                else f"G{0 if rng.random() < 0.1 else 1} "
+            )
+            z = f" {c}{number(rng, -1, 1)}" if rng.random() < 0.2 else ""
+            f = f" F{number(rng, 50, 200)}" if rng.random() < 0.2 else ""
+            lines.append(
+                f"G91 {code or 'G1 '}{a}{size * np.cos(heading):.4f} {b}{size * np.sin(heading):.4f}{z}{f}"
+            )
+        elif choice < 9:
+            size, sweep = (
+                rng.uniform(1.5, 9),
+                rng.uniform(0.2, 5.5) if rng.random() < 0.3 else rng.uniform(0.2, 2),
+            )
+            turning = rng.choice([-1, 1])
+            centre = size * np.array([-np.sin(heading), np.cos(heading)]) * turning
+            spoke = complex(*-centre) * np.exp(1j * turning * sweep)
+            end = complex(*centre) + spoke
+            heading += turning * sweep
+            lines.append(
+                f"G91 G{3 if turning > 0 else 2} {a}{end.real:.12f} {b}{end.imag:.12f} {i}{centre[0]:.12f} {j}{centre[1]:.12f}"
+                + (f" {c}{number(rng, -1, 1)}" if rng.random() < 0.2 else "")
+            )
+        elif (
+            choice == 9 and lines[-1] != "M0"
+        ):  # (there LinuxCNC meets the next arc as if the move were one along the last)
+            lines.append(f"G90 G1 {c}{number(rng, -3, 3)}")
+        elif choice == 10:
+            lines.append(pick(rng, "M3", "G4 P0.5", "S300", "M0", "F200"))
+        elif rng.random() < 0.3:
+            lines += ["G40", f"G91 G{rng.integers(2)} {a}{number(rng, -30, 30)} {b}20"]
+            lines += [
+                f"G{rng.integers(41, 43)}.1 D{diameter / 2:.3f}",
+                f"G91 G1 {a}{number(rng, 5, 10)} {b}-3",
+            ]
+    lines += ["G40 G90", f"G0 {a}{number(rng, -30, 30)}"]
+    return "\n".join(lines) + "\nM2\n"
+
+
+KINDS = {"compensated": compensated, "cycles": cycles, "offsets": offsets, "feeds": feeds, "lathe": lathe}

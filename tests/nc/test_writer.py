@@ -235,7 +235,7 @@ def test_the_control_reads_real_programs_as_we_do(tmp_path: Path) -> None:
     jobs, results = [], []
     for path in [*PROGRAMS, *sorted((SHARED / "peers" / "programs").glob("*.ngc"))]:
         try:
-            program = read_program(path)
+            program = read_program(path, reading=Reading(strict=True))
         except InputError:
             continue
         if path.stat().st_size > REAL_MAX:

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain, Task
+from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain, Task, way_to_brake
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.slowing import slower_by
@@ -125,4 +125,4 @@ def _braking(chain: Chain, point: int) -> float:
     x = chain.profile.x[point]
     own = slice(point, chain.at + 1)
     a, j = chain.columns.acceleration[own].min(), chain.columns.jerk[own].min()
-    return float(x / (2.0 * a) + np.sqrt(x) * a / (2.0 * j))
+    return float(way_to_brake(x, a, j))

@@ -47,9 +47,6 @@ TRACKING_ROUNDS = (
 )
 POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
 POLISHED = 1e-14  # defect, share of the largest feed [-]
-GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
-RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
-DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
 
 
 Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
@@ -147,7 +144,7 @@ class ScaledWindow:
             put(self.blocks, x, u)
             found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
-            if _accepted(found):
+            if found.status == kernel.SOLVED:
                 self._track(0.0, POLISHING_ROUNDS, POLISHED)
                 return self._window(), most, starts
         return None, most, starts
@@ -245,16 +242,6 @@ class ScaledWindow:
 def _mirrored(x: FloatArray, u: FloatArray) -> Way:
     """A profile passed backward."""
     return x[::-1].copy(), -u[::-1].copy()
-
-
-def _accepted(found: kernel.Minimum) -> bool:
-    """Whether a window's profile is good enough; one that used up its iterations may be."""
-    return (
-        found.status in (kernel.SOLVED, kernel.OUT_OF_ITERATIONS)
-        and found.gap <= GAP_ACCEPTED
-        and found.residual <= RESIDUAL_ACCEPTED
-        and found.defect <= DEFECT_ACCEPTED
-    )
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -13,6 +13,7 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.program import PathControl
+from planner.nc.state import System
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
@@ -20,6 +21,8 @@ Modes = tuple[tuple[tuple[str, float], ...], ...]
 _SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 _PATH = {PathControl.EXACT_PATH: 61.0, PathControl.EXACT_STOP: 61.1, PathControl.BLEND: 64.0}
 _PLANE = {2: 17.0, 1: 18.0, 0: 19.0}
+_ROTATION = 9  # behind the axes of a work coordinate system
+_FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
 _AXES = 9  # x y z a b c u v w; the last six are zero here
 
 
@@ -47,7 +50,7 @@ class Asked:
     def here(self, axis: int) -> float:
         """The position in the program's coordinates and unit."""
         state = self.interpreter.state
-        return float((state.position[axis] - state.offset[axis]) / state.unit) if axis < 3 else 0.0
+        return float(state.programmed()[axis] / state.unit) if axis < 3 else 0.0
 
     def machine(self, axis: int) -> float:
         """The position in the machine's coordinates and the program's unit."""
@@ -55,9 +58,11 @@ class Asked:
         return float(state.position[axis] / state.unit) if axis < 3 else 0.0
 
     def offset(self, system: int, axis: int) -> float:
-        """The offset of a work coordinate system, G54 is 0 [mm]."""
-        given = self.interpreter.setup.systems.get(_SYSTEMS[system])
-        return 0.0 if given is None or axis >= 3 else float(given[axis])
+        """The offset of a work coordinate system, G54 is 0 [mm], or its rotation [degrees]."""
+        given = self.interpreter.state.work_system(_SYSTEMS[system])
+        if axis == _ROTATION:
+            return given.rotation
+        return float(given.origin[axis]) if axis < 3 else 0.0
 
     def event(self, letter: str, values: tuple[float, ...] = ()) -> float | None:
         """The last event with that letter, and one of the values if any are given."""
@@ -91,10 +96,18 @@ class Asked:
             90.1 if state.absolute_centre else 91.1,
         )
         rows = [
-            [("G", 21.0 if state.unit == 1.0 else 20.0)],
-            [*(("G", code) for code in (*codes, system)), *path],
+            [("G", 21.0 if state.unit == 1.0 else 20.0), ("G", 7.0 if state.diameters else 8.0)],
+            [*(("G", code) for code in (*codes, system, 98.0 if state.to_level else 99.0)), *path],
+            [("G", _FEED_MODES[state.feed_mode])],
         ]
-        if state.feed > 0:
+        if state.tool_offset.any():
+            lengths = (
+                (letter, float(state.tool_offset[axis]) / state.unit) for axis, letter in enumerate("XYZ")
+            )
+            rows.append([("G", 43.1), *(pair for pair in lengths if pair[1])])
+        else:
+            rows.append([("G", 49.0)])
+        if state.feed > 0 and state.feed_mode == "per minute":
             rows.append([("F", self.feed())])
         if self.event("S") is not None:
             rows.append([("S", self.event("S"))])
@@ -108,6 +121,11 @@ class Asked:
 # --- LinuxCNC -------------------------------------------------------------------------------------------------------------------
 
 
+def _motion_mode(motion: int) -> float:
+    """The motion code in force in tenths, as `State.motion` keeps it; G80 where there is none."""
+    return 800.0 if motion < 0 else 10.0 * motion if motion <= 3 else float(motion)
+
+
 def _on(condition: bool) -> float:
     return 1.0 if condition else 0.0
 
@@ -117,27 +135,27 @@ _LINUXCNC_NAMES: dict[str, Callable[[Asked], float]] = {
     "_vminor": lambda a: 0.0,
     "_task": lambda a: 0.0,
     "_remap_level": lambda a: 0.0,
-    "_motion_mode": lambda a: 10.0 * a.interpreter.state.motion if a.interpreter.state.motion >= 0 else 800.0,
+    "_motion_mode": lambda a: _motion_mode(a.interpreter.state.motion),
     "_plane": lambda a: 10.0 * _PLANE[a.interpreter.state.normal],
     "_ccomp": lambda a: 400.0,
     "_metric": lambda a: _on(a.interpreter.state.unit == 1.0),
     "_imperial": lambda a: _on(a.interpreter.state.unit != 1.0),
     "_absolute": lambda a: _on(a.interpreter.state.absolute),
     "_incremental": lambda a: _on(not a.interpreter.state.absolute),
-    "_inverse_time": lambda a: 0.0,
-    "_units_per_minute": lambda a: 1.0,
-    "_units_per_rev": lambda a: 0.0,
+    "_inverse_time": lambda a: _on(a.interpreter.state.feed_mode == "inverse time"),
+    "_units_per_minute": lambda a: _on(a.interpreter.state.feed_mode == "per minute"),
+    "_units_per_rev": lambda a: _on(a.interpreter.state.feed_mode == "per turn"),
     "_coord_system": lambda a: float(a.interpreter.state.system),
-    "_tool_offset": lambda a: _on(a.interpreter.state.tool_length != 0.0),
-    "_retract_r_plane": lambda a: _on(a.event("G", (98.0, 99.0)) == 99.0),
-    "_retract_old_z": lambda a: _on(a.event("G", (98.0, 99.0)) != 99.0),
-    "_spindle_rpm_mode": lambda a: 1.0,
-    "_spindle_css_mode": lambda a: 0.0,
+    "_tool_offset": lambda a: _on(a.interpreter.state.tool_offset.any()),
+    "_retract_r_plane": lambda a: _on(not a.interpreter.state.to_level),
+    "_retract_old_z": lambda a: _on(a.interpreter.state.to_level),
+    "_spindle_rpm_mode": lambda a: _on(not a.interpreter.state.spindle.surface_speed),
+    "_spindle_css_mode": lambda a: _on(a.interpreter.state.spindle.surface_speed),
     "_ijk_absolute_mode": lambda a: _on(a.interpreter.state.absolute_centre),
-    "_lathe_diameter_mode": lambda a: 0.0,
-    "_lathe_radius_mode": lambda a: 1.0,
-    "_spindle_on": lambda a: _on(a.event("M", (3.0, 4.0, 5.0)) in (3.0, 4.0)),
-    "_spindle_cw": lambda a: _on(a.event("M", (3.0, 4.0, 5.0)) == 3.0),
+    "_lathe_diameter_mode": lambda a: _on(a.interpreter.state.diameters),
+    "_lathe_radius_mode": lambda a: _on(not a.interpreter.state.diameters),
+    "_spindle_on": lambda a: _on(a.interpreter.state.spindle.turning != 0),
+    "_spindle_cw": lambda a: _on(a.interpreter.state.spindle.turning > 0),
     "_mist": lambda a: _on(a.event("M", (7.0, 9.0)) == 7.0),
     "_flood": lambda a: _on(a.event("M", (8.0, 9.0)) == 8.0),
     "_speed_override": lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0),
@@ -145,7 +163,7 @@ _LINUXCNC_NAMES: dict[str, Callable[[Asked], float]] = {
     "_adaptive_feed": lambda a: 0.0,
     "_feed_hold": lambda a: 0.0,
     "_feed": lambda a: a.feed(),
-    "_rpm": lambda a: a.event("S") or 0.0,
+    "_rpm": lambda a: a.interpreter.state.spindle.speed,
     "_current_tool": lambda a: float(a.interpreter.state.tool_loaded),
     "_current_pocket": lambda a: float(a.interpreter.state.tool_loaded),
     "_selected_tool": lambda a: float(a.interpreter.state.tool_selected),
@@ -159,7 +177,7 @@ def _linuxcnc_number(asked: Asked, number: int) -> float:
     interpreter = asked.interpreter
     for code, first in ((280, 5161), (300, 5181)):
         if first <= number < first + _AXES:
-            given = interpreter.setup.positions.get(code)
+            given = interpreter.state.homes.get(code)
             return 0.0 if given is None or number - first >= 3 else float(given[number - first])
     if number == 5210:
         return _on(bool(interpreter.state.g92.any()))
@@ -172,8 +190,11 @@ def _linuxcnc_number(asked: Asked, number: int) -> float:
         return asked.offset(system, axis)
     if number == 5400:
         return float(interpreter.state.tool_loaded)
-    if number == 5403:
-        return float(interpreter.state.tool_length)
+    if 5401 <= number <= 5403:
+        return float(interpreter.state.tool_offset[number - 5401])
+    if number == 5410:
+        tool = interpreter.state.tools.get(interpreter.state.tool_loaded)
+        return 0.0 if tool is None else tool.diameter
     if 5420 <= number < 5420 + _AXES:
         return asked.here(number - 5420)
     return 0.0
@@ -210,7 +231,9 @@ class FanucAsked(Asked):
 
     numbers = frozenset(
         (*range(4001, 4131), *range(4201, 4331), *range(5001, 5009), *range(5021, 5029), *range(5041, 5049))
-    ) | frozenset((*range(5201, 5209), *range(5221, 5327), *range(3000, 3020)))
+    ) | frozenset(
+        (*range(5201, 5209), *range(5221, 5327), *range(3000, 3020), *range(1000, 1200), *range(2000, 3000))
+    )
 
     def get(self, parameter: int | str, depth: int) -> float:
         """The value of a parameter by its number; `depth` calls are open. Raises ValueError for what only the control knows."""
@@ -219,13 +242,13 @@ class FanucAsked(Asked):
         if 4201 <= number <= 4330:
             number -= 200
         modal: dict[int, Callable[[], float]] = {
-            4001: lambda: float(max(state.motion, 0)),
+            4001: lambda: _motion_mode(state.motion) / 10.0,
             4002: lambda: _PLANE[state.normal],
             4003: lambda: 90.0 if state.absolute else 91.0,
-            4005: lambda: 94.0,
+            4005: lambda: _FEED_MODES[state.feed_mode],
             4006: lambda: 21.0 if state.unit == 1.0 else 20.0,
             4007: lambda: 40.0,
-            4008: lambda: 43.0 if state.tool_length else 49.0,
+            4008: lambda: 43.0 if state.tool_offset.any() else 49.0,
             4014: lambda: min(54.0 + self.system(), 59.0),
             4109: self.feed,
             4113: lambda: self.event("M") or 0.0,
@@ -248,7 +271,21 @@ class FanucAsked(Asked):
         )
 
     def put(self, number: int, value: float | None) -> None:
-        """Assign to a parameter of the control. Raises ValueError: an alarm, or a state that is changed by codes."""
+        """Assign to a parameter of the control: a work offset. Raises ValueError: an alarm, or a state that is changed by codes."""
         if number == 3000:
             raise ValueError(f"the program raises its alarm {value or 0:g} here")
+        if 3001 <= number <= 3007:
+            return  # timers and what the operator may do: nothing moves
+        if 5221 <= number <= 5326 and (number - 5221) % 20 < 3:
+            self._set_offset(number - 5221, value or 0.0)
+            return
         super().put(number, value)
+
+    def _set_offset(self, place: int, value: float) -> None:
+        state = self.interpreter.state
+        code = _SYSTEMS[place // 20]
+        old = state.work_system(code)
+        origin = old.origin.copy()
+        origin[place % 20] = value * state.unit
+        state.systems[code] = System(origin, old.rotation)
+        state.apply_offsets()

@@ -97,8 +97,8 @@ def compile_procedures(
 
 @dataclass
 class _End:
-    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves the function. With `computed`
-    it goes to the label of the program whose number that text gives.
+    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves the function.
+    With `computed` it goes to the label of the program whose number that text gives.
     """
 
     place: Place

@@ -2,8 +2,8 @@
 
 A program that holds nothing of it is told from the words that the lexer has made, without looking at its text.
 
-LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [ with DO, G65, G66, M98, M99,
-and sums without brackets behind an equals sign. Parameters and brackets alone belong to both and are read as LinuxCNC's.
+LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [ with DO, G65, G66, M98,
+M99, and sums without brackets behind an equals sign. Parameters and brackets alone belong to both and are read as LinuxCNC's.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from planner.nc.lexer import FAULT, Words
 from planner.nc.reading import AUTO, FANUC, LINUXCNC, Reading
 
 # Codes that call and return, save and restore modes.
-_CALLS = {ord("M"): (70, 72, 97, 98, 99), ord("G"): (65, 66)}
+_CALLS = {ord("M"): (70, 71, 72, 73, 97, 98, 99), ord("G"): (65, 66, 67)}
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 _O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
 _LINUXCNC = re.compile(
@@ -25,9 +25,9 @@ _LINUXCNC = re.compile(
 )
 _FANUC = re.compile(
     r"GOTO|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
-    r"[A-Z\d.]*(?:G6[56](?![\d.])|M9[789](?![\d.])))"
+    r"[A-Z\d.]*(?:G6[567](?![\d.])|M9[789](?![\d.])))"
 )
-_EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[02]$")
+_EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
 
 
 def may_compute(words: Words) -> Array:
@@ -50,8 +50,10 @@ def computes(text: str) -> bool:
 
 def dialect_of(words: Words, reading: Reading) -> str | None:
     """The language that a program computes in, or None if it does not. `Reading.dialect` decides where it is given."""
-    found = None
+    found, end = None, _first_end(words)
     for row in may_compute(words).tolist():
+        if row > end and found is None:
+            return None  # what follows the end of a program that computes nothing is not read
         text = bare(row_text(words, row))
         if not computes(text):
             continue
@@ -63,6 +65,12 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
             found = FANUC
         found = found or LINUXCNC
     return found
+
+
+def _first_end(words: Words) -> int:
+    """The first row with M2 or M30, or the number of rows."""
+    ends = np.flatnonzero((words.letter == ord("M")) & np.isin(words.value, (2, 30)))
+    return words.row(int(ends[0])) if len(ends) else len(words.line)
 
 
 def row_text(words: Words, row: int) -> str:

@@ -171,12 +171,13 @@ class Parser:
         self.open: list[_Open] = []
         self.base = self.body = self.main
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
+        self.ended = False  # the main program has ended; subprograms may follow
 
     def parse(self) -> list[Procedure]:
         """All procedures of the file; the main program first, under the empty name."""
         for item in self.source.in_order():
             if isinstance(item, PlainRows):
-                self.body.append(item)
+                self._plain(item)
                 continue
             try:
                 self._line(item)
@@ -193,13 +194,21 @@ class Parser:
             )
         return [Procedure(_PROGRAM, Place(self.source.file, 1, 0), self.main), *self.procedures.values()]
 
+    def _plain(self, rows: PlainRows) -> None:
+        in_main = self.body is self.main
+        if not (in_main and self.ended):
+            self.body.append(rows)
+        self.ended |= in_main and rows.may_end and self.source.has_end(rows)
+
     def _line(self, line: SourceLine) -> None:
         reader = LineReader(line.text, line.start, SPELLING, line.place.line)
         reader.take("/")
         if reader.peek() in "oO" and not reader.ended:
             self._o_word(reader, line)
+        elif self.ended and self.body is self.main:
+            return
         elif line.row >= 0 and not self._code(reader, line):
-            words, assignments = reader.words_and_assignments()
+            words, assignments = reader.words_and_assignments(line.scale)
             for word in words:
                 if word.letter == ord("N") and not isinstance(word.value, Number):
                     raise ProgramFault(line.place._replace(at=word.at), "a line number is written in digits")

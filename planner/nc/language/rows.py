@@ -17,7 +17,8 @@ from planner.nc.lexer import Words
 
 @dataclass
 class _Tables:
-    """All rows that can be appended, of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed` words have no value here."""
+    """All rows that can be appended, of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed` words have no
+    value here."""
 
     letter: Array
     value: FloatArray

@@ -9,6 +9,7 @@ calls, with a sentence that names the line.
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
@@ -236,9 +237,8 @@ class Run:
         return number
 
     def _function(self, name: str, word: str) -> Callable[..., float | None]:
-        if name not in self.functions:
-            if not self.load(name) or name not in self.functions:
-                raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
+        if name not in self.functions and (not self.load(name) or name not in self.functions):
+            raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
         return self.functions[name]
 
     def _frame_of(self, place: tuple[int, int, int], name: str) -> int:
@@ -261,10 +261,8 @@ class Run:
                 message += " ..."
                 break
             frame = self.frames[frame].caller
-        try:
+        with contextlib.suppress(Ended, NotFinite):
             self.flush()
-        except (Ended, NotFinite):
-            pass
         return ProgramFault(fault.place, message)
 
     def _place(self, traceback: TracebackType | None) -> Place:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.nc.faults import Fault
+from planner.nc.integers import Integers
 from planner.nc.language.detect import bare, computes, may_compute, row_text
 from planner.nc.language.tree import Place, PlainRows, ProgramFault
 from planner.nc.lexer import Words
@@ -22,6 +23,7 @@ _CALLS = {
     ord("M"): (70, 71, 72, 73, 97, 98, 99),
     ord("G"): (65, 66, 67),
 }  # codes that call, return, save and restore
+_PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
 _MESSAGE = re.compile(rb"\([ \t]*(?:DEBUG|PRINT|MSG)[ \t]*,", re.IGNORECASE)
 
 
@@ -31,25 +33,29 @@ class SourceLine:
 
     row   : its row of words; -1 for a comment alone
     start : byte offset of its first character in the words' data
+    scale : what a length without a point is multiplied by
     """
 
     row: int
     place: Place
     start: int
     text: str
+    scale: float = 1.0
 
 
 class Source:
     """One file: its words, and the lines among them that may belong to the language."""
 
-    def __init__(self, words: Words, file: int, first_row: int = 0, begin: int = 0):
+    def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
+        self.scale = integers.scale(words)
         self.lines = self._statements()
 
     def _statements(self) -> list[int]:
         """Rows, ascending, that are statements of the language rather than words."""
         words = self.words
-        return [row for row in may_compute(words).tolist() if computes(bare(row_text(words, row)))]
+        bare_texts = ((row, bare(row_text(words, row))) for row in may_compute(words).tolist())
+        return [row for row, text in bare_texts if computes(text) or _PROGRAM.match(text)]
 
     def _message_lines(self) -> list[tuple[int, SourceLine]]:
         """Lines with a message in a comment, each with the row that it comes before."""
@@ -77,7 +83,7 @@ class Source:
         if start == 0 and text.startswith(_BOM):
             start, text = len(_BOM), text[len(_BOM) :]
         place = Place(self.file, int(words.line[row]), self.begin + at)
-        return SourceLine(row, place, start + self.begin, text.decode("latin-1"))
+        return SourceLine(row, place, start + self.begin, text.decode("latin-1"), float(self.scale[row]))
 
     def in_order(self) -> Iterator[SourceLine | PlainRows]:
         """The program in its order: lines of the language, and runs of plain rows between them."""
@@ -114,6 +120,12 @@ class Source:
         if begin < last:
             runs.append(self._run(begin, last, may_end=False))
         return runs
+
+    def has_end(self, rows: PlainRows) -> bool:
+        """Whether the rows hold M2 or M30."""
+        words, first = self.words, rows.first - self.first_row
+        span = slice(int(words.first[first]), int(words.first[rows.last - self.first_row]))
+        return bool(((words.letter[span] == ord("M")) & np.isin(words.value[span], (2, 30))).any())
 
     def _run(self, first: int, last: int, *, may_end: bool) -> PlainRows:
         place = Place(

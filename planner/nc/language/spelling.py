@@ -14,6 +14,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from planner.nc.integers import LENGTHS
 from planner.nc.language.tree import (
     Exists,
     Expression,
@@ -255,8 +256,10 @@ class LineReader:
 
     # --- words --------------------------------------------------------------------------------------------------------------
 
-    def words_and_assignments(self) -> tuple[tuple[Word, ...], tuple[tuple[Parameter, Expression], ...]]:
-        """All words and assignments up to the end of the line."""
+    def words_and_assignments(
+        self, scale: float = 1.0
+    ) -> tuple[tuple[Word, ...], tuple[tuple[Parameter, Expression], ...]]:
+        """All words and assignments up to the end of the line; lengths written without a point are multiplied by `scale`."""
         words: list[Word] = []
         assignments: list[tuple[Parameter, Expression]] = []
         while not self.ended:
@@ -267,7 +270,15 @@ class LineReader:
                 assignments.append((target, self.expression() if self.spelling.long_values else self.value()))
             elif c.isalpha() and c.isascii():
                 self.at += 1
-                words.append(Word(ord(c.upper()), self.start + self.column(at), self.value()))
+                letter, value = ord(c.upper()), self.value()
+                if (
+                    scale != 1.0
+                    and isinstance(value, Number)
+                    and letter in LENGTHS
+                    and "." not in self.text[at : self.at]
+                ):
+                    value = Number(value.value * scale)
+                words.append(Word(letter, self.start + self.column(at), value))
             else:
                 raise self.refused(at, f"{c!r} starts neither a word nor an assignment")
         return tuple(words), tuple(assignments)

@@ -13,6 +13,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
 from planner.machine import machine_from_dict
 from planner.nc.reader import load, parse_program
+from planner.nc.reading import Reading
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
 from planner.verify import verify
@@ -37,7 +38,8 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes]:
         raise InputError("the trajectory and the summary are of two runs; plan again", source=str(directory))
     text = load(summary["program"])
     machine = machine_from_dict(read.metadata["machine"], source=f"{files[0]} (its own machine)")
-    program = parse_program(text, machine, source=summary["program"])
+    reading = Reading.saved(read.metadata.get("reading"))
+    program = parse_program(text, machine, reading, source=summary["program"])
     toolpath = toolpath_from_program(program, machine, read.metadata.get("tolerance_mm"))
     if len(program) != summary["blocks"]:
         raise InputError(

@@ -229,6 +229,7 @@ class Interpreter:
             state.tool_loaded = state.tool_selected
             store.add(Kind.STOP, line, state)
             self.note("a tool change is a full stop that takes no time and moves nothing", line)
+        store.make_room(len(block.events) + 3 * _ROWS_AT_ONCE)  # a line may hold any number of them
         for letter, value in block.events:
             store.add_event(letter, value, line)
         for group in ("spindle", "spindle orientation", "coolant", "override"):

@@ -30,7 +30,7 @@ def test_info(job: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert "every construct is supported" in result.stdout
     assert json.loads(run("info", job, "--json").stdout)["blocks"]["line"] == 4
-    (tmp_path / "bad.ngc").write_text("G21 G90\nG41 D1\nG1 X5 F100\nG81 X1 Z-3 R1\n")
+    (tmp_path / "bad.ngc").write_text("G21 G90\nG38.2 X1\nG1 X5 F100\nG29\n")
     result = run("info", tmp_path / "bad.ngc")
     assert result.exit_code == 2
     assert "2:1" in result.stdout

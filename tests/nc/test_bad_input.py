@@ -42,7 +42,7 @@ REFUSED = [
     ("X1" * 500_000, 1, 1, [str(LINE_MAX)]),
     # words
     ("G0 X1e3", 1, 6, ["e3", "extruder axis", "--extruder ignore"]),
-    ("G0 X1 L2", 1, 7, ["L2", "without G10, G41.1"]),
+    ("G0 X1 L2", 1, 7, ["L2", "without", "canned cycle"]),
     ("o100 call", 1, 1, ["subprogram"]),
     ("G0 X1 X2", 1, 7, ["X2", "second X"]),
     ("G0 N5 X1", 1, 4, ["N5", "comes first"]),
@@ -51,7 +51,7 @@ REFUSED = [
     ("G0 X1 P2", 1, 7, ["P2", "without G4, G10, G64, G2, G3"]),
     ("G0\nX1 P2", 2, 4, ["P2", "without G4"]),
     ("G0\nX1 I2", 2, 4, ["I2", "without G2, G3"]),
-    ("G0 X1 Q2", 1, 7, ["Q2", "without G10, G64"]),
+    ("G0 X1 Q2", 1, 7, ["Q2", "without", "G64"]),
     ("T1.5", 1, 1, ["T1.5", "whole number, 0 or more"]),
     ("T-1", 1, 1, ["T-1", "whole number"]),
     ("G43 H1.5", 1, 5, ["H1.5", "whole number"]),
@@ -105,9 +105,7 @@ REFUSED = [
     ("F1 G90.1\nG2 X2 I1", 2, 1, ["J is missing", "G90.1"]),
     ("F1\nG2 X20.5 I10", 2, 1, ["10 mm", "10.5 mm", "0.5 mm apart", "allowed are 0.0282843 mm", "correct"]),
     ("F1\nG90.1\nG0 X30\nG2 X50 I10 J0", 4, 1, ["if its centre were incremental: write G91.1"]),
-    # other languages, other files
-    ("0 BEGIN PGM 11 MM\n1 L X+5", 1, 3, ["BEGIN PGM", "Heidenhain"]),
-    ("G21\nN10 CYCLE800()\nG0 X1", 2, 5, ["CYCLE800(", "Siemens"]),
+    # other files
     ("", 1, 1, ["empty"]),
     ("(nothing)\n\n; here", 1, 1, ["empty"]),
     ("G0 X1\nG\0", 2, 2, ["NUL", "binary"]),

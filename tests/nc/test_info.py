@@ -78,10 +78,3 @@ def test_every_fault_is_listed(tmp_path: Path) -> None:
     assert all(f.message for f in found.unsupported)
     assert found.blocks["line"] == 1  # G1 X9, at the feed of line 3
     assert found.extent_max.tolist() == [9, 0, 0]
-
-
-def test_another_language_is_one_fault(tmp_path: Path) -> None:
-    found = info(tmp_path, "BEGIN PGM 1 MM\nL X+1 Y+2\n")
-    assert [f.word for f in found.unsupported] == ["BEGIN PGM"]
-    assert sum(found.blocks.values()) == 0
-    assert np.isnan(found.feed).all()

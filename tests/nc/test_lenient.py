@@ -79,6 +79,7 @@ def test_events_of_what_is_not_known_are_kept() -> None:
     assert [(e.block, e.text) for e in program.events] == [
         (0, "O7"), (1, "M428"), (1, "G50"), (1, "M3"), (1, "M123"),
     ]  # fmt: skip
+    assert len(parse_program("M428 " * 500 + "\nO1\n" * 3).events) == 503
     assert "S1600" not in {e.text for e in program.events}  # it is a limit, not a speed
 
 

@@ -231,6 +231,12 @@ def test_numbers_without_a_point_are_least_increments() -> None:
         with pytest.raises(InputError, match="radius"):
             parse_program(increments + tail, machine)  # Y2 is 2 increments
         program = parse_program(increments.replace("Y2\n", "Y2.\n") + tail, machine)
+        if tail:  # and back, with points
+            found = flat_program(
+                (increments.replace("Y2\n", "Y2.\n") + tail).encode(), machine, Reading(), source="x"
+            )
+            assert found is not None
+            same(parse_program(found[0], machine), program, apart=1e-12)
         same(program, parse_program(written_out.replace("Y0.002", "Y2") + tail), apart=1e-12)
     inch = parse_program("G20 F10\nG1 X10000\nM30", machine)
     assert inch.end[0, 0] == pytest.approx(25.4)

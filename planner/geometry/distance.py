@@ -10,6 +10,8 @@ from planner.geometry.toolpath import Toolpath
 
 NEIGHBOURS = 3  # segments on both sides of a point's own that are looked at: between short blocks a motion is nearest to a later one
 _TURNS_MAX = 1000  # of a helix that are looked at
+_PLACES = 17  # on a curve, between which the nearest point is looked for
+_THIRDS = 45  # times that a third of the range between two of them is left out
 
 
 def distance_near(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatArray:
@@ -22,8 +24,14 @@ def distance_near(toolpath: Toolpath, point: FloatArray, segment: Array) -> Floa
     for step in range(-NEIGHBOURS, NEIGHBOURS + 1):
         other = segment + step
         at = np.flatnonzero((other >= 0) & (other < len(toolpath)))
-        straight = toolpath.arc[other[at]] < 0
-        for rows, distance in ((at[straight], _from_lines), (at[~straight], _from_arcs)):
+        segments = other[at]
+        kinds = (
+            (toolpath.straight[segments], _from_lines),
+            (toolpath.arc[segments] >= 0, _from_arcs),
+            (toolpath.curve[segments] >= 0, _from_curves),
+        )
+        for kind, distance in kinds:
+            rows = at[kind]
             if len(rows):
                 nearest[rows] = np.minimum(nearest[rows], distance(toolpath, point[rows], other[rows]))
     return nearest
@@ -52,3 +60,23 @@ def _from_arcs(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatAr
     for x in places:
         nearest = np.minimum(nearest, np.linalg.norm(out - arc_point(toolpath, segment, x), axis=1))
     return nearest
+
+
+def _from_curves(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatArray:
+    """(n,) distance of points (n, A) from curves (n,): from the nearest of some places, then between its neighbours by thirds."""
+    row, length = toolpath.curve[segment], toolpath.length[segment]
+
+    def off(share: FloatArray) -> FloatArray:
+        distance: FloatArray = np.linalg.norm(
+            toolpath.curves.at(row, length, share * length)[:, 0] - point, axis=1
+        )
+        return distance
+
+    shares = np.linspace(0.0, 1.0, _PLACES)
+    nearest = np.argmin([off(np.full(len(point), share)) for share in shares], axis=0)
+    low, high = shares[np.maximum(nearest - 1, 0)], shares[np.minimum(nearest + 1, _PLACES - 1)]
+    for _ in range(_THIRDS):
+        third = (high - low) / 3.0
+        left = off(low + third) < off(high - third)
+        low, high = np.where(left, low, low + third), np.where(left, high - third, high)
+    return off(0.5 * (low + high))

@@ -16,7 +16,7 @@ from planner.nc import codes
 from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
 from planner.nc.commands import MESSAGE, command, homed
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
-from planner.nc.settings import EVERYTHING, EXTRUDER_MODES, TEXTS, setting
+from planner.nc.settings import ALWAYS_READ, EVERYTHING, EXTRUDER_MODES, TEXTS, setting
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
@@ -78,8 +78,10 @@ class Block:
         return min(self.at[letter] for letter in letters if letter in self.at)
 
     def motion_word(self) -> int:
-        """Index of the word that makes the block move: its motion code, else its first coordinate."""
-        return self.at["motion"] if "motion" in self.at else self.first_of("XYZIJKR")
+        """Index of the word that makes the block move: its motion code, else its first coordinate, or its first word."""
+        if "motion" in self.at:
+            return self.at["motion"]
+        return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
 
 
 def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Block | None:
@@ -115,7 +117,9 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
                 return None
         elif letter in "GM":
             owned = ""
-            taken = _settle(words, word, (first, last), block, assumed)
+            taken = None
+            if value * 10.0 not in ALWAYS_READ[letter] or assumed.reading.ignore:
+                taken = _settle(words, word, (first, last), block, assumed)
             if taken is not None:
                 owned = taken
             else:

@@ -57,7 +57,7 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
     pecks = (clear - bottom) / words["Q"] if code in cycles.PECKING else 0.0
     if repeats * (_PER_HOLE + _PER_PECK * pecks) > STEPS_MAX:
         raise WordFault(word, f"{name} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}")
-    if series.level < clear:
+    if series.level < clear - _ROUNDING:
         _to(state, store, block.line, Step(Kind.RAPID, (here[a], here[b], clear)))
         here[normal] = clear
     for _ in range(repeats):

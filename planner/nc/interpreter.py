@@ -67,6 +67,7 @@ class Interpreter:
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
         self._cutter: Cutter | None = None
+        self._words: Words | None = None  # of the last chunk
         self._splines = SplineReader()
         self._begun = False
         self._read = 0  # rows of the last chunk
@@ -79,7 +80,17 @@ class Interpreter:
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
+        self._end_compensation()
         return self.store.finish(self.source, self.notes, frames, self.reading)
+
+    def _end_compensation(self) -> None:
+        """Settle the last move, if the program just ends while compensation is on."""
+        if self._cutter is None or self._words is None:
+            return
+        try:
+            self._cutter.fix()
+        except CutterFault as fault:
+            self._found.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -92,7 +103,7 @@ class Interpreter:
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
-        row, rows = 0, len(words.line)
+        row, rows, self._words = 0, len(words.line), words
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
@@ -415,7 +426,14 @@ class Interpreter:
         if not is_spline_line(block):
             return
         if self._cutter is not None:
-            raise WordFault(block.motion_word(), "a spline under cutter radius compensation; write G40 before it")
+            raise WordFault(
+                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
+            )
+        if state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
+            )
         state.series = None
         if state.in_thread:
             threads.stop(state, self.store, block.line)

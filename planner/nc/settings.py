@@ -73,6 +73,10 @@ MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printe
 # stored stroke and spindle speed checks, mirror image off, look-ahead of Haas and its smoothness, rotation off.
 _G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 690, 1030, 1130, 1870))
 
+# Codes of the groups that are settings beside some words.
+_SOMETIMES = frozenset((50, 51, 80, 100, 920))
+ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {730}}
+
 
 @dataclass(frozen=True, slots=True)
 class Setting:

@@ -38,6 +38,7 @@ def thread(state: State, store: Store, block: Block, note: Note) -> None:
     _cut(state, store, block.line, target, feed)
     if state.motion == _AND_BACK:
         stop(state, store, block.line)
+        state.in_thread = True
         _cut(state, store, block.line, start, feed * faster)
     _say(state, block, note)
 

@@ -2,8 +2,9 @@
 
 An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it. One is written where
 a block's feed is not the one in force, in those units, and where the source has one on the block's line its number is replaced. A block
-that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. F words
-on lines without a feed move (alone on a line, beside G0) stay, they are what the source says.
+that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. Lines
+under G93 and G95, and threads, have no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a
+line, beside G0) stay, they are what the source says.
 
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
 up to 0.1 % longer than asked.
@@ -57,10 +58,30 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
     unit = _unit_before(words)
     f_word = _f_words(words)
     programmed = _f_in_force(words, f_word, unit)[row]
+    own = _has_feed_of_f(program.feed[moving], programmed * unit[row], _per_minute(words)[row])
+    moving, row, programmed = moving[own], row[own], programmed[own]
     wanted = np.maximum(asked[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
-    return _spliced(source, _edits(words, f_word, unit, row, np.where(slower, wanted, np.nan), programmed))
+    # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them decides
+    rows, first, place = np.unique(row, return_index=True, return_inverse=True)
+    fastest = np.zeros(len(rows))
+    np.maximum.at(fastest, place, np.where(slower, wanted, np.inf))
+    fastest[np.isinf(fastest)] = np.nan
+    return _spliced(source, _edits(words, f_word, unit, rows, fastest, programmed[first]))
+
+
+def _has_feed_of_f(feed: FloatArray, f_word: FloatArray, per_minute: Array) -> Array:
+    """(n,) whether the feed of a move [mm/s] is that of its F word [mm per minute]: not under G93 and G95, and not in a thread."""
+    return per_minute & (np.abs(feed * SECONDS_PER_MINUTE - f_word) <= SAME_FEED * f_word)
+
+
+def _per_minute(words: Words) -> Array:
+    """(R,) whether F is a length per minute (G94) on each row."""
+    code = np.rint(words.value * 10.0)
+    switch = np.flatnonzero((words.letter == _G) & np.isin(code, (930.0, 940.0, 950.0)))
+    mode = np.append(True, code[switch] == 940.0)
+    return mode[np.searchsorted(_row_of_word(words)[switch], np.arange(len(words.line)), side="right")]
 
 
 def _edits(

@@ -205,7 +205,7 @@ def test_a_window_behind_motion_that_does_not_converge_ends_in_the_stop_before(m
     assert constraint_ratios(problem, solution)[0].max() <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize(("window", "slower"), [(150, 2e-4), (300, 1e-6)])
+@pytest.mark.parametrize(("window", "slower"), [(150, 4e-4), (300, 1e-5)])
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_short_windows_join_where_the_motion_has_room(seed, window, slower):
     """Joined wherever the end is not felt, seed 2 takes 1e-4 longer, and multipliers near a join may be a hundred times too large."""

@@ -1,7 +1,6 @@
 """Programs made by chance over LinuxCNC's language: parameters, expressions, O words, calls, questions about the state.
 
-Every program ends: loops count, recursion has a depth, and words are kept small by MOD. Some programs fail on the way (division by zero,
-an unknown name); whoever compares must then find the same moves before it.
+Every program ends: loops count, and words are kept small by MOD. With `risky`, programs may fail on the way (division by zero).
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ class Generator:
         self.label = 100
         self.names = ["#<a>", "#<depth>", "#<_shared>"]
         self.subs: list[tuple[str, int]] = []
-        self.loops: list[str] = []  # labels of while and do loops around
+        self.loops: list[tuple[str, str]] = []  # labels and kinds of the while and do loops around
         self.in_sub = False
         self.counters = 0
 
@@ -79,7 +78,7 @@ class Generator:
         inner = self.expression(depth + 1)
         if not self.risky:
             guard = {
-                "SQRT": f"ABS[{inner}]", "LN": f"1+ABS[{inner}]", "ASIN": f"SIN[{inner}]", "ACOS": f"COS[{inner}]",
+                "SQRT": f"ABS[{inner}]", "LN": f"1+ABS[{inner}]", "ASIN": f"[[{inner}] MOD 0.97]", "ACOS": f"[[{inner}] MOD 0.97]",
                 "EXP": f"[{inner}] MOD 5", "TAN": f"[[{inner}] MOD 80]",
             }  # fmt: skip
             inner = guard.get(name, inner)
@@ -217,33 +216,35 @@ class Generator:
     def loop(self, depth: int) -> list[str]:
         label, kind = self.o(), self.rng.integers(3)
         if kind == 0:
-            inside = self.inside(label, depth, named=False)
+            inside = self.inside(label, depth, "repeat")
             return [f"o{label} repeat [{self.rng.integers(0, 4)}]", *inside, f"o{label} endrepeat"]
         self.counters += 1
         counter = f"#<n{self.counters}>"
         step = f"{counter}=[{counter}+1]"
         condition = f"[{counter} LT {self.rng.integers(1, 5)}]"
         if kind == 1:
-            inside = self.inside(label, depth, named=True)
+            inside = self.inside(label, depth, "while")
             return [f"{counter}=0", f"o{label} while {condition}", step, *inside, f"o{label} endwhile"]
-        inside = self.inside(label, depth, named=True)
+        inside = self.inside(label, depth, "do")
         return [f"{counter}=0", f"o{label} do", step, *inside, f"o{label} while {condition}"]
 
-    def inside(self, label: str, depth: int, *, named: bool) -> list[str]:
-        if not named:
+    def inside(self, label: str, depth: int, kind: str) -> list[str]:
+        if kind == "repeat":  # LinuxCNC has no break and continue in it
             kept, self.loops = self.loops, []
             body = self.body(depth + 1, 4)
             self.loops = kept
             return body
-        self.loops.append(label)
+        self.loops.append((label, kind))
         body = self.body(depth + 1, 4)
         self.loops.pop()
         return body
 
     def leave(self) -> list[str]:
         label = self.o()
-        inner = self.loops[-1]
-        what = self.pick(("break", "continue"))
+        inner, kind = self.loops[-1]
+        # LinuxCNC 2.9 does not count the turns of a repeat around a do loop that was continued, and ends a do loop too early that
+        # comes after a while loop with a break
+        what = "break" if kind == "do" else "continue"
         return [f"o{label} if [{self.expression()}]", f"o{inner} {what}", f"o{label} endif"]
 
     def call(self) -> list[str]:

@@ -5,14 +5,11 @@ eliminating their Newton steps
 
     ds = -r -+ dg,      dlam = (mu h - second-order terms)/s - lam (1 + ds/s)
 
-adds lam/s times the row's square to the Hessian. One pass is a loop over the blocks, over groups of rows and over the block's
-intervals, of which the innermost is done several at a time (layout.py). Rows go in threes, and the last two or four in twos, so that
-the sums over rows of an interval stay in registers within a group.
+adds lam/s times the row's square to the Hessian. One pass is a loop over the blocks, over the rows and over the block's intervals, of
+which the innermost is done several at a time (layout.py).
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
@@ -46,64 +43,32 @@ from planner.feedrate.jerk.riccati import forward
 from planner.feedrate.jerk.rows import linearise
 
 
-def _weigher(group: int) -> Callable[..., None]:
-    """`_weigh` for so many rows, with which `rows` begin."""
-
-    @njit(error_model="numpy", fastmath=LANE_MATH)
-    def weigh(w, rows, worst, m):
-        for i in range(m):
-            xx, xu, xp = w[CONVEX + i], w[CONVEX + LANES + i], w[CONVEX + 2 * LANES + i]
-            uu, up, pp = w[CONVEX + 3 * LANES + i], w[CONVEX + 4 * LANES + i], w[CONVEX + 5 * LANES + i]
-            x, u, p = w[GRADIENT + i], w[GRADIENT + LANES + i], w[GRADIENT + 2 * LANES + i]
-            most = worst[i]
-            for r in range(group):
-                k = r * ROW + i
-                s, y, s_low, y_low = (
-                    rows[SLACK_UP + k],
-                    rows[LAM_UP + k],
-                    rows[SLACK_LOW + k],
-                    rows[LAM_LOW + k],
-                )
-                gap, gap_low = s * y, s_low * y_low
-                per_both = 1.0 / (gap * gap_low)
-                per_gap, per_gap_low = per_both * gap_low, per_both * gap
-                rows[PER_GAP_UP + k], rows[PER_GAP_LOW + k] = per_gap, per_gap_low
-                residual, residual_low = rows[VALUE + k] + s - 1.0, s_low - rows[VALUE + k] - 1.0
-                most = max(most, max(abs(residual), abs(residual_low)))
-                weight, weight_low = y * y * per_gap, y_low * y_low * per_gap_low
-                push = weight * residual - weight_low * residual_low
-                weight += weight_low
-                a, b, c = rows[BY_X + k], rows[BY_U + k], rows[BY_P + k]
-                wa, wb = weight * a, weight * b
-                xx, xu, xp = xx + wa * a, xu + wa * b, xp + wa * c
-                uu, up, pp = uu + wb * b, up + wb * c, pp + weight * c * c
-                x, u, p = x + push * a, u + push * b, p + push * c
-            worst[i] = most
-            w[CONVEX + i], w[CONVEX + LANES + i], w[CONVEX + 2 * LANES + i] = xx, xu, xp
-            w[CONVEX + 3 * LANES + i], w[CONVEX + 4 * LANES + i], w[CONVEX + 5 * LANES + i] = uu, up, pp
-            w[GRADIENT + i], w[GRADIENT + LANES + i], w[GRADIENT + 2 * LANES + i] = x, u, p
-
-    return weigh
-
-
-_weigh_three, _weigh_two = _weigher(3), _weigher(2)
-
-
-@njit(error_model="numpy")
-def threes(count):
-    """How many of so many rows, at least two, go in threes; the others go in twos."""
-    return count - 2 * (-count % 3)
-
-
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _weigh(w, rows, count, worst, m):
     """Add the rows' weights to the convex Hessian and the gradient of a block, without a barrier, and keep what later passes need of
     slacks and multipliers; `worst` (LANES,) grows to the rows' residuals."""
-    first = threes(count)
-    for r in range(0, first, 3):
-        _weigh_three(w, rows[r * ROW :], worst, m)
-    for r in range(first, count, 2):
-        _weigh_two(w, rows[r * ROW :], worst, m)
+    for r in range(count):
+        row = rows[r * ROW :]
+        for i in range(m):
+            s, y, s_low, y_low = row[SLACK_UP + i], row[LAM_UP + i], row[SLACK_LOW + i], row[LAM_LOW + i]
+            per_gap, per_gap_low = 1.0 / (s * y), 1.0 / (s_low * y_low)
+            row[PER_GAP_UP + i], row[PER_GAP_LOW + i] = per_gap, per_gap_low
+            residual, residual_low = row[VALUE + i] + s - 1.0, s_low - row[VALUE + i] - 1.0
+            worst[i] = max(worst[i], max(abs(residual), abs(residual_low)))
+            weight, weight_low = y * y * per_gap, y_low * y_low * per_gap_low
+            push = weight * residual - weight_low * residual_low
+            weight += weight_low
+            a, b, c = row[BY_X + i], row[BY_U + i], row[BY_P + i]
+            wa, wb = weight * a, weight * b
+            w[CONVEX + i] += wa * a
+            w[CONVEX + LANES + i] += wa * b
+            w[CONVEX + 2 * LANES + i] += wa * c
+            w[CONVEX + 3 * LANES + i] += wb * b
+            w[CONVEX + 4 * LANES + i] += wb * c
+            w[CONVEX + 5 * LANES + i] += weight * c * c
+            w[GRADIENT + i] += push * a
+            w[GRADIENT + LANES + i] += push * b
+            w[GRADIENT + 2 * LANES + i] += push * c
 
 
 # What `predicted` finds of all rows of an interval: smallest and largest share, and the sums of s lam, of it times the share, and times
@@ -111,63 +76,36 @@ def _weigh(w, rows, count, worst, m):
 LEAST, MOST, PLAIN, ONCE, TWICE = range(0, 5 * LANES, LANES)
 
 
-def _predictor(group: int) -> Callable[..., None]:
-    """`_predict` for so many rows, with which `rows` begin."""
-
-    @njit(error_model="numpy", fastmath=LANE_MATH)
-    def predict(w, rows, seen, m):
-        for i in range(m):
-            dx, du, dp, h = w[STEP + i], w[STEP + LANES + i], w[STEP + 2 * LANES + i], w[H + i]
-            least, most = seen[LEAST + i], seen[MOST + i]
-            plain, once, twice = seen[PLAIN + i], seen[ONCE + i], seen[TWICE + i]
-            push_x, push_u = w[BY_BARRIER + i], w[BY_BARRIER + LANES + i]
-            push_p = w[BY_BARRIER + 2 * LANES + i]
-            bent_x, bent_u, bent_p = w[BY_BENT + i], w[BY_BENT + LANES + i], w[BY_BENT + 2 * LANES + i]
-            for r in range(group):
-                k = r * ROW + i
-                s, y, s_low, y_low = (
-                    rows[SLACK_UP + k],
-                    rows[LAM_UP + k],
-                    rows[SLACK_LOW + k],
-                    rows[LAM_LOW + k],
-                )
-                a, b, c = rows[BY_X + k], rows[BY_U + k], rows[BY_P + k]
-                after = rows[VALUE + k] + a * dx + b * du + c * dp
-                per_s, per_s_low = y * rows[PER_GAP_UP + k], y_low * rows[PER_GAP_LOW + k]
-                share, share_low = (1.0 - after - s) * per_s, (1.0 + after - s_low) * per_s_low
-                rows[MOVE_UP + k], rows[MOVE_LOW + k] = share, share_low
-                least, most = min(least, min(share, share_low)), max(most, max(share, share_low))
-                gap, gap_low = s * y, s_low * y_low
-                moved, moved_low = gap * share, gap_low * share_low
-                plain += gap + gap_low
-                once += moved + moved_low
-                twice += moved * share + moved_low * share_low
-                push = h * (per_s - per_s_low)
-                bent = y * share * (1.0 + share) - y_low * share_low * (1.0 + share_low)
-                push_x, push_u, push_p = push_x + push * a, push_u + push * b, push_p + push * c
-                bent_x, bent_u, bent_p = bent_x + bent * a, bent_u + bent * b, bent_p + bent * c
-            seen[LEAST + i], seen[MOST + i] = least, most
-            seen[PLAIN + i], seen[ONCE + i], seen[TWICE + i] = plain, once, twice
-            w[BY_BARRIER + i], w[BY_BARRIER + LANES + i] = push_x, push_u
-            w[BY_BARRIER + 2 * LANES + i] = push_p
-            w[BY_BENT + i], w[BY_BENT + LANES + i], w[BY_BENT + 2 * LANES + i] = bent_x, bent_u, bent_p
-
-    return predict
-
-
-_predict_three, _predict_two = _predictor(3), _predictor(2)
-
-
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _predict(w, rows, count, seen, m):
     """Newton's steps of the slacks of a block without a barrier, as shares of them, into MOVE; those of the multipliers are -(1 +
     share) of them. Also what a barrier and the steps' second-order terms dslack dlam add to the gradient."""
     w[BY_BARRIER : BY_BARRIER + 6 * LANES] = 0.0
-    first = threes(count)
-    for r in range(0, first, 3):
-        _predict_three(w, rows[r * ROW :], seen, m)
-    for r in range(first, count, 2):
-        _predict_two(w, rows[r * ROW :], seen, m)
+    for r in range(count):
+        row = rows[r * ROW :]
+        for i in range(m):
+            s, y, s_low, y_low = row[SLACK_UP + i], row[LAM_UP + i], row[SLACK_LOW + i], row[LAM_LOW + i]
+            a, b, c = row[BY_X + i], row[BY_U + i], row[BY_P + i]
+            after = row[VALUE + i] + a * w[STEP + i] + b * w[STEP + LANES + i] + c * w[STEP + 2 * LANES + i]
+            per_s, per_s_low = y * row[PER_GAP_UP + i], y_low * row[PER_GAP_LOW + i]
+            share, share_low = (1.0 - after - s) * per_s, (1.0 + after - s_low) * per_s_low
+            row[MOVE_UP + i], row[MOVE_LOW + i] = share, share_low
+            seen[LEAST + i] = min(seen[LEAST + i], min(share, share_low))
+            seen[MOST + i] = max(seen[MOST + i], max(share, share_low))
+            gap, gap_low = s * y, s_low * y_low
+            seen[PLAIN + i] += gap + gap_low
+            seen[ONCE + i] += gap * share + gap_low * share_low
+            seen[TWICE + i] += gap * share * share + gap_low * share_low * share_low
+            push, bent = (
+                w[H + i] * (per_s - per_s_low),
+                y * share * (1.0 + share) - y_low * share_low * (1.0 + share_low),
+            )
+            w[BY_BARRIER + i] += push * a
+            w[BY_BARRIER + LANES + i] += push * b
+            w[BY_BARRIER + 2 * LANES + i] += push * c
+            w[BY_BENT + i] += bent * a
+            w[BY_BENT + LANES + i] += bent * b
+            w[BY_BENT + 2 * LANES + i] += bent * c
 
 
 @njit(cache=True, error_model="numpy")
@@ -199,56 +137,34 @@ def correct(blocks, barrier):
             w[GRADIENT + i] += mu * w[BY_BARRIER + i] + second_order * w[BY_BENT + i]
 
 
-def _director(group: int) -> Callable[..., None]:
-    """`_direct` for so many rows, with which `rows` begin."""
-
-    @njit(error_model="numpy", fastmath=LANE_MATH)
-    def direct(w, rows, mu, second_order, nearest, m):
-        for i in range(m):
-            dx, du, dp = w[STEP + i], w[STEP + LANES + i], w[STEP + 2 * LANES + i]
-            asked, slack, lam = mu * w[H + i], nearest[i], nearest[LANES + i]
-            for r in range(group):
-                k = r * ROW + i
-                after = rows[VALUE + k] + rows[BY_X + k] * dx + rows[BY_U + k] * du + rows[BY_P + k] * dp
-                s, y, per_gap, share = (
-                    rows[SLACK_UP + k],
-                    rows[LAM_UP + k],
-                    rows[PER_GAP_UP + k],
-                    rows[MOVE_UP + k],
-                )
-                move = 1.0 - after - s
-                part = move * y * per_gap
-                dual = (asked + second_order * s * y * share * (1.0 + share)) * per_gap - 1.0 - part
-                rows[MOVE_UP + k], rows[PER_GAP_UP + k] = move, y * dual
-                s, y, per_gap, share = (
-                    rows[SLACK_LOW + k],
-                    rows[LAM_LOW + k],
-                    rows[PER_GAP_LOW + k],
-                    rows[MOVE_LOW + k],
-                )
-                move = 1.0 + after - s
-                part_low = move * y * per_gap
-                dual_low = (asked + second_order * s * y * share * (1.0 + share)) * per_gap - 1.0 - part_low
-                rows[MOVE_LOW + k], rows[PER_GAP_LOW + k] = move, y * dual_low
-                slack, lam = min(slack, min(part, part_low)), min(lam, min(dual, dual_low))
-            nearest[i], nearest[LANES + i] = slack, lam
-
-    return direct
-
-
-_direct_three, _direct_two = _director(3), _director(2)
-
-
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _direct(w, rows, count, barrier, nearest, m):
     """Newton's steps of the slacks of a block, into MOVE, and of the multipliers, into PER_GAP; `nearest` (2 LANES,) falls to their
     shares of slack and multiplier."""
     mu, second_order = barrier
-    first = threes(count)
-    for r in range(0, first, 3):
-        _direct_three(w, rows[r * ROW :], mu, second_order, nearest, m)
-    for r in range(first, count, 2):
-        _direct_two(w, rows[r * ROW :], mu, second_order, nearest, m)
+    for r in range(count):
+        row = rows[r * ROW :]
+        for i in range(m):
+            s, y, per_gap, share = row[SLACK_UP + i], row[LAM_UP + i], row[PER_GAP_UP + i], row[MOVE_UP + i]
+            after = row[VALUE + i] + row[BY_X + i] * w[STEP + i]
+            after += row[BY_U + i] * w[STEP + LANES + i] + row[BY_P + i] * w[STEP + 2 * LANES + i]
+            asked = mu * w[H + i]
+            move = 1.0 - after - s
+            relative = move * y * per_gap
+            dual = (asked + second_order * s * y * share * (1.0 + share)) * per_gap - 1.0 - relative
+            row[MOVE_UP + i], row[PER_GAP_UP + i] = move, y * dual
+            s, y, per_gap, share = (
+                row[SLACK_LOW + i],
+                row[LAM_LOW + i],
+                row[PER_GAP_LOW + i],
+                row[MOVE_LOW + i],
+            )
+            move = 1.0 + after - s
+            relative_low = move * y * per_gap
+            dual_low = (asked + second_order * s * y * share * (1.0 + share)) * per_gap - 1.0 - relative_low
+            row[MOVE_LOW + i], row[PER_GAP_LOW + i] = move, y * dual_low
+            nearest[i] = min(nearest[i], min(relative, relative_low))
+            nearest[LANES + i] = min(nearest[LANES + i], min(dual, dual_low))
 
 
 @njit(cache=True, error_model="numpy")

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from planner.nc.language.asked import LinuxcncAsked
@@ -86,7 +87,7 @@ def nearest(x: float) -> float:
     return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
 
 
-DEGREES = {
+DEGREES: dict[str, Callable[..., object]] = {
     "sin": lambda x: math.sin(math.radians(x)),
     "cos": lambda x: math.cos(math.radians(x)),
     "tan": lambda x: math.tan(math.radians(x)),
@@ -186,7 +187,7 @@ class Parser:
                 self.faults.append(ProgramFault(place, fault.message))
             except ProgramFault as fault:
                 self.faults.append(fault)
-        for left in self.open[:1]:
+        for left in self.open[:1] if not self.faults else ():
             self.faults.append(
                 ProgramFault(
                     left.place, f"this {left.kind} has no end; write o{left.label} {_end_of(left.kind)}"

@@ -22,7 +22,7 @@ from planner.nc.language.tree import Language, Place, ProgramFault
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
-TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: more than a minute of computing
+TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: some ten seconds of computing
 ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
 DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
 ROWS_AT_ONCE = 100_000  # rows that are executed together

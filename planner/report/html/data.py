@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SAMPLES_MAX = 200_000
 PROGRAMMED_MAX = 60_000  # points of the programmed path that are shown
-ARC_POINTS = 24  # of every arc that are shown
+ARC_POINTS = 24  # of every arc and curve that are shown
 NO_LIMIT = "none"
 
 
@@ -156,19 +156,24 @@ def _longest(at: Array, samples: Samples, rows: int) -> Array:
 
 
 def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArray:
-    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc; every so many where they are more than
-    `most`."""
+    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc and curve; every so many where they are
+    more than `most`."""
     linear = [k for k, axis in enumerate(toolpath.axes) if axis in LINEAR_AXES]
     if not len(toolpath):
         return np.zeros((0, 3))
-    count = np.where(toolpath.arc >= 0, ARC_POINTS, 1)
+    count = np.where(toolpath.straight, 1, ARC_POINTS)
     segment = np.repeat(np.arange(len(toolpath)), count)
     number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 1
     points = toolpath.end[segment].copy()
     inner = np.flatnonzero(number < count[segment])
     at = segment[inner]
     along = toolpath.length[at] * number[inner] / count[at]
-    points[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(toolpath, at, along)
+    bent = toolpath.arc[at] >= 0
+    arcs, curves = at[bent], at[~bent]
+    points[inner[bent]] = toolpath.arcs.center[toolpath.arc[arcs]] + arc_point(toolpath, arcs, along[bent])
+    points[inner[~bent]] = toolpath.curves.at(toolpath.curve[curves], toolpath.length[curves], along[~bent])[
+        :, 0
+    ]
     points = np.vstack([toolpath.start[:1], points])[:, linear]
     points = points[:: max(1, -(-len(points) // most))]
     return np.pad(points, ((0, 0), (0, 3 - len(linear))))

@@ -122,6 +122,22 @@ def test_distances_from_lines_arcs_and_helices() -> None:
     assert (found <= expected * np.sqrt(1.0 + (toolpath.arcs.drift[0, 2]) ** 2) + 1e-3).all()
 
 
+def test_distances_from_curves() -> None:
+    toolpath = toolpath_from_program(
+        parse_program("G21 F99\nG1 X10\nG5 I5 J5 P-5 Q8 X40 Y10", MILL), MILL, None
+    )
+    segment = np.flatnonzero(toolpath.curve >= 0)
+    assert len(segment)
+    rng = np.random.default_rng(2)
+    shares = rng.random(len(segment))
+    on = toolpath.curves.at(
+        toolpath.curve[segment], toolpath.length[segment], shares * toolpath.length[segment]
+    )[:, 0]
+    assert distance_near(toolpath, on, segment).max() < 1e-6
+    off = on + np.array([0.0, 0.0, 0.3])
+    np.testing.assert_allclose(distance_near(toolpath, off, segment), 0.3, atol=1e-9)
+
+
 def test_programmed_path_goes_through_the_vertices(plan: Plan) -> None:
     points = programmed_path(plan.toolpath)
     for vertex in plan.toolpath.end:

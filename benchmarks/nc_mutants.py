@@ -118,6 +118,14 @@ def load_programs(folder: Path) -> list[list[bytes]]:
     return [f.read_bytes().splitlines()[:3000] for f in files]
 
 
+class _Hung(BaseException):
+    """A program took longer than `SECONDS`."""
+
+
+def _hung(*_: object) -> None:
+    raise _Hung
+
+
 def main() -> None:
     """Read all mutants and print what came of them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -127,21 +135,24 @@ def main() -> None:
     options = parser.parse_args()
     programs = load_programs(options.folder)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    signal.signal(signal.SIGALRM, _hung)
     found: Counter[str] = Counter()
     bad = []
     for seed in range(options.seed, options.seed + options.count):
-        signal.alarm(SECONDS)  # a hang ends the process; the seed is the last one printed
+        signal.alarm(SECONDS)
         try:
             found[outcome(mutant(seed, programs), a_reading(seed))] += 1
-        except Exception:
-            found["crashed"] += 1
+        except (Exception, _Hung) as fault:
+            found["hung" if isinstance(fault, _Hung) else "crashed"] += 1
             bad.append(seed)
             traceback.print_exc()
+        signal.alarm(0)
         if seed % 1000 == 0:
             print(f"{seed}: {dict(found)}", flush=True)
-    signal.alarm(0)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(f"{options.count:,} programs: {dict(found)}; peak memory {peak:.2f} GB; crashed: {bad[:20]}")
+    print(
+        f"{options.count:,} programs: {dict(found)}; peak memory {peak:.2f} GB; crashed or hung: {bad[:20]}"
+    )
     sys.exit(1 if bad else 0)
 
 

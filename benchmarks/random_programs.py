@@ -9,6 +9,7 @@ module gcode (Debian package linuxcnc-uspace) and ../shared/peers. Writes result
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 import tempfile
 from pathlib import Path
@@ -22,7 +23,7 @@ AT_ONCE = 500  # programs that one run of the oracle reads
 def main() -> None:
     """Read the programs and write what became of them."""
     sys.path.insert(0, str(TESTS))
-    import test_random_agreement as agreement
+    agreement = importlib.import_module("test_random_agreement")
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=1000, help="programs of each kind")

@@ -74,7 +74,12 @@ def halves(pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def evenly_weighted(pieces: FloatArray) -> FloatArray:
-    """(K, 4, A+1) the same curves with 1 for the outer two weights: another parameter, u / (u + (1-u) c), and a common factor."""
+    """The same curves with 1 for the outer two weights: another parameter, u / (u + (1-u) c), and a common factor.
+
+    pieces : (K, 4, A+1)
+
+    Returns (K, 4, A+1).
+    """
     first, last = pieces[:, 0, -1], pieces[:, 3, -1]
     factor = np.cbrt(first / last)[:, None] ** np.arange(4) / first[:, None]
     return np.asarray(pieces * factor[..., None])

@@ -78,8 +78,10 @@ class Block:
         return min(self.at[letter] for letter in letters if letter in self.at)
 
     def motion_word(self) -> int:
-        """Index of the word that makes the block move: its motion code, else its first coordinate."""
-        return self.at["motion"] if "motion" in self.at else self.first_of("XYZIJKR")
+        """Index of the word that makes the block move: its motion code, else its first coordinate, or its first word."""
+        if "motion" in self.at:
+            return self.at["motion"]
+        return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
 
 
 def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Block | None:

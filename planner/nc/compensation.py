@@ -28,7 +28,8 @@ def check_words(state: State, block: Block) -> None:
             raise WordFault(block.at[group], _refusal(f"G{codes.number(code)}"))
     one_shot = block.g.get("one-shot")
     sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
-    if one_shot in _REFUSED_ONE_SHOTS or (sets_system and _system_in_force(state, block)):
+    refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and _system_in_force(state, block))
+    if one_shot is not None and refused:
         raise WordFault(block.at["one-shot"], _refusal(f"G{codes.number(one_shot)}"))
     if block.homing:
         raise WordFault(min(block.at.values(), default=0), _refusal("homing"))

@@ -1,20 +1,20 @@
 """Cutter radius compensation, G41 (left of the path) and G42 (right of it): from programmed moves to the tool's.
 
-In the plane of the moves, with the tool's radius r and the side s = +1 (left) or -1 (right), a programmed move is followed at the distance
-r: where its tangent is t, the tool's centre is at p + s r n(t), n(t) = t turned left by a quarter. So a line is offset by r to a parallel,
-and an arc about its centre, its radius less r where it turns towards the tool's side and more r elsewhere. Where two moves meet and the
-second turns by beta towards the tool's side (inner corner), away from it (outer corner), or by less than `STRAIGHT_ON`:
+In the plane of the moves, with the tool's radius r and the side s = +1 (left) or -1 (right), a programmed move is followed at the
+distance r: where its tangent is t, the tool's centre is at p + s r n(t), n(t) = t turned left by a quarter. So a line is offset to a
+parallel, and an arc about its centre, its radius less r where it turns towards the tool's side and more r elsewhere. Where two moves
+meet, the second turns by an angle away from the tool's side (outer corner), towards it (inner corner), or by less than `STRAIGHT_ON`:
 
     outer corner    an arc of radius r about the programmed corner joins the two offset ends; before a rapid a straight move does
     inner corner    both offset moves end at their intersection: the one that crosses in the sense in which the programmed moves turn
     straight on     the second begins where the first ends
 
-An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to `STRAIGHT_ON`, is an outer
-corner between lines, and an inner one beside an arc.
+An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to `STRAIGHT_ON`, is an outer corner
+between lines, and an inner one beside an arc.
 
 The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one that ends there with the
-programmed tangent). The move after G40 leads straight from there to the programmed end. Moves along the normal alone keep the place in the
-plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does.
+programmed tangent). The move after G40 leads straight from there to the programmed end. Moves along the normal alone keep the place in
+the plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does.
 
 Lengths are machine coordinates in mm. Points and vectors in the plane are complex numbers: n(t) = i t.
 """
@@ -36,7 +36,10 @@ STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
 _ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
 NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of coordinates around 1e3 mm
 
-_GOUGE = "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a smaller tool"
+_GOUGE = (
+    "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a "
+    "smaller tool"
+)
 
 
 class CutterFault(ValueError):
@@ -69,7 +72,8 @@ class Side:
 class _Open:
     """The last move, whose end the next corner may move.
 
-    row   : its block, or, once it is fixed, that of the first move along the normal after it, or -1;  arc : its row among the arcs, or -1
+    row   : its block, or, once it is fixed, that of the first move along the normal after it, or -1
+    arc   : its row among the arcs, or -1
     begin : where the tool begins it
     sweep : of an arc, as it is now
     fixed : its end is not moved any more

@@ -426,7 +426,14 @@ class Interpreter:
         if not is_spline_line(block):
             return
         if self._cutter is not None:
-            raise WordFault(block.motion_word(), "a spline under cutter radius compensation; write G40 before it")
+            raise WordFault(
+                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
+            )
+        if state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
+            )
         state.series = None
         if state.in_thread:
             threads.stop(state, self.store, block.line)

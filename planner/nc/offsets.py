@@ -123,17 +123,14 @@ def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:
             note(
                 f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge", block.line
             )
-    if kind == 1:
-        offset = _given(state, block, tool.offset)
-    else:
-        offset = _offset_from_place(state, block, tool, kind)
+    offset = _given(state, block, tool.offset) if kind == 1 else _offset_from_place(state, block, tool, kind)
     diameter = 2.0 * block.value["R"] * state.unit if "R" in block.value else tool.diameter
     state.tools[number] = Tool(offset, diameter)
 
 
 def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:
-    """(3,) the tool's offset with which the place has the block's coordinates: in the system in force (L10), or in G59.3 without G92 (L11)
-    [mm]."""
+    """(3,) the tool's offset [mm] with which the place has the block's coordinates: in the system in force (L10), or in G59.3 without
+    G92 (L11)."""
     system = state.work_system(_FIXTURE if kind == 11 else 0)
     place = system.turn(state.position - system.origin, -1.0)
     if kind == 10:

@@ -62,8 +62,8 @@ class Cut:
 
 def depths(thread: Thread) -> Iterator[float]:
     """Depths of the passes, spring passes included."""
-    depth, number = thread.first, 1
-    while depth < thread.depth:
+    depth, number, peak = thread.first, 1, abs(thread.peak)
+    while peak + depth < peak + thread.depth:  # rounded as LinuxCNC rounds, which counts from the drive line
         yield depth
         number += 1
         depth = thread.first * number ** (1.0 / thread.degression)
@@ -74,7 +74,7 @@ def depths(thread: Thread) -> Iterator[float]:
 def passes(thread: Thread) -> Iterator[Cut]:
     """The moves of the thread, all passes."""
     inwards = math.copysign(1.0, thread.peak)
-    ahead = math.copysign(1.0, thread.end - thread.start[1])
+    ahead = 1.0 if thread.end > thread.start[1] else -1.0
     slope = math.tan(math.radians(thread.angle))
     tapered = thread.tapered if thread.taper > 0 else 0
     aslant = thread.pitch * math.hypot(thread.depth, thread.taper) / thread.taper if tapered else 0.0
@@ -98,7 +98,7 @@ def passes(thread: Thread) -> Iterator[Cut]:
 
 
 def read_thread(state: State, block: Block, end: float) -> Thread:
-    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that are missing or impossible."""
+    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that are missing or wrong."""
     word, value = block.motion_word(), block.value
     for letter, what in _NEEDED.items():
         if letter not in value:

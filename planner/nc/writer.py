@@ -3,7 +3,8 @@
 An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it. One is written where
 a block's feed is not the one in force, in those units, and where the source has one on the block's line its number is replaced. A block
 that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. Lines
-under G93 and G95, and threads, have no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a line, beside G0) stay, they are what the source says.
+under G93 and G95, and threads, have no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a
+line, beside G0) stay, they are what the source says.
 
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
 up to 0.1 % longer than asked.

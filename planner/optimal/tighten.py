@@ -42,8 +42,8 @@ EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
 # Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places
-# of its own, and finds up to 2.4e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
-SEEN_BEFORE = 1.0 + 1e-5
+# of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
+SEEN_BEFORE = 1.0 + 2e-5
 ORDER = {limit.name: limit.order for limit in LIMITS}
 
 

@@ -23,7 +23,11 @@ SETTLED = 1e-13  # a step of Newton's method below this fraction of the piece is
 
 
 def curve_points(points: FloatArray, weight: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points and u-derivatives (n, A) of rational cubics with control points (n, 4, A) and inner weights (n, 2) at u (n,)."""
+    """Points and u-derivatives (n, A) of rational cubics at u (n,).
+
+    points : (n, 4, A) control points
+    weight : (n, 2) of the inner two
+    """
     v = 1.0 - u
     ones = np.ones(len(u))
     w = np.stack([ones, weight[:, 0], weight[:, 1], ones], axis=1)
@@ -36,8 +40,11 @@ def curve_points(points: FloatArray, weight: FloatArray, u: FloatArray) -> tuple
 
 
 def curve_counts(points: FloatArray, weight: FloatArray, angle: float) -> Array:
-    """(K,) into how many pieces of even steps each curve is cut, so that they turn by `CURVE_TURN` of `angle` [rad] on
-    the mean."""
+    """(K,) into how many pieces of even steps each curve is cut, so that they turn by `CURVE_TURN` of `angle` on the mean.
+
+    points, weight : (K, 4, A), (K, 2) of the curves as of `curve_points`
+    angle          : [rad]
+    """
     curves = len(points)
     row, u = np.repeat(np.arange(curves), PLACES), np.tile(np.linspace(0.0, 1.0, PLACES), curves)
     rate = curve_points(points[row], weight[row], u)[1]

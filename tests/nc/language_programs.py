@@ -78,7 +78,7 @@ class Generator:
         inner = self.expression(depth + 1)
         if not self.risky:
             guard = {
-                "SQRT": f"ABS[{inner}]", "LN": f"1+ABS[{inner}]", "ASIN": f"SIN[{inner}]", "ACOS": f"COS[{inner}]",
+                "SQRT": f"ABS[{inner}]", "LN": f"1+ABS[{inner}]", "ASIN": f"[[{inner}] MOD 0.97]", "ACOS": f"[[{inner}] MOD 0.97]",
                 "EXP": f"[{inner}] MOD 5", "TAN": f"[[{inner}] MOD 80]",
             }  # fmt: skip
             inner = guard.get(name, inner)

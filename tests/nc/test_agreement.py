@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from random_splines import random_splines, with_splines_whole
 
 from planner.base.arrays import Array
 from planner.base.errors import InputError
@@ -88,14 +89,15 @@ def assert_same_motion(
     for k in np.flatnonzero(move[:, 0] == 3):
         move[k, 2:5] = move[k - 1, 2:5] if k else 0.0
     move = move[moving(move[:, 0], move[:, 2:5], (move[:, 0] == 2) | ((move[:, 0] == 3) & (move[:, 5] > 0)))]
-    keep = moving(program.kind, program.end, np.isin(program.kind, (Kind.ARC, Kind.DWELL)))
+    keep = moving(program.kind, program.end, np.isin(program.kind, (Kind.ARC, Kind.DWELL, Kind.SPLINE)))
+    move = with_splines_whole(program, np.flatnonzero(keep), move)
     kind, line, end = program.kind[keep], program.line[keep], program.end[keep]
 
     np.testing.assert_array_equal(kind, move[:, 0])
     still = kind == Kind.DWELL  # LinuxCNC issues those of compensated moves with the next move
     np.testing.assert_array_equal(line[~still], move[~still, 1])
     np.testing.assert_allclose(end, move[:, 2:5], rtol=1e-12, atol=NOWHERE)
-    feed_moves = np.isin(kind, (Kind.LINE, Kind.ARC)) & feeds
+    feed_moves = np.isin(kind, (Kind.LINE, Kind.ARC, Kind.SPLINE)) & feeds
     np.testing.assert_allclose(program.feed[keep][feed_moves] * 60, move[feed_moves, 5], rtol=1e-12)
     np.testing.assert_allclose(
         program.dwell[keep][kind == Kind.DWELL], move[kind == Kind.DWELL, 5], rtol=1e-12
@@ -248,6 +250,22 @@ def random_program(rng: np.random.Generator) -> str:
 
 @pytest.mark.slow
 @needs_oracle
+def test_random_splines_agree(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    texts = [random_splines(rng) for _ in range(60)]
+    for k, text in enumerate(texts):
+        (tmp_path / f"{k}.ngc").write_text(text)
+    jobs = [{"path": str(tmp_path / f"{k}.ngc")} for k in range(len(texts))]
+    for text, canon in zip(texts, ask_oracle(jobs, tmp_path), strict=True):
+        assert not canon.error, f"{canon.error}\n{text}"
+        try:
+            assert_same_motion(parse_program(text), canon)
+        except (AssertionError, InputError) as fault:
+            raise AssertionError(f"{text}\n{fault}") from fault
+
+
+@pytest.mark.slow
+@needs_oracle
 def test_random_programs_agree(tmp_path: Path) -> None:
     rng = np.random.default_rng(2024)
     texts = [random_program(rng) for _ in range(400)]
@@ -279,6 +297,11 @@ VERDICTS = {
     "g01x1f10": True, "G00.0 X1": True, "G0.00001 X1": True, "G1.1 X1": False, "G0 X1 (a(b)": False,
     "G0 X1 (a": False, "G0 (a) X1 (b) Y2 ; c": True, "G0 X1 )": False, "; (h\nG0 X1": True, "%1\nG0 X1": False,
     "G0 N1 X1": False, "N1 N2 G0 X1": False, "G0 /X1": False, "N1 /G0 X1": False, "G61 G64": False, "G15": False,
+    "F1 G5 X4 I1 J1 P0 Q1": True, "F1 G5 X4 I1 J1 P0": False, "F1 G5 X4 I1 P0 Q1": False, "F1 G5 I1 J1 P0 Q1": False,
+    "F1 G5 X4 Z1 I1 J1 P0 Q1": False, "F1 G18 G5 X4 I1 J1 P0 Q1": False, "F1 G5.1 X4 I1 J1": True, "F1 G5.1 X4": False,
+    "F1 G5.1 X4 I1": False, "G5 X4 I1 J1 P0 Q1": False, "G5.3": False,
+    "F1 G5.2 X1 Y1 P1 L3\nX2 Y0 P1\nX3 Y3 P2\nG5.3": True, "F1 G5.2 X1 Y1 P1 L3\nX2 P1": False,
+    "F1 G5.2 X1 Y1 P1 L4\nG5.3": False, "F1 G5.2 X1 Y1 P1 L3\nX2 Y2 P1\nG1 X3\nG5.3": False, "F1 G1 X1 L2": False,
     "M48": True, "G8": True, "G97 S1": True, "G98": True, "G40 D1": False, "G0 X1.2.3": False, "G0 X1 @": False,
 }  # fmt: skip
 

@@ -163,7 +163,9 @@ def test_words_that_nothing_uses_are_refused(letter: str, needs: str) -> None:
 
 
 def test_first_fault_is_named_and_the_others_counted() -> None:
-    with pytest.raises(InputError, match=r"^<text>:2:7: \?: this character starts no word.* \(1 more in this program"):
+    with pytest.raises(
+        InputError, match=r"^<text>:2:7: \?: this character starts no word.* \(1 more in this program"
+    ):
         parse_program("G0 X1\nG0 X1 ?\nG38.2 X1 Z2")
 
 

@@ -1,4 +1,4 @@
-"""Cutter radius compensation: the tool's centre keeps the distance of its radius from the programmed path. Judged by code of this file."""
+"""Cutter radius compensation: the tool's centre keeps the distance of its radius from the programmed path, by code of this file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ def pieces(program: Program) -> list[tuple[Kind, complex, complex, complex, floa
 def points(piece: tuple[Kind, complex, complex, complex, float], count: int = 40) -> np.ndarray:
     kind, start, end, centre, sweep = piece
     t = np.linspace(0.0, 1.0, count)
-    return start + t * (end - start) if kind != Kind.ARC else centre + (start - centre) * np.exp(1j * t * sweep)
+    return (
+        start + t * (end - start) if kind != Kind.ARC else centre + (start - centre) * np.exp(1j * t * sweep)
+    )
 
 
 def distance(point: complex, piece: tuple[Kind, complex, complex, complex, float]) -> float:
@@ -60,14 +62,18 @@ def star(rng: np.random.Generator, *, arcs: bool) -> list[str]:
 
 @pytest.mark.parametrize("arcs", [False, True])
 @pytest.mark.parametrize("side", ["G41.1", "G42.1"])
-@pytest.mark.parametrize("seed", [0, 1, 3, 5])  # 2 and 4 have a turn of less than 0.05 rad, which is taken straight on
+@pytest.mark.parametrize(
+    "seed", [0, 1, 3, 5]
+)  # 2 and 4 have a turn of less than 0.05 rad, which is taken straight on
 def test_the_centre_keeps_its_distance(seed: int, side: str, arcs: bool) -> None:
     path, radius = star(np.random.default_rng(seed), arcs=arcs), 0.8
     text = HEAD + "{}\nG1 " + "\n".join([*path, path[1], path[2]]) + "\n{}\nG0 X0 Y0\n"
     programmed = pieces(parse_program(text.format("", "")))[2:-1]
     compensated = parse_program(text.format(f"{side} D{2 * radius}", "G40"))
     # once round, without the moves that come from the first and lead to the last
-    once = [piece for piece, line in zip(pieces(compensated), compensated.line, strict=True) if 5 <= line <= 13]
+    once = [
+        piece for piece, line in zip(pieces(compensated), compensated.line, strict=True) if 5 <= line <= 13
+    ]
     assert len(once) >= 9
     for piece in once:
         for point in points(piece):

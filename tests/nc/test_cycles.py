@@ -15,7 +15,10 @@ HEAD = "G21 G90 G98 F100 S60 M3\nG0 X0 Y0 Z10\n"
 
 
 def places(program: Program) -> list[tuple[str, float, float, float]]:
-    return [(Kind(k).name[0], *(round(float(v), 6) + 0.0 for v in end)) for k, end in zip(program.kind, program.end, strict=True)]
+    return [
+        (Kind(k).name[0], *(round(float(v), 6) + 0.0 for v in end))
+        for k, end in zip(program.kind, program.end, strict=True)
+    ]
 
 
 def test_holes_one_after_the_other() -> None:
@@ -72,7 +75,9 @@ def test_depths_of_a_thread_take_equal_sections() -> None:
 
 
 def test_the_last_pass_of_a_thread_reaches_its_depth_and_end() -> None:
-    thread = Thread((20.0, 5.0), -10.0, peak=-1.0, depth=2.0, first=0.5, pitch=1.5, angle=29.5, taper=3.0, tapered=3)
+    thread = Thread(
+        (20.0, 5.0), -10.0, peak=-1.0, depth=2.0, first=0.5, pitch=1.5, angle=29.5, taper=3.0, tapered=3
+    )
     cuts = list(passes(thread))
     last = cuts[-6:]
     assert min(cut.x for cut in cuts) == pytest.approx(17.0)

@@ -48,10 +48,11 @@ EXAMPLES = [
     "G1 X[2**3**2] Y[-2**2] Z[7 MOD 3]\nX[-7 MOD 3] Y[1 EQ 1.00005] Z[1 EQ 1.0002]\nX[2+3*4-6/2] Y[1 LT 2 EQ 1] Z-#5420\n"
     "X[1 OR 0 AND 0] Y[ROUND[-2.5]] Z[FIX[-2.3]]\nX[FUP[-2.3]] Y[ATAN[1]/[-1]] Z--3",
     # what the control knows
-    "G20 G1 X1 F10\nG21 X#<_x> Y#<_feed> Z#<_metric>\nG92 X5\nX#5420 Y#<_coord_system>\nM3 S500\n"
+    "G20\nF10\nG1 X1\nX[#<_x>*2] Y#<_feed> Z#<_metric>\nG21\nX#<_y> Z#<_metric>\nG92 X5\nX#5420 Y#<_coord_system>\nM3 S500\n"
     "X#<_rpm> Y#<_spindle_on>\nG91 X1\nX#<_incremental>",
-    # saved modes
-    "G20 G91 F5\nM70\nG21 G90 F100\nG1 X25.4\nM72\nG1 X1\no50 sub\nM73\nG21 G90 G1 X50.8\no50 endsub\no50 call\nG1 X1",
+    # saved modes (LinuxCNC does not restore a feed across a change of units)
+    "G91 F50\nM70\nG90 F100\nG1 X10\nM72\nG1 X1\nG20\nM70\nG21\nF80 G1 X3\nM72\nF9\nG1 X1\no50 sub\nM73\nG90 G1 X2\no50 endsub\n"
+    "o50 call\nG1 X1",
     # blanks and case mean nothing, EXISTS, break of a do loop
     "#< A b >=3\nG 1 X [ # <ab> * 1 . 5 ] y[exists[#<Ab>]+exists[#<no>]]\n#1=0\nO 7 DO\n#1=[#1+1]\no8 if [#1 EQ 3]\n"
     "o7 break\nO8 ENDIF\n"

@@ -9,6 +9,7 @@ from scipy.interpolate import BSpline
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.nurbs import Nurbs
+from planner.machine import machine_from_dict
 from planner.methods.registry import plan
 from planner.nc.bezier import at, evenly_weighted, halves, homogeneous, lengths, raised
 from planner.nc.info import describe
@@ -239,3 +240,15 @@ def test_a_curve_of_its_own_is_an_exact_program() -> None:
         Nurbs(
             degree=4, points=np.eye(5, 2), knots=np.repeat([0.0, 1.0], 5), weights=np.ones(5)
         ).exact_program(5.0)
+
+
+@pytest.mark.parametrize(
+    "text", ["G41 D1 G1 X9 Y9\nG5 X15 I1 J1 P0 Q1", "G41 D1 G1 X9 Y9\nX20\nG40\nG5 X30 I1 J1 P0 Q1"]
+)
+def test_a_spline_is_no_move_of_cutter_compensation(text: str) -> None:
+    axes = {a: {"velocity": 1, "acceleration": 1, "jerk": 1} for a in "xyz"}
+    machine = machine_from_dict(
+        {"name": "m", "axes": axes, "tolerance": 0.01, "dt": 1e-3, "tools": {"1": {"diameter": 1.0}}}
+    )
+    with pytest.raises(InputError, match=r"G5: .*(G40|straight)"):
+        parse_program((HEAD + text + "\nM2\n").encode(), machine)

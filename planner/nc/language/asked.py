@@ -109,13 +109,14 @@ class Asked:
             rows.append([("G", 49.0)])
         if state.feed > 0 and state.feed_mode == "per minute":
             rows.append([("F", self.feed())])
-        if self.event("S") is not None:
-            rows.append([("S", self.event("S"))])
+        speed = self.event("S")
+        if speed is not None:
+            rows.append([("S", speed)])
         for group in ((3.0, 4.0, 5.0), (7.0, 8.0, 9.0), (48.0, 49.0)):
             code = self.event("M", group)
             if code is not None:
                 rows.append([("M", code)])
-        return tuple(tuple(row) for row in rows)  # type: ignore[arg-type]
+        return tuple(tuple(row) for row in rows)
 
 
 # --- LinuxCNC -------------------------------------------------------------------------------------------------------------------
@@ -146,7 +147,7 @@ _LINUXCNC_NAMES: dict[str, Callable[[Asked], float]] = {
     "_units_per_minute": lambda a: _on(a.interpreter.state.feed_mode == "per minute"),
     "_units_per_rev": lambda a: _on(a.interpreter.state.feed_mode == "per turn"),
     "_coord_system": lambda a: float(a.interpreter.state.system),
-    "_tool_offset": lambda a: _on(a.interpreter.state.tool_offset.any()),
+    "_tool_offset": lambda a: _on(bool(a.interpreter.state.tool_offset.any())),
     "_retract_r_plane": lambda a: _on(not a.interpreter.state.to_level),
     "_retract_old_z": lambda a: _on(a.interpreter.state.to_level),
     "_spindle_rpm_mode": lambda a: _on(not a.interpreter.state.spindle.surface_speed),

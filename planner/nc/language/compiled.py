@@ -16,6 +16,7 @@ A line of the Python source belongs to a statement, so that an error of Python's
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -65,6 +66,11 @@ def whole(value: float | None) -> int:
     return number
 
 
+def turns_of(value: float | None) -> int:
+    """The number of turns of a repeated loop: rounded, as LinuxCNC does it."""
+    return math.floor((value or 0.0) + 0.5)
+
+
 @dataclass
 class Compiled:
     """Python functions of procedures, by name, and the place of each line of their source."""
@@ -88,7 +94,7 @@ def compile_procedures(
         for line, place in _Function(procedure, language, rows).source(f"p{k}"):
             text.append(line)
             found.places.append(place)
-    namespace: dict[str, object] = {"whole": whole, **language.functions}
+    namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, **language.functions}
     exec(compile("\n".join(text), marker, "exec"), namespace)
     for k, procedure in enumerate(procedures):
         found.functions[procedure.name] = namespace[f"p{k}"]  # type: ignore[assignment]
@@ -245,7 +251,7 @@ class _Function:
         if loop.kind == "repeat":
             self.counters += 1
             left = f"r{self.counters}"
-            self._put(f"{left}=whole({self.value(loop.condition)})", loop.place)
+            self._put(f"{left}=turns_of({self.value(loop.condition)})", loop.place)
             condition = f"{left}>0"
         else:
             condition = self.condition(loop.condition)

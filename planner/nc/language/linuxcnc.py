@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from planner.nc.language.asked import LinuxcncAsked
@@ -86,7 +87,7 @@ def nearest(x: float) -> float:
     return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
 
 
-DEGREES = {
+DEGREES: dict[str, Callable[..., object]] = {
     "sin": lambda x: math.sin(math.radians(x)),
     "cos": lambda x: math.cos(math.radians(x)),
     "tan": lambda x: math.tan(math.radians(x)),

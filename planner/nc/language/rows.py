@@ -7,6 +7,7 @@ computed. `take` puts both together, some 100,000 rows at once, with a few numpy
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +54,7 @@ class Rows:
         self._rows = 0
         self._entries: list[tuple[int, int]] = []
         self._new: list[
-            tuple[int, list[tuple[int, int, float | None]]]
+            tuple[int, Sequence[tuple[int, int, float | None]]]
         ] = []  # rows that are not in arrays yet
         self._tables: _Tables | None = None
 
@@ -67,7 +68,7 @@ class Rows:
         self._append(words.letter, words.value, words.at + begin, words.line, np.diff(words.first))
         return self._rows - len(words.line), begin
 
-    def add_row(self, line: int, words: list[tuple[int, int, float | None]]) -> int:
+    def add_row(self, line: int, words: Sequence[tuple[int, int, float | None]]) -> int:
         """Make an entry of one row of (letter code, place, value), with None where the value is computed; returns its number."""
         self._new.append((line, words))
         row = self._rows + len(self._new) - 1

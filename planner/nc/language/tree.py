@@ -31,7 +31,7 @@ class Number(NamedTuple):
 class Numbered(NamedTuple):
     """A parameter by its number, which may be computed."""
 
-    index: Expression
+    index: Expression  # type: ignore[assignment]  # hides tuple.index, which nobody asks for
 
 
 class Named(NamedTuple):

@@ -13,13 +13,13 @@ coordinates without a pole, texts and QS parameters.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.heidenhain import drilling
+from planner.nc.language.heidenhain.flow import Flow, procedure_name
 from planner.nc.language.heidenhain.moves import (
     CORNER,
-    ONE,
     POLAR,
     POLE,
     ZERO,
@@ -33,14 +33,11 @@ from planner.nc.language.heidenhain.moves import (
     target,
     word,
 )
-from planner.nc.language.heidenhain.text import Block, Formula, blocks, of, own, parameter, plus, value
+from planner.nc.language.heidenhain.text import Block, blocks, of, own, plus, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
-    Call,
     Expression,
-    Goto,
     If,
-    Label,
     Line,
     Message,
     Number,
@@ -57,33 +54,20 @@ _FUNCTION = re.compile(
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
-_LABEL = re.compile(r'\s*(?:(\d+)|"([^"]*)")')
-_REPEAT = re.compile(r"\s*REP\s*(\d+)", re.IGNORECASE)
-_IF = re.compile(r"\s*IF\s", re.IGNORECASE)
-_THEN = re.compile(r"\s*GOTO\s+LBL\s*", re.IGNORECASE)
-_COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
-_FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
-_FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
-_FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}
-_NAMED = 100_000  # number of the first label with a name
 _TILTED = (128, 129, 144)
 _AT_END = (2, 30)
 
 
-class Parser:
+class Parser(Flow):
     """Statements of a conversational program. Faults of all its blocks are kept in `faults`."""
 
     def __init__(self, source: Source):
+        super().__init__()
         self.source = source
         self.faults: list[ProgramFault] = []
-        self.blocks: Sequence[Block] = ()
         self.moves = Moves(1.0)
         self.unit = 1.0
         self.cycles: set[int] = set()  # that the program defines
-        self.names: dict[str, int] = {}  # labels
-        self.known: dict[int, int] = {}  # label to its block
-        self.called: set[int] = set()
-        self.repeats = 0
         self.skip = False  # the block was read with the one before
 
     def parse(self) -> list[Procedure]:
@@ -101,7 +85,7 @@ class Parser:
                     first = self.known[label]
                     procedures.append(
                         Procedure(
-                            _procedure(label),
+                            procedure_name(label),
                             self.blocks[first].place,
                             self._body(first, self._end_of(first), True),
                         )
@@ -128,14 +112,6 @@ class Parser:
                 continue
             if label:
                 self.known.setdefault(label, k)
-
-    def _label(self, block: Block, column: int) -> tuple[int, int]:
-        found = _LABEL.match(block.text, column)
-        if found is None:
-            raise block.fault('a label is a number or a name: LBL 5, LBL "holes"', column)
-        if found.group(1):
-            return int(found.group(1)), found.end()
-        return self.names.setdefault(found.group(2), _NAMED + len(self.names)), found.end()
 
     def _end_of(self, first: int) -> int:
         """The block after the LBL 0 that ends a subprogram."""
@@ -334,87 +310,6 @@ class Parser:
         before, after, _ = self._codes(block, given)
         return [*before, Line(block.place, (word("M", block.place.at, ZERO),)), *after]
 
-    # --- labels and parameters --------------------------------------------------------------------------------------------------
-
-    def _label_here(self, block: Block, column: int) -> list[Statement]:
-        label, _ = self._label(block, column)
-        if label == 0:
-            return []
-        if self.blocks[self.known[label]] is not block:
-            raise block.fault(f"label {block.text[column:].strip()} is set twice")
-        return [Label(block.place, label)]
-
-    def _call(self, block: Block, column: int) -> list[Statement]:
-        label, column = self._label(block, column)
-        if label not in self.known:
-            raise block.fault(f"there is no LBL {block.text[8:].split('REP')[0].strip()} to call")
-        repeat = _REPEAT.match(block.text, column)
-        if repeat is None:
-            self.called.add(label)
-            return [Call(block.place, _procedure(label), None, block.text)]
-        counter = own(f"rep{self.repeats}")
-        self.repeats += 1
-        again: list[Statement] = [
-            Line(block.place, (), ((counter, plus(counter, ONE)),)),
-            Goto(block.place, Number(float(label))),
-        ]
-        end: list[Statement] = [Line(block.place, (), ((counter, ZERO),))]
-        return [If(block.place, ((of("LT", counter, Number(float(repeat.group(1)))), again),), end)]
-
-    def _parameter(self, block: Block, column: int) -> list[Statement]:
-        found = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
-        if found is None:
-            raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
-        return [
-            Line(
-                block.place, (), ((self._q(block, int(found.group(1))), Formula(block, found.end()).read()),)
-            )
-        ]
-
-    def _q(self, block: Block, number: int) -> Parameter:
-        if number >= 2000:
-            raise block.fault(f"Q{number}: there are Q0 to Q1999")
-        return parameter(number)
-
-    def _fn(self, block: Block, column: int) -> list[Statement]:
-        found = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
-        number = int(found.group(1)) if found else -1
-        column += found.end() if found else 0
-        if number in _FN_IF:
-            return self._jump(block, column, number)
-        target_of = re.match(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE)
-        if target_of is None or number not in {**_FN_ONE, **_FN_TWO}:
-            raise block.fault(f"FN {number if found else ''} is not read; read are FN 0 to 13", column)
-        q, column = self._q(block, int(target_of.group(1))), column + target_of.end()
-        if number in _FN_ONE:
-            word_of = re.match(r"(?:SQRT|SIN|COS)\s*", block.text[column:], re.IGNORECASE)
-            given, column = value(block, column + (word_of.end() if word_of else 0))
-            operation: Expression = of(_FN_ONE[number], given) if _FN_ONE[number] else given
-        else:
-            left, column = value(block, column)
-            sign = re.match(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
-            if sign is None:
-                raise block.fault("+, -, *, DIV, LEN or ANG and a second value are expected", column)
-            right, column = value(block, column + sign.end())
-            operation = of(_FN_TWO[number], left, right)
-        if block.text[column:].strip():
-            raise block.fault("nothing may follow here", column)
-        return [Line(block.place, (), ((q, operation),))]
-
-    def _jump(self, block: Block, column: int, number: int) -> list[Statement]:
-        start = _IF.match(block.text, column)
-        left, column = value(block, start.end() if start else column)
-        compare = re.match(r"\s*(EQU|NE|GT|LT)\b", block.text[column:], re.IGNORECASE)
-        if compare is None or compare.group(1).upper() != _FN_IF[number]:
-            raise block.fault(f"FN {number} compares with {_FN_IF[number]}", column)
-        right, column = value(block, column + compare.end())
-        then = _THEN.match(block.text, column)
-        if then is None:
-            raise block.fault("GOTO LBL is expected here", column)
-        label, _ = self._label(block, then.end())
-        then_go: list[Statement] = [Goto(block.place, Number(float(label)))]
-        return [If(block.place, ((of(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
-
     # --- cycles -----------------------------------------------------------------------------------------------------------------
 
     def _define(self, block: Block, column: int) -> list[Statement]:
@@ -490,10 +385,6 @@ class Parser:
             Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
         ]
         return [If(block.place, branches, nothing)]
-
-
-def _procedure(label: int) -> str:
-    return f"LBL {label}"
 
 
 _REMEDY = "let the CAM system write the moves out as L, C and CC"

@@ -9,6 +9,7 @@ copied or gets a new date. Versions that are older than `OTHERS_KEPT` are remove
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import pickle
 import re
@@ -55,6 +56,7 @@ class Place(NamedTuple):
 
     @property
     def name(self) -> str:
+        """Of its file."""
         return f"{self.kernel}.{self.version}.kernel"
 
 
@@ -207,8 +209,9 @@ def content_of(
         for module in [known[name] for name in names if isinstance(known.get(name), ModuleType)]:
             inside = [(name, vars(module)[name]) for name in names if name in vars(module)]
             used += [(name, of(value)) for name, value in inside if called(value) or _told_by_repr(value)]
-        cells = [of(cell.cell_contents) for cell in function.__closure__ or ()]
-        return repr((of(code), code.co_varnames, code.co_argcount, used, cells, of(function.__defaults__)))
+        closed = inspect.getclosurevars(function).nonlocals  # values of the functions around it
+        enclosed = [of(closed[name]) for name in code.co_freevars if name in closed]
+        return repr((of(code), code.co_varnames, code.co_argcount, used, enclosed, of(function.__defaults__)))
 
     found.update(code_of(function).encode())
     found.update(repr(sorted((name, of(value)) for name, value in settings.items())).encode())

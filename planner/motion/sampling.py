@@ -82,6 +82,7 @@ class _Room(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def room_for(axes):
+    """Arrays for one lot of samples over so many axes."""
     return _Room(
         np.empty((DEGREE + 1, axes)),
         np.empty((DEGREE, axes)),

@@ -140,7 +140,7 @@ class Cutter:
         return self._open is not None
 
     def line(self, target: FloatArray, kind: Kind, line: int) -> None:
-        """A straight move to a programmed end (3,). Raises CutterFault if the tool cannot follow."""
+        """A straight move to `target` (3,), the programmed end. Raises CutterFault if the tool cannot follow."""
         state = self._state
         start, end = self._plane(state.position), self._plane(target)
         length = abs(end - start)
@@ -160,7 +160,7 @@ class Cutter:
         self._add(side, target, kind, line)
 
     def arc(self, target: FloatArray, arc: Arc, line: int) -> None:
-        """An arc to a programmed end (3,). Raises CutterFault if the tool cannot follow."""
+        """An arc to `target` (3,), the programmed end. Raises CutterFault if the tool cannot follow."""
         state = self._state
         start, end, centre = self._plane(state.position), self._plane(target), self._plane(arc.centre)
         turning = 1 if arc.sweep > 0 else -1

@@ -172,7 +172,7 @@ class State:
         return self.in_system() - self.g92
 
     def machine(self, point: FloatArray) -> FloatArray:
-        """(3,) machine position of programmed coordinates (3,) [mm]."""
+        """(3,) machine position of `point` (3,) in programmed coordinates [mm]."""
         if not self.rotated:
             return point + self.offset
         system = self.work_system()

@@ -196,10 +196,10 @@ class Chain:
 
 
 def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """Distances to come to rest from feeds^2 x at no acceleration, about."""
+    """(n,) distances to come to rest from feeds^2 x (n,) at no acceleration, about."""
     return x / (2.0 * acceleration) + np.sqrt(x) * acceleration / (2.0 * jerk)
 
 
 def way_felt(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """The same, and much of the way a^3/j^2 on which a motion from rest builds up its acceleration and takes it back."""
+    """(n,) the same for x (n,), and much of the way a^3/j^2 on which a motion from rest builds up its acceleration and takes it back."""
     return way_to_brake(x, acceleration, jerk) + BUILDING * acceleration**3 / jerk**2

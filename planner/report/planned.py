@@ -6,6 +6,7 @@ calls is expanded first: one line of it may be executed at many feeds.
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from planner.base.errors import InputError
 from planner.nc.dialects import is_plotter_file
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
+from planner.nc.reading import AUTO
 from planner.nc.text import program_text
 from planner.nc.writer import retimed
 from planner.report.block_feeds import PlannedBlocks, feeds_of, planned_blocks
@@ -119,7 +121,7 @@ def _read_back(text: bytes, plan: Plan, how: str) -> Program:
     """The program that a text reads as. Raises LeftOut if its path is not the one of the plan's program."""
     planned = plan.program
     try:
-        read = parse_program(text, plan.machine)
+        read = parse_program(text, plan.machine, dataclasses.replace(planned.reading, dialect=AUTO))
     except InputError as fault:
         raise LeftOut(f"{planned.source} {how} does not read back: {fault.message}") from None
     same = _same(read, planned, ("kind", "path_control", "arc_block", "arc_normal"))

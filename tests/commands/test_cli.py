@@ -158,3 +158,23 @@ def test_files_that_do_not_end(job: Path, tmp_path: Path) -> None:
             result = run(*arguments)
             assert result.exit_code == 2
             assert said in result.stderr
+
+
+def test_expand(tmp_path: Path) -> None:
+    job, out = tmp_path / "job.ngc", tmp_path / "flat.ngc"
+    job.write_text("G21 F600\no1 sub\nG1 X[#1*2] Y[1/3]\no1 endsub\no1 call [4]\no1 call [5]\nM2\n")
+    printed = run("expand", job)
+    assert printed.exit_code == 0
+    assert printed.stdout.splitlines()[1:] == ["G21 F600", "G1 X8 Y0.3333333", "G1 X10 Y0.3333333", "M2"]
+    written = run("expand", job, "-o", out)
+    assert written.stdout.strip().endswith("flat.ngc: 4 lines executed, 2 blocks")
+    assert out.read_text() == printed.stdout
+    assert run("expand", job, "-o", out).exit_code == 2  # it exists
+    assert run("expand", out).stdout == out.read_text()  # nothing to expand
+    shown = " ".join(run("info", job).stdout.split())
+    assert "as linuxcnc: called 1 2 times" in shown
+    assert "4 lines executed" in shown
+    assert json.loads(run("info", job, "--json").stdout)["expansion"]["calls"] == [["1", 2]]
+    job.write_text("G21 F600\nG1 X[1/0]\n")
+    assert run("expand", job, "-o", out, "--force").exit_code == 2
+    assert "division by zero" in run("expand", job).stderr

@@ -67,7 +67,7 @@ def test_a_program_that_has_changed(job: Path, tmp_path: Path, now: str) -> None
 
 def test_a_line_that_would_grow_too_long(tmp_path: Path) -> None:
     job = tmp_path / "job.ngc"
-    job.write_text(SQUARE.replace("X10", "X10 (" + "long " * ((LINE_MAX - 11) // 5) + ")"))
+    job.write_text(SQUARE.replace("X10", "X10" + " " * (LINE_MAX - 8)))
     plan = plan_of(job)
     plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
     assert "planned.ngc" not in write_plan(plan, tmp_path / "out")
@@ -122,3 +122,21 @@ def test_it_is_said_where_the_original_serves_better(job: Path, tmp_path: Path) 
     write_plan(plan, tmp_path / "out")
     (said,) = notes(tmp_path / "out")
     assert said.startswith("planned.ngc: 4 of 4 blocks last less than a period of 600 ms")
+
+
+def test_of_a_program_that_computes_the_expanded_one_is_written(tmp_path: Path) -> None:
+    """Two turns of one line at two feeds; 10 mm in 0.5 s are F2250 at most, and the thousandth."""
+    job = tmp_path / "job.ngc"
+    job.write_text("G21 F9000\no1 repeat [2]\n#1=[#1+10]\nG1 X#1\no1 endrepeat\nM2\n")
+    machine = load_machine("mill")
+    plan = make_plan()
+    plan.program = read_program(job, machine)
+    plan.toolpath = toolpath_from_program(plan.program, machine)
+    plan.trajectory = trajectory_along(plan.toolpath, time=0.5)
+    write_plan(plan, tmp_path / "out")
+    lines = (tmp_path / "out" / "planned.ngc").read_text().splitlines()
+    assert "expanded" in lines[0]
+    assert lines[1:] == ["G21 F9000", "G1 X10 F2252", "G1 X20", "M2"]
+    assert notes(tmp_path / "out") == [
+        "planned.ngc is the expanded program: parameters, loops and calls are written out"
+    ]

@@ -31,11 +31,12 @@ _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
 
 
 def may_compute(words: Words) -> Array:
-    """Rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
-    mark = (words.letter == FAULT) | (words.letter == ord("O"))
+    """(n,) rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
+    found = [np.flatnonzero((words.letter == FAULT) | (words.letter == ord("O")))]
     for letter, numbers in _CALLS.items():
-        mark |= (words.letter == letter) & np.isin(words.value, numbers)
-    return np.unique(np.searchsorted(words.first, np.flatnonzero(mark), side="right") - 1)
+        codes = np.flatnonzero(words.letter == letter)
+        found.append(codes[np.isin(words.value[codes], numbers)])
+    return np.unique(np.searchsorted(words.first, np.concatenate(found), side="right") - 1)
 
 
 def bare(text: str) -> str:

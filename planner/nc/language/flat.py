@@ -12,21 +12,27 @@ from pathlib import PurePath
 from planner.machine import Machine
 from planner.nc.events import plain
 from planner.nc.faults import require_none
+from planner.nc.integers import LENGTHS
 from planner.nc.lexer import Words
 from planner.nc.program import Program
 from planner.nc.reader import execute, interpret
-from planner.nc.reading import Reading
+from planner.nc.reading import FANUC, Reading
 
 DECIMALS = 7  # of a number
 _LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
+_LENGTHS = "".join(map(chr, sorted(LENGTHS)))
 _ENDS = ("M2", "M02", "M30")
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 
 
 class Flat:
-    """Collects the lines of a program while it is expanded: `add` is the `tee` of `expand`."""
+    """Collects the lines of a program while it is expanded: `add` is the `tee` of `expand`.
 
-    def __init__(self, source: str):
+    points : write lengths and the times of dwells with a point, because the machine reads them otherwise without
+    """
+
+    def __init__(self, source: str, *, points: bool = False):
+        self.points = points
         name = PurePath(source).name.translate(_NO_COMMENT)
         self.lines = [f"({name}, expanded by feedrate-planner: parameters, loops and calls written out)"]
 
@@ -41,12 +47,20 @@ class Flat:
                 if letters[w] not in _LEFT_OUT
             )
             if text:
-                self.lines.append(text)
+                self.lines.append(_with_points(text) if self.points else text)
 
     def text(self) -> str:
         """The program, with M2 at its end if it has no end of its own."""
         ended = bool(set(self.lines[-1].split()) & set(_ENDS))
         return "\n".join([*self.lines, *([] if ended else ["M2"]), ""])
+
+
+def _with_points(text: str) -> str:
+    """A line whose lengths, and P beside G4, have a point."""
+    letters = _LENGTHS + "P" if "G4" in text.split() else _LENGTHS
+    return " ".join(
+        f"{word}." if word[0] in letters and "." not in word else word for word in text.split(" ")
+    )
 
 
 def number(value: float) -> str:
@@ -66,7 +80,8 @@ def flat_program(
     require_none(faults, source)
     if program.expansion is None:
         return None
-    flat = Flat(source)
+    fanuc = program.expansion.dialect == FANUC
+    flat = Flat(source, points=fanuc or (machine is not None and machine.dialect is not None))
     execute(
         data, machine, program.reading, source, flat.add
     )  # once more, now that it is known how arc centres are read

@@ -113,3 +113,9 @@ def test_a_centre_of_zero_along_the_axis_is_none() -> None:
     assert same_motion(parse_program("F60 G2 X2 I1 J0 K0"), parse_program("F60 G2 X2 I1 J0"))
     with pytest.raises(InputError, match="K in the x y plane"):
         parse_program("F60 G2 X2 I1 J0 K1")
+
+
+@pytest.mark.slow
+def test_a_loop_that_only_switches_something_ends_with_a_sentence() -> None:
+    with pytest.raises(InputError, match="lines executed without a move"):
+        parse_program("o1 while [1]\nM9\no1 endwhile")

@@ -3,8 +3,8 @@
 Rows go to the interpreter in chunks. A parameter that holds the state of the control (a position, an offset, the tool) is asked of the
 interpreter after everything pending has been executed.
 
-A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, or `ROWS_MAX` rows, or at `DEPTH_MAX` open
-calls, with a sentence that names the line.
+A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows, `IDLE_MAX` rows without a
+move, or at `DEPTH_MAX` open calls, with a sentence that names the line.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
 TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: some ten seconds of computing
+IDLE_MAX = 100_000  # rows one after the other that neither move nor stop: a loop that only switches something never ends
 ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
 DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
 ROWS_AT_ONCE = 100_000  # rows that are executed together
@@ -60,6 +61,7 @@ class Run:
         self.tee: Callable[[Words], None] = lambda words: None
         self.calls: Counter[str] = Counter()  # by name
         self.executed = 0  # rows
+        self.idle = 0  # of them, since the last block
         self._frame = 0
         self._depth = 0
         self._known_frames: dict[tuple[int, int, int, str], int] = {}
@@ -109,7 +111,11 @@ class Run:
             raise _Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
         if pending > ROWS_AT_ONCE:
+            blocks = self.interpreter.store.blocks
             self.flush()
+            self.idle = 0 if self.interpreter.store.blocks > blocks else self.idle + pending
+            if self.idle > IDLE_MAX:
+                raise _Endless(f"{self.idle:,} lines executed without a move")
         if self.executed + pending > ROWS_MAX:
             raise _Endless(f"{ROWS_MAX:,} lines executed")
         return 0

@@ -42,7 +42,8 @@ def agree(count: int) -> None:
 def fuzz(count: int) -> None:
     """Read mutated programs; a bug shows as another exception than InputError."""
     from language_programs import Generator
-    from test_language import EXAMPLES, FANUC
+    from test_language import EXAMPLES
+    from test_macros import FANUC
 
     from planner.base.errors import InputError
     from planner.nc.language import run
@@ -97,6 +98,6 @@ def speed() -> None:
 
 
 if __name__ == "__main__":
-    sys.path[:0] = [str(TESTS), str(TESTS.parent)]
+    sys.path[:0] = [str(TESTS / "language"), str(TESTS), str(TESTS.parent)]
     command, *rest = sys.argv[1:] or ["speed"]
     {"agree": agree, "fuzz": fuzz}[command](int(rest[0]) if rest else 1000) if command != "speed" else speed()

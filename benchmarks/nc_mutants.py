@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 
-SECONDS = 20  # for one program; the slowest of ordinary ones takes some hundredths
+SECONDS = 20  # of computing for one program; the slowest of ordinary ones takes some hundredths
 NOTES_MAX = 200
+LONG_LINE = 10_000  # bytes: a longer line (a plotter file can be one) is not doubled
 MEMORY = 6 << 30  # bytes of address space
 PIECE = 60  # lines of a program that are mutated together
 
@@ -53,7 +54,7 @@ def mutant(seed: int, programs: list[list[bytes]]) -> bytes:
             lines[k], lines[other] = lines[other], lines[k]
         elif change == 2:
             lines[k] += b" " + lines[other]
-        elif change == 3:
+        elif change == 3 and len(lines[k]) < LONG_LINE:
             lines[k] = lines[k] * int(rng.integers(2, 5))
         elif change == 4 and len(lines) > 2:
             del lines[k]
@@ -135,18 +136,18 @@ def main() -> None:
     options = parser.parse_args()
     programs = load_programs(options.folder)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGALRM, _hung)
+    signal.signal(signal.SIGPROF, _hung)
     found: Counter[str] = Counter()
     bad = []
     for seed in range(options.seed, options.seed + options.count):
-        signal.alarm(SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
         try:
             found[outcome(mutant(seed, programs), a_reading(seed))] += 1
         except (Exception, _Hung) as fault:
             found["hung" if isinstance(fault, _Hung) else "crashed"] += 1
             bad.append(seed)
             traceback.print_exc()
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         if seed % 1000 == 0:
             print(f"{seed}: {dict(found)}", flush=True)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6

@@ -3,7 +3,7 @@
 A kernel's name there is made of its own bytecode and settings, of the values of all constants that it uses, and of the same of every
 kernel that it calls; further of the types of its arguments, of the processor, and of the versions of Python and numba. So a kernel is
 compiled again when it, or one that it calls in another file, computes something else, and not when a comment changes, a file is
-copied or gets a new date. What an older version of a kernel has left is removed when the new one is written.
+copied or gets a new date. Versions that are older than `OTHERS_KEPT` are removed when a new one is written.
 """
 
 from __future__ import annotations
@@ -13,12 +13,15 @@ import os
 import pickle
 import re
 import sys
+import time
 from collections.abc import Callable, Iterable
 from functools import cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 FORMAT = 1  # of the files
+# Other versions of a kernel are kept so long [s], 30 days: they may be of another processor or checkout that shares the folder.
+OTHERS_KEPT = 30 * 86_400.0
 _NOT_OF_CODE = {
     "NUMBA_CACHE_DIR",
     "NUMBA_NUM_THREADS",
@@ -79,7 +82,7 @@ def read(where: Place) -> Kept | None:
 
 
 def write(where: Place, kernel: Kept) -> None:
-    """Keep a kernel, in place of its older versions. Raises OSError if it can be written nowhere."""
+    """Keep a kernel, in place of its old versions. Raises OSError if it can be written nowhere."""
     faults: list[OSError] = []
     for folder in folders():
         part = os.path.join(folder, f"{where.name}.{os.getpid()}")
@@ -97,10 +100,10 @@ def write(where: Place, kernel: Kept) -> None:
             continue
         if not where.single:
             return
-        older = [name for name in os.listdir(folder) if name.startswith(f"{where.kernel}.")]
-        _remove(
-            os.path.join(folder, name) for name in older if name.endswith(".kernel") and name != where.name
-        )
+        same = [
+            name for name in os.listdir(folder) if name.startswith(f"{where.kernel}.") and name != where.name
+        ]
+        _remove(os.path.join(folder, name) for name in same if _is_old(os.path.join(folder, name)))
         return
     raise faults[0]
 
@@ -119,6 +122,13 @@ def folders() -> list[str]:
     else:
         of_user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     return [os.path.join(package, "__pycache__", "kernels"), os.path.join(of_user, "planner", "kernels")]
+
+
+def _is_old(file: str) -> bool:
+    try:
+        return time.time() - os.path.getmtime(file) > OTHERS_KEPT
+    except OSError:  # another process has removed it
+        return False
 
 
 def _remove(files: Iterable[str]) -> None:

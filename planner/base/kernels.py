@@ -67,7 +67,9 @@ def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]
 class Kernel:
     """A compiled function."""
 
-    def __init__(self, function: Callable[..., Any], settings: dict[str, Any], cache: bool):
+    py_func: Any  # the function of Python
+
+    def __init__(self, function: Any, settings: dict[str, Any], cache: bool):
         functools.update_wrapper(self, function)
         self.py_func = function
         self.compiled = self.loaded = 0  # for how many types of arguments: here, and before
@@ -131,7 +133,7 @@ class Kernel:
     @cached_property
     def content(self) -> bytes:
         """A digest of what it computes; itself inside, a kernel is known by its name."""
-        vars(self)["content"] = self.__qualname__.encode()
+        vars(self)["content"] = self.py_func.__qualname__.encode()
         return kept.content_of(self.py_func, self._settings, _content)
 
     @cached_property

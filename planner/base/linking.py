@@ -77,8 +77,8 @@ class Linker:
         entry = self._engine.get_function_address(kernel.entry)
         if not entry or not made:
             raise RuntimeError(f"no kernel {kernel.entry}")
-        module = SimpleNamespace(__name__=named.__module__)
-        return self._make(module, named.__name__, named.__doc__ or "", entry, made[0], self)
+        of = SimpleNamespace(__name__=named.__module__)
+        return self._make(of, named.__name__, named.__doc__ or "", entry, made[0], self)
 
 
 _lasting: list[Any] = []

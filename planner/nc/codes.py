@@ -145,10 +145,10 @@ LETTER_NEEDS = {
     "K": "G2, G3, G6.2, G33, G33.1, G76 or G87",
     "R": "G2, G3, G6.2, G10 or a canned cycle",
     "P": "G4, G10, G64, G2, G3, G5, G5.2, G6.2, a canned cycle that dwells or M62 to M66",
-    "Q": "G5, G10, G64, G73, G76, G83, M61 or M66 to M68",
+    "Q": "G10, G64, G5, G73, G76, G83, M61 or M66 to M68",
     "H": "G43, G43.2 or G76",
     "D": "G41, G42 or G96",
-    "L": "G5.2, G10, G41.1, G42.1, M66 or a canned cycle",
+    "L": "G10, G41.1, G42.1, G5.2, M66 or a canned cycle",
     "E": "G76 or M66 to M68",
 }
 

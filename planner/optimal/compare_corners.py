@@ -101,7 +101,7 @@ def with_corners(
             return best, left
         time, before = planned.stop_to_stop(), splines[chosen]
         faster = time < fraction * before
-        job.tell("corners", found=time.sum(), before=before.sum(), runs=len(time), kept=int(faster.sum()))
+        job.tell("corners", found=time.sum(), before=before.sum(), runs=len(time), faster=int(faster.sum()))
         chosen[chosen] = faster
     if not chosen.any() or (before - time)[faster].sum() < FASTER * best.solution.cycle_time:
         return best, left

@@ -163,9 +163,9 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     best = reshaped(rounded, best, job, settings, grids.rounds)
     coarse = best.stop_to_stop() if best.solution.solved else np.zeros(0)
     if best.solution.solved:
-        path, shape = best.path, best.shape
+        path, splined = best.path, best.shape
         del best
-        best = dataclasses.replace(order.solve(path, job, grids.final), shape=shape)
+        best = dataclasses.replace(order.solve(path, job, grids.final), shape=splined)
         job.tell(
             "final grid",
             found=best.solution.cycle_time,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -91,11 +93,15 @@ def test_kernels_from_the_disk(use: Callable[..., str], tmp_path: Path) -> None:
     written = files(tmp_path)
     assert [name.partition("-")[0] for name in written] == ["roots.parts", "roots.twice"]
     assert use() == "6.0 2.0 2.0 2.0 6.0 | 0 1 0 False"  # the same, without numba
-    # a comment is nothing to compile for; a kernel inside it, in another file, or a constant is, and the old one goes
+    # a comment is nothing to compile for; a kernel inside it, in another file, or a constant is, and what is old goes
     assert use(INNER + "# as before\n", "# the same\n" + KERNELS).endswith("| 0 1 0 False")
     assert files(tmp_path) == written
     assert use(INNER.replace("x / n", "x / n + 1.0")) == "9.0 3.0 3.0 3.0 8.0 | 1 0 0 True"
     assert use(INNER.replace("FACTOR = 1.0", "FACTOR = 2.0")) == "12.0 2.0 2.0 2.0 12.0 | 1 0 0 True"
+    assert len(files(tmp_path)) == 4  # those before may be somebody else's, for some time
+    for file in (tmp_path / "cache").rglob("*.kernel"):
+        os.utime(file, (0.0, time.time() - 2.0 * kept.OTHERS_KEPT))
+    assert use(INNER.replace("x / n", "x / n + 2.0")) == "12.0 4.0 4.0 4.0 10.0 | 1 0 0 True"
     assert len(files(tmp_path)) == 2
     # half a file is none
     for file in (tmp_path / "cache").rglob("*.kernel"):

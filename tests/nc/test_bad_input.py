@@ -74,7 +74,7 @@ REFUSED = [
     *[
         (f"G21\nM{codes.number(code)}", 2, 1, [f"M{codes.number(code)}", refusal.what, refusal.remedy])
         for code, refusal in codes.M_REFUSED.items()
-        if code not in (700, 710, 720, 730, 980, 990)  # calls and saved modes: tests/nc/test_language.py
+        if code not in (700, 710, 720, 730, 980, 990)  # calls and saved modes: tests/nc/language
     ],
     # what the state does not allow
     ("X1", 1, 1, ["X1", "no motion code"]),

@@ -15,7 +15,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
@@ -67,6 +70,7 @@ class _Run:
 
     def __init__(self, data: bytes, machine: Machine | None, reading: Reading):
         self.data = data
+        self._line_ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n")).tolist()
         self.strict = reading.strict
         self.unknown: list[int] = []
         self.plotter = (machine.plotter if machine is not None else None) or Plotter()
@@ -131,7 +135,8 @@ class _Run:
 
     def _place(self, at: int) -> tuple[int, int]:
         """Line and column of a byte, from 1."""
-        return self.data.count(b"\n", 0, at) + 1, at - self.data.rfind(b"\n", 0, at)
+        line = bisect_left(self._line_ends, at)
+        return line + 1, at - (self._line_ends[line - 1] if line else -1)
 
     # --- instructions -----------------------------------------------------------------------------------------------------------
 

@@ -31,7 +31,7 @@ _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
 
 
 def may_compute(words: Words) -> Array:
-    """Rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
+    """(n,) rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
     found = [np.flatnonzero((words.letter == FAULT) | (words.letter == ord("O")))]
     for letter, numbers in _CALLS.items():
         codes = np.flatnonzero(words.letter == letter)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.nc.program import Program
+
 LINE_MAX = 250  # LinuxCNC reads lines of 255 characters
 _ONE = ("ABS", "SIN", "COS", "TAN", "FIX", "FUP", "ROUND", "EXP", "SQRT", "LN", "ASIN", "ACOS")
 _TWO = ("+", "-", "*", "/", "MOD", "**", "EQ", "NE", "GT", "GE", "LT", "LE", "AND", "OR", "XOR")
@@ -292,3 +294,11 @@ class Generator:
         lines += ["o90 sub", "o90 endsub", "o90 call"]
         lines += self.body(0, 12)
         return lines
+
+
+def same(one: Program, other: Program, *, apart: float = 0.0) -> None:
+    """The same motion, whatever lines it comes from."""
+    for name in ("kind", "path_control", "arc_block", "arc_normal"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    for name in ("end", "feed", "dwell", "arc_center"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=apart, err_msg=name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from planner.nc.store import Store
 Note = Callable[[str, int], None]
 
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
+_BY_HAND = 880  # G88
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3
 _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
@@ -26,75 +28,95 @@ _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 def drill(state: State, store: Store, block: Block, note: Note) -> None:
     """Execute the line. Raises WordFault for words that are missing or contradict each other."""
-    code = state.motion
-    name = f"G{codes.number(code)}"
-    word = block.motion_word()
-    normal = state.normal
-    a, b = IN_PLANE[normal]
+    a, b = IN_PLANE[state.normal]
+    c = state.normal
     here = _per_unit(state)
-    series = _series(state, code, float(here[normal]))
-    repeats = integer(block, "L", 1) if "L" in block.value else 1
+    series = _series(state, state.motion, float(here[c]))
     words = _words(state, block, series)
+    _check_words(state, block, words)
+    hole = _hole(state, block, series, words)
+    repeats = _repeats(block, hole)
+    if series.level < hole.clear - _ROUNDING:
+        _to(state, store, block.line, Step(Kind.RAPID, (here[a], here[b], hole.clear)))
+        here[c] = hole.clear
+    for _ in range(repeats):
+        for axis in (a, b):
+            if "XYZ"[axis] in block.value:
+                length = _length(state, block.value, axis)
+                here[axis] = length + (0.0 if state.absolute else here[axis])
+        hole = replace(hole, place=(float(here[a]), float(here[b])))
+        height = float(here[c]) if here[c] > hole.clear + _ROUNDING else hole.retract
+        _to(state, store, block.line, Step(Kind.RAPID, (*hole.place, height)))
+        _to(state, store, block.line, Step(Kind.RAPID, (*hole.place, hole.clear)))
+        for step in cycles.steps(hole):
+            _to(state, store, block.line, step)
+        here[c] = hole.retract
+    _say(state, block, note)
+
+
+def _check_words(state: State, block: Block, words: dict[str, float]) -> None:
+    """Raises WordFault for a peck or dwell that is impossible, and for a spindle that does not turn as it must."""
+    code, word = state.motion, block.motion_word()
+    name = f"G{codes.number(code)}"
     if code in cycles.PECKING and not words["Q"] > 0:
         raise WordFault(block.at.get("Q", word), f"{name} needs the depth of a peck as a Q word above 0")
     if code in cycles.DWELLING and words["P"] < 0:
         raise WordFault(block.at["P"], "a dwell must not be negative; write its seconds, such as P0.5")
     _check_spindle(state, code, word)
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
-    if not state.retract_given:
-        note(
-            f"{name} before any G98 or G99: holes end at R (G99), as LinuxCNC has it; some controls start with G98",
-            block.line,
-        )
+
+
+def _hole(state: State, block: Block, series: Series, words: dict[str, float]) -> Hole:
+    """The hole of the words in force, at no place yet. Raises WordFault if it would begin below its depth."""
+    a, b = IN_PLANE[state.normal]
+    axis = state.normal
     clear = words["R"] + (0.0 if state.absolute else series.level)
-    bottom = words["XYZ"[normal]] + (0.0 if state.absolute else clear)
+    bottom = words["XYZ"[axis]] + (0.0 if state.absolute else clear)
     if bottom > clear:
         raise WordFault(
-            word,
-            f"{name} would begin at R = {clear:g}, below its depth {AXES[normal].upper()} = {bottom:g}; write R above it",
+            block.motion_word(),
+            f"G{codes.number(state.motion)} would begin at R = {clear:g}, below its depth {AXES[axis].upper()} = {bottom:g}; "
+            "write R above it",
         )
-    retract = series.level if state.to_level and series.level > clear else clear
-    pecks = (clear - bottom) / words["Q"] if code in cycles.PECKING else 0.0
+    return Hole(
+        state.motion,
+        (0.0, 0.0),
+        bottom,
+        clear,
+        retract=series.level if state.to_level and series.level > clear else clear,
+        peck=words.get("Q", 0.0),
+        dwell=words.get("P", state.cycle_dwell),
+        beside=(words.get("IJK"[a], 0.0), words.get("IJK"[b], 0.0)),
+        counterbore=words.get("IJK"[axis], 0.0) + (0.0 if state.absolute else bottom),
+        turning=state.spindle.turning,
+        unit=state.unit,
+    )
+
+
+def _repeats(block: Block, hole: Hole) -> int:
+    """L. Raises WordFault for more moves than a line may make."""
+    repeats = integer(block, "L", 1) if "L" in block.value else 1
+    pecks = (hole.clear - hole.bottom) / hole.peck if hole.code in cycles.PECKING else 0.0
     if repeats * (_PER_HOLE + _PER_PECK * pecks) > STEPS_MAX:
-        raise WordFault(word, f"{name} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}")
-    if series.level < clear - _ROUNDING:
-        _to(state, store, block.line, Step(Kind.RAPID, (here[a], here[b], clear)))
-        here[normal] = clear
-    for _ in range(repeats):
-        for axis in (a, b):
-            if "XYZ"[axis] in block.value:
-                length = _length(state, block.value, axis)
-                here[axis] = length + (0.0 if state.absolute else here[axis])
-        place = (float(here[a]), float(here[b]))
-        height = float(here[normal]) if here[normal] > clear + _ROUNDING else retract
-        _to(state, store, block.line, Step(Kind.RAPID, (*place, height)))
-        _to(state, store, block.line, Step(Kind.RAPID, (*place, clear)))
-        hole = Hole(
-            code,
-            place,
-            bottom,
-            clear,
-            retract,
-            peck=words.get("Q", 0.0),
-            dwell=words.get("P", state.cycle_dwell),
-            beside=(words.get("IJK"[a], 0.0), words.get("IJK"[b], 0.0)),
-            counterbore=words.get("IJK"[normal], 0.0) + (0.0 if state.absolute else bottom),
-            turning=state.spindle.turning,
-            unit=state.unit,
+        found = (
+            f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
         )
-        for step in cycles.steps(hole):
-            _to(state, store, block.line, step)
-        here[normal] = retract
-    if code == 880:
-        note(
-            "G88: the operator retracts the tool after the full stop; the plan has a rapid for it", block.line
-        )
-    if code in cycles.TAPPING:
-        note(
-            f"{name} is synchronised with the spindle: planned with F as its upper limit and full stops at both ends, "
-            "not at constant feed",
-            block.line,
-        )
+        raise WordFault(block.motion_word(), found)
+    return repeats
+
+
+def _say(state: State, block: Block, note: Note) -> None:
+    """What was assumed of a cycle."""
+    name = f"G{codes.number(state.motion)}"
+    if not state.retract_given:
+        found = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"
+        note(f"{name} before any G98 or G99: {found}", block.line)
+    if state.motion == _BY_HAND:
+        found = "the operator retracts the tool after the full stop; the plan has a rapid for it"
+        note(f"{name}: {found}", block.line)
+    if state.motion in cycles.TAPPING:
+        found = "planned with F as its upper limit and full stops at both ends, not at constant feed"
+        note(f"{name} is synchronised with the spindle: {found}", block.line)
 
 
 def _series(state: State, code: int, level: float) -> Series:

@@ -11,11 +11,13 @@ B1, B2 and B3 the time derivatives of the basis functions along the motion, and 
 (v.e) + e.(B1.dc) - (v.e) theta with its direction e, and the acceleration across the path likewise. With theta a spline over the same
 knots all that is linear in dc and theta. A step minimises
 
-    integral of theta dt  +  pull/2 integral of sum_k (B3.dc_k / jerk_k)^2 + SLOWER theta^2 dt
+    integral of theta + 1/2 |w|^2/v^2 + pull/2 (sum_k (B3.dc_k / jerk_k)^2 + SLOWER theta^2) dt
 
-subject to the limits and to the corridor, whose sites stay balls (sites.py). The second term keeps the step where the first order
-holds. Limits are kept at two places inside each interval of the grid, and may grow there by what the interval leaves of them, its ends
-included: the motion keeps its limits at grid points, and the step must not promise what it cannot have there.
+subject to the limits and to the corridor, whose sites stay balls (sites.py). The second term counts where the motion goes at the
+programmed feed v: w is what B1.dc has across the path, and the speed with it is v + |w|^2/(2 v); without it a wavy path seems to cost
+nothing. The third keeps the step where the first order holds. Limits are kept at places inside the intervals of the grid, and a share
+may grow there by what the interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step
+must not promise what it cannot have there.
 
 Long runs are improved window by window (joint_solver.py).
 """
@@ -33,14 +35,13 @@ from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.joint_rows import Places, places_of_run, pull_of_window, rows_of_window
+from planner.smoothing.joint_rows import Places, gain_of_step, places_of_run, pull_of_window, rows_of_window
 from planner.smoothing.joint_solver import JointProblem, improve_window
 from planner.smoothing.relax import TIGHTENED, next_window
 from planner.smoothing.runs import SplineRuns
 from planner.smoothing.sites import Sites, with_radius
 from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
 
-SLOWER = 10.0  # how much theta counts beside jerks [-]
 WINDOW = 400  # control points improved at a time ...
 OVERLAP = 40  # ... and of them again with the next window
 ITERATIONS = 40  # per window; 10 to 25 are the rule
@@ -120,8 +121,7 @@ def _improve_window(run, radius, lo, hi, y):
     free = np.zeros((b - a, axes + 1), np.bool_)
     free[lo - a : hi - a] = run.free[lo:hi]
     band, linear = np.zeros(((b - a) * (axes + 1), ORDER * (axes + 1))), np.zeros((b - a, axes + 1))
-    pull_of_window(places, first, last, run.pulled, SLOWER, a, band, linear)
-    band *= run.pull
+    pull_of_window(places, first, last, run.pull, run.pulled, a, band, linear)
     rows = rows_of_window(places, first, last, a)
     sites = _sites_of_window(with_radius(run.sites, radius), lo, hi, spans)
     problem = JointProblem(band, linear, free, rows, run.control[a:b], sites)
@@ -181,9 +181,7 @@ def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, ag
         for i in range(len(own)):
             for k in range(own.shape[1]):
                 control[begin + i, k] += y[i, k]
-        for p in range(len(places.span)):
-            for b in range(ORDER):
-                gain[q] -= places.weight[p] * places.basis[p, 0, b] * y[places.span[p] + b, own.shape[1]]
+        gain[q] = gain_of_step(places, y)
     return control, radius, gain, iterations
 
 

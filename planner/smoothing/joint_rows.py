@@ -21,9 +21,18 @@ NONE = 1e12  # stands for a bound that there is none of
 NEAR = np.array([0.8, 0.6, 0.2, 0.8])
 
 
+# Places at which the limits are kept: so many in each interval of the grid at least, and in each span. With two in long intervals the
+# jerk grows between them, and the motion gains a quarter of what the step promises.
+PER_INTERVAL, PER_SPAN = 2, 5.0
+EDGE = 0.5 - np.sqrt(3.0) / 6.0  # of them from the ends of the interval [-]: Gauss's rule of two points
+
+
+SLOWER = 10.0  # how much theta counts beside jerks in the pull [-]
+
+
 class Places(NamedTuple):
-    """P places on a run, two inside each interval of the grid, and the motion there. Its R limits are velocity, acceleration and jerk of
-    each axis, the feed, and the acceleration across the path."""
+    """P places on a run, some inside each interval of the grid, and the motion there. Its R limits are velocity, acceleration and
+    jerk of each axis, the feed, and the acceleration across the path."""
 
     span: Array  # (P,)
     weight: FloatArray  # (P,) time that each stands for [s]
@@ -48,8 +57,9 @@ class Rows(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def time_derivatives(rows, tangent, feed, acc, jerk, out):
-    """out (4, 6) = the basis functions and their time derivatives, from their derivatives `rows` (4, 6) and those of the curve `tangent`
-    (3, A) by the spline's parameter, for a motion with feed, acc and jerk along the path (forms.py); returns the speed of the curve."""
+    """out (4, 6) = the basis functions and their time derivatives in a motion with feed, acc and jerk along the path (forms.py),
+    from the derivatives by the spline's parameter, `rows` (4, 6) of the basis functions and `tangent` (3, A) of the curve; returns
+    |p_u|."""
     square, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
     for k in range(tangent.shape[1]):
         square += tangent[0, k] * tangent[0, k]
@@ -92,46 +102,64 @@ def _put_shares(jet, tangent, acc, limits, bound, along, share, limit):
 
 
 @njit(cache=True, error_model="numpy")
+def _count(motion, n):
+    """How many places interval n gets."""
+    return max(int(np.ceil(PER_SPAN * (motion.tau[n, 1] - motion.tau[n, 0]))), PER_INTERVAL)
+
+
+@njit(cache=True, error_model="numpy")
 def places_of_run(knots, control, motion, bound, limits, first, last):
-    """The `Places` of the grid intervals first .. last - 1 of a `SplineMotion` that has four places for each, both ends and what
-    counts inside; bound (I, 2) of feed and of acceleration across the path, limits (3, A)."""
-    axes, seen = control.shape[1], motion.tau.shape[1]
+    """The `Places` of the grid intervals first .. last - 1 of a `SplineMotion` that is given at both ends of each; bound (I, 2) of feed
+    and of acceleration across the path, limits (3, A)."""
+    axes = control.shape[1]
     kinds = 3 * axes + 2
-    inside = seen - 2
-    count = inside * (last - first)
+    count = 0
+    for n in range(first, last):
+        count += _count(motion, n)
     span, weight = np.empty(count, np.int64), np.empty(count)
     basis, jet = np.empty((count, 4, ORDER)), np.empty((count, 3, axes))
     along, limit = np.empty((count, 2, axes)), np.empty((count, kinds))
     share, least, most = np.empty((count, kinds)), np.empty((count, kinds)), np.empty((count, kinds))
-    rows, tangent, unit, here = (
+    rows, tangent, unit, edge = (
         np.empty((4, ORDER)),
         np.empty((3, axes)),
         np.empty(axes),
-        np.empty((seen, 4, ORDER)),
+        np.empty((4, ORDER)),
     )
-    jets, shares, ways = np.empty((seen, 3, axes)), np.empty((seen, kinds)), np.empty((seen, 2, axes))
-    limit_here = np.empty(kinds)
+    edge_jet, edge_share = np.empty((3, axes)), np.empty((2, kinds))
+    edge_way, edge_limit = np.empty((2, axes)), np.empty(kinds)
+    begin = 0
     for n in range(first, last):
-        i = motion.span[n]
-        for side in range(seen):
-            derivatives(knots.basis[i], motion.tau[n, side], knots.breaks[i + 1] - knots.breaks[i], rows)
+        i, inside = motion.span[n], _count(motion, n)
+        h = knots.breaks[i + 1] - knots.breaks[i]
+        for side in range(inside + 2):  # the places inside, and then both ends
+            at = EDGE + side * (1.0 - 2.0 * EDGE) / (inside - 1.0) if side < inside else side - inside * 1.0
+            tau = motion.tau[n, 0] + at * (motion.tau[n, 1] - motion.tau[n, 0])
+            v0, v1 = motion.feed[n, 0], motion.feed[n, 1]
+            feed = np.sqrt(v0 * v0 + at * (v1 * v1 - v0 * v0))
+            acc = motion.acc[n, 0] + at * (motion.acc[n, 1] - motion.acc[n, 0])
+            derivatives(knots.basis[i], tau, h, rows)
             _products(rows, control, i, tangent)
-            acc = motion.acc[n, side]
-            speed = time_derivatives(rows, tangent, motion.feed[n, side], acc, motion.jerk[n], here[side])
-            _products(here[side], control, i, jets[side])
+            p, end = begin + side, side - inside
+            here = basis[p] if end < 0 else edge
+            speed = time_derivatives(rows, tangent, feed, acc, motion.jerk[n], here)
             for k in range(axes):
                 unit[k] = tangent[0, k] / speed
-            _put_shares(jets[side], unit, acc, limits, bound[n], ways[side], shares[side], limit_here)
-        for side in range(1, seen - 1):
-            p = inside * (n - first) + side - 1
-            span[p], weight[p] = i, motion.duration[n] / inside
-            basis[p], jet[p], along[p] = here[side], jets[side], ways[side]
-            share[p], limit[p] = shares[side], limit_here
-            for kind in range(kinds):
-                low = high = shares[0, kind]
-                for other in range(1, seen):
-                    low, high = min(low, shares[other, kind]), max(high, shares[other, kind])
+            if end < 0:
+                span[p], weight[p] = i, motion.duration[n] / inside
+                _products(here, control, i, jet[p])
+                _put_shares(jet[p], unit, acc, limits, bound[n], along[p], share[p], limit[p])
+            else:
+                _products(here, control, i, edge_jet)
+                _put_shares(edge_jet, unit, acc, limits, bound[n], edge_way, edge_share[end], edge_limit)
+        for kind in range(kinds):
+            low = min(edge_share[0, kind], edge_share[1, kind])
+            high = max(edge_share[0, kind], edge_share[1, kind])
+            for p in range(begin, begin + inside):
+                low, high = min(low, share[p, kind]), max(high, share[p, kind])
+            for p in range(begin, begin + inside):
                 least[p, kind], most[p, kind] = low, high
+        begin += inside
     return Places(span, weight, basis, jet, along, share, least, most, limit)
 
 
@@ -235,17 +263,53 @@ def add_rows(rows, q, out):
 
 
 @njit(cache=True, error_model="numpy")
-def pull_of_window(places, first, last, pulled, slower, lo, band, linear):
-    """Add to band the pull of the places first .. last - 1, slower theta^2 + sum of the squared changes of the jerks over `pulled`
-    (A,), each times the time of the place, and to linear (n, A+1) the time itself; control points count from `lo`."""
+def sideways(places, p):
+    """What a square of the velocity across the path costs at a place [s3/mm2] (joint.py): where the feed is held."""
+    axes = places.jet.shape[2]
+    share = places.share[p, 3 * axes]
+    return places.weight[p] / (share * places.limit[p, 3 * axes]) ** 2 if share > NEAR[3] else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def pull_of_window(places, first, last, pull, pulled, lo, band, linear):
+    """Add to band and linear (n, A+1) the objective of joint.py at the places first .. last - 1; control points count from `lo`.
+
+    pull, pulled : as there, and the jerks (A,) that it counts in
+    """
     axes = len(pulled)
     blocks, where = np.zeros((axes + 1, axes + 1, SQUARE)), pattern(axes + 1)
     for p in range(first, last):
         i, basis, own = places.span[p] - lo, places.basis[p], places.weight[p]
         for k in range(axes):
-            add_outer(blocks[k, k], basis[3], basis[3], own / pulled[k] ** 2)
-        add_outer(blocks[axes, axes], basis[0], basis[0], slower * own)
+            add_outer(blocks[k, k], basis[3], basis[3], pull * own / pulled[k] ** 2)
+        add_outer(blocks[axes, axes], basis[0], basis[0], SLOWER * pull * own)
+        cost = sideways(places, p)
+        if cost > 0.0:
+            for k in range(axes):
+                for m in range(k, axes):
+                    across = (1.0 if k == m else 0.0) - places.along[p, 0, k] * places.along[p, 0, m]
+                    add_outer(blocks[k, m], basis[1], basis[1], cost * across)
         for b in range(ORDER):
             linear[i + b, axes] += own * basis[0, b]
         if p + 1 == last or places.span[p + 1] != places.span[p]:
             scatter(blocks, i, where, band)
+
+
+@njit(cache=True, error_model="numpy")
+def gain_of_step(places, y):
+    """By how much the step y (n, A+1) shortens the time (joint.py) [s]."""
+    axes = places.jet.shape[2]
+    gain = 0.0
+    for p in range(len(places.span)):
+        i, basis = places.span[p], places.basis[p]
+        theta, square, along = 0.0, 0.0, 0.0
+        for b in range(ORDER):
+            theta += basis[0, b] * y[i + b, axes]
+        for k in range(axes):
+            move = 0.0
+            for b in range(ORDER):
+                move += basis[1, b] * y[i + b, k]
+            square += move * move
+            along += move * places.along[p, 0, k]
+        gain -= places.weight[p] * theta + 0.5 * sideways(places, p) * (square - along * along)
+    return gain

@@ -36,7 +36,7 @@ JOBS = 150
 NC = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[2] / "shared")) / "nc"
 NC_BYTES = 20_000
 WHOLE_PLANS = "compare", "another method", "share of tolerance"
-SOLVER = "windows", "other starts", "other ends", "divided", "standstills"
+SOLVER = "windows", "other starts", "divided", "standstills"
 Steps = list[dict[str, Any]]
 
 

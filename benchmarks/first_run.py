@@ -31,7 +31,7 @@ PROGRAM = "G21 G90 G17\nG64 P0.02\nG1 X20 F3000\nX40 Y10\nX60\nX70 Y30\nX50 Y50\
 METHODS = ("optimal", "second-order", "kinematic", "fir", "stop")
 ONE = "import planner.commands.first_run as first; first.cores = lambda: 1; "
 WAYS = {
-    "numba": ONE + "import planner.base.compiling as compiling; compiling.known_numba = lambda: False; ",
+    "numba": ONE + "import planner.base.kernels as kernels; kernels.known_numba = lambda: False; ",
     "one": ONE,
     "two": "",
 }
@@ -61,7 +61,7 @@ def first_run(method: str, way: str) -> dict[str, Any]:
             done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
             row[f"{run}_wall"], row[f"{run}_cpu"] = time.perf_counter() - began, cpu_of_children() - before
             if run == "first":
-                row["kernels"] = len(list(Path(folder).rglob("*.nbc")))
+                row["kernels"] = len([*Path(folder).rglob("*.kernel"), *Path(folder).rglob("*.nbc")])
                 row["exit"] = done.returncode
                 row["cycle_time"] = json.loads(done.stdout)["cycle_time_s"]
     return row

@@ -6,6 +6,7 @@
     PathLimit, JointLimit    limits of your own; with corner shapes (PolynomialCorner) and methods (Method): docs/extending.md
     compare                  several methods on one program, judged by the same verifier
     Program, read_program    the blocks of an NC program
+    Reading                  how a program is read: what is refused, left out and assumed
     Toolpath                 the programmed path with its joints and tolerances
     Trajectory               the setpoints, one row per interpolation period
     Verdict                  the verifier's findings
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
     from planner.nc.reader import read_program
+    from planner.nc.reading import Reading
     from planner.report.compare import compare
     from planner.verify import Verdict
 
@@ -52,6 +54,7 @@ _HOME = {
     "load_machine": "planner.machine",
     "Program": "planner.nc.program",
     "read_program": "planner.nc.reader",
+    "Reading": "planner.nc.reading",
     "Toolpath": "planner.geometry.toolpath",
     "Trajectory": "planner.motion.trajectory",
     "Verdict": "planner.verify",
@@ -69,6 +72,7 @@ __all__ = [
     "Plan",
     "PolynomialCorner",
     "Program",
+    "Reading",
     "Toolpath",
     "Trace",
     "Trajectory",

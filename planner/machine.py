@@ -80,6 +80,20 @@ class Plotter(_Record):
     pen_up: NotNegative = 0.0
 
 
+class ToolData(_Record):
+    """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42 use [mm]."""
+
+    length: Finite = 0.0
+    x: Finite = 0.0
+    diameter: NotNegative = 0.0
+
+
+class DialectData(_Record):
+    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit."""
+
+    least_increment: Positive | None = None
+
+
 class Machine(_Record):
     """A machine. The template explains every key.
 
@@ -89,6 +103,7 @@ class Machine(_Record):
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
     feed_max            : largest feed along the path [mm/s], or None
+    feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
     """
@@ -99,12 +114,14 @@ class Machine(_Record):
     path_control: Literal["blend", "exact_path", "exact_stop"] = "blend"
     axes: dict[str, Axis]
     feed_max: Positive | None = None
+    feed_default: Positive | None = None
     normal_acceleration: Positive | None = None
     blend_rapids: bool = False
     fir: Fir | None = None
     modes: tuple[Mode, ...] = ()
     plotter: Plotter | None = None
-    tools: dict[str, Finite] = {}
+    dialect: DialectData | None = None
+    tools: dict[str, ToolData] = {}
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}
     _own: tuple[OwnLimit, ...] = PrivateAttr(default=())
@@ -120,6 +137,14 @@ class Machine(_Record):
             if letter not in axes:
                 raise ValueError(f"axis '{letter}' is missing; write a table [axes.{letter}]")
         return {letter: axes[letter] for letter in known if letter in axes}
+
+    @field_validator("tools", mode="before")
+    @classmethod
+    def _lengths_alone(cls, tools: object) -> object:
+        """A number alone is a tool's length."""
+        if not isinstance(tools, dict):
+            return tools
+        return {n: {"length": t} if isinstance(t, int | float | str) else t for n, t in tools.items()}
 
     @model_validator(mode="after")
     def _names_known(self) -> Machine:

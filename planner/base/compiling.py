@@ -12,7 +12,7 @@ optimises each of these by itself, turns each into machine code, and makes an en
   garbage     is not collected meanwhile
 
 Numbers are in docs/speed.md. The replacements work while a root is compiled, and numba is as it was afterwards. They reach into
-numba: with a version that they are not tested with, kernels are compiled as numba does it, and only the first run takes longer.
+numba, and are used with the versions only that they are tested with (kernels.py).
 """
 
 from __future__ import annotations
@@ -25,26 +25,19 @@ from contextlib import contextmanager
 from typing import Any
 
 import numba
-from numba.core import codegen, compiler, config, registry, targetconfig, types
+from numba.core import codegen, compiler, registry, targetconfig, types
 from numba.core.types import functions
-from numba.extending import typeof_impl
 
-FIRST, LAST = (0, 60), (0, 68)  # versions of numba that the tests have run with
+from planner.base.kept import Kept
+
 ENTRIES = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 _environments: dict[str, Any] = {}  # of what is compiled inside roots, until a root has their place
 _by_function: weakref.WeakKeyDictionary[Any, dict[Any, Any]] = weakref.WeakKeyDictionary()
 
 
-def known_numba() -> bool:
-    """Whether numba is of a version that is compiled with as the module text says."""
-    return FIRST <= tuple(int(part) for part in numba.__version__.split(".")[:2]) <= LAST
-
-
 def root(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
     """The kernel of a function, with these settings of `numba.njit`."""
-    if not known_numba() or getattr(config, "DISABLE_JIT", False):
-        return numba.njit(**settings)(function)
     made = numba.njit(pipeline_class=_RootCompiler, **{"no_cfunc_wrapper": True, **settings})(function)
     made._compiler = _Compiler(made._compiler)
     made.inside_others = inside = numba.njit(**{**settings, **ENTRIES})(function)
@@ -59,10 +52,26 @@ def _without_values(numba_s: Callable[..., Any], args: Any, kws: Any) -> Any:
     )
 
 
-@typeof_impl.register(registry.CPUDispatcher)
-def _kernel_inside_another(kernel: Any, _: Any) -> Any:
-    """The type of a kernel that another one calls."""
-    return types.Dispatcher(getattr(kernel, "inside_others", kernel))
+def type_inside(kernel: Any) -> Any:
+    """numba's type of a kernel that another one calls."""
+    return types.Dispatcher(kernel.dispatcher.inside_others)
+
+
+def compiled(dispatcher: Any, args: tuple[Any, ...]) -> Any:
+    """numba's result of compiling for arguments of the types of these. Raises numba's errors."""
+    signature = tuple(dispatcher.typeof_pyval(value) for value in args)
+    dispatcher.compile(signature)
+    return dispatcher.overloads[signature]
+
+
+def to_keep(made: Any) -> Kept:
+    """What of numba's result is kept."""
+    environments = [made.environment, *made._find_referenced_environments()]
+    return Kept(
+        made.fndesc.llvm_cpython_wrapper_name,
+        [(of.env_name, of.globals.get("__name__", ""), list(of.consts)) for of in environments],
+        made.library._get_compiled_object(),
+    )
 
 
 class _Inner(codegen.JITCodeLibrary):

@@ -1,27 +1,39 @@
-"""numba's `njit` with a cache that may fail: `from planner.base.kernels import njit` instead of `from numba import njit`.
+"""numba's `njit` for the planner's kernels: `from planner.base.kernels import njit` instead of `from numba import njit`.
 
-Compiled kernels are kept on disk, beside the package or, where that is read-only, in the user's cache directory. numba refuses to start
-where neither can be written, and fails where the disk is full. A kernel that cannot be kept is compiled again by the next run, which
-takes a minute for all of them, and is nothing to fail for: one warning says so.
+A kernel is a function that is compiled when it is first called with arguments of some types, and kept on the disk (kept.py). From
+then on it comes from there without numba, which takes longer to import than a small plan to make (linking.py). How a kernel is compiled
+is in compiling.py.
 
-How a kernel is compiled is in compiling.py. numba itself is imported with the first kernel.
+A kernel that cannot be kept, because no directory can be written or the disk is full, is compiled again by the next run, which takes a
+minute for all of them, and is nothing to fail for: one warning says so. With a version of numba that the tests have not run with,
+kernels are numba's own, and kept where numba keeps them.
 """
 
 from __future__ import annotations
 
+import functools
+import inspect
+import os
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cached_property
 from typing import Any
 
-from planner.base.loading import load_kernel
+import numpy as np
 
-# What reading an index raises that another version of the package has written: it names the classes of the kernels' arguments, and
-# those may have gone since. numba reads the whole index before it looks whether it is out of date.
-_OUT_OF_DATE = (AttributeError, ImportError)
+from planner.base import kept
+
+FIRST, LAST = (0, 60), (0, 68)  # versions of numba that the tests have run with
+# What numba's type of an array depends on besides its dtype and dimensions: bits of `flags.num` for contiguous in C's and in Fortran's
+# order, aligned, writable.
+_LAYOUT = 0x0001 | 0x0002 | 0x0100 | 0x0400
+# Arguments whose type says all of numba's type; numbers of NumPy's are told by their dtype.
+_SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "none", str: "str"}
 
 _told: Callable[[bool], None] | None = None
 _warned = False
+_one_at_a_time = threading.RLock()
 
 
 class KernelCacheWarning(UserWarning):
@@ -34,76 +46,155 @@ def at_compilation(tell: Callable[[bool], None] | None) -> None:
     _told = tell
 
 
+def known_numba() -> bool:
+    """Whether numba is of a version that the tests have run with."""
+    return FIRST <= tuple(int(part) for part in kept.numba_version().split(".")[:2]) <= LAST
+
+
 def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]], Any]:
     """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is possible."""
-    from planner.base.compiling import root
 
-    def compiled(function: Callable[..., Any]) -> Any:
-        dispatcher = root(function, settings)
-        if cache and hasattr(dispatcher, "enable_caching"):  # a plain function with NUMBA_DISABLE_JIT
-            dispatcher._cache = _Cache(function)
-        return dispatcher
+    def made(function: Callable[..., Any]) -> Any:
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+            return function
+        if known_numba():
+            return Kernel(function, settings, cache)
+        return _numba_s_own(function, settings, cache)
 
-    return compiled
+    return made
 
 
-class _Cache:
-    """The cache of one kernel: numba's, without its OSErrors, and made when the kernel is first called: a plan calls 30 of 190, and
-    numba tries for each whether its directory can be written."""
+class Kernel:
+    """A compiled function."""
 
-    def __init__(self, function: Callable[..., Any]):
-        self._function = function
+    def __init__(self, function: Callable[..., Any], settings: dict[str, Any], cache: bool):
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self.compiled = self.loaded = 0  # for how many types of arguments: here, and before
+        self._settings, self._cache = settings, cache
+        self._made: dict[Hashable, Callable[..., Any]] = {}
+        self._arguments = function.__code__.co_argcount
 
-    @cached_property
-    def _numba_s(self) -> Any:
-        from numba.core.caching import FunctionCache, NullCache
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        if named or len(args) != self._arguments:
+            bound = inspect.signature(self.py_func).bind(*args, **named)
+            bound.apply_defaults()
+            args = bound.args
+        kind = tuple([_kind(value) for value in args])
+        found = self._made.get(kind)
+        if found is None:
+            found = self._found(args, kind)
+        return found(*args)
 
+    def _found(self, args: tuple[Any, ...], kind: tuple[Hashable, ...]) -> Callable[..., Any]:
+        """The compiled function for arguments of a kind, from the disk if it is there."""
+        with _one_at_a_time:
+            if kind in self._made:
+                return self._made[kind]
+            if _other in _flat(kind):
+                return self.dispatcher  # numba knows what these are, or says that it does not
+            where = kept.place(self.py_func, self.content, kind) if self._cache else None
+            found = self._loaded(where) if where is not None else None
+            if found is None:
+                if _told is not None:
+                    _told(where is not None and _can_be_kept)
+                found = self._compiled(args, where)
+            self._made[kind] = found
+            return found
+
+    def _loaded(self, where: kept.Place) -> Callable[..., Any] | None:
         try:
-            return FunctionCache(self._function)
-        except (RuntimeError, OSError) as fault:  # "no locator available"
+            kernel = kept.read(where)
+        except OSError as fault:
             _warn(fault)
-            return NullCache()
+            return None
+        if kernel is None:
+            return None
+        from planner.base.linking import linker
 
-    @cached_property
-    def _kept(self) -> bool:
-        return type(self._numba_s).__name__ != "NullCache"
-
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        try:
-            found = load_kernel(self._numba_s, signature, context)
-        except (OSError, EOFError) as fault:
-            self._failed(fault)
-            found = None
-        except _OUT_OF_DATE:
-            found = None
-            self._forget()
-        if found is None and _told is not None:
-            _told(self._kept)
+        found = linker().function(kernel, self.py_func)
+        self.loaded += 1
         return found
 
-    def save_overload(self, signature: Any, made: Any) -> None:
-        try:
-            self._numba_s.save_overload(signature, made)
-        except (OSError, *_OUT_OF_DATE) as fault:
-            self._failed(fault)
+    def _compiled(self, args: tuple[Any, ...], where: kept.Place | None) -> Callable[..., Any]:
+        from planner.base.compiling import compiled, to_keep
 
-    def _forget(self) -> None:
-        """Empty the index of a kernel."""
-        try:
-            self._numba_s.flush()
-        except OSError as fault:
-            self._failed(fault)
+        made = compiled(self.dispatcher, args)
+        self.compiled += 1
+        if where is not None:
+            try:
+                kept.write(where, to_keep(made))
+            except OSError as fault:
+                _warn(fault)
+        return made.entry_point
 
-    def _failed(self, fault: Exception) -> None:
-        self._kept = False
+    @cached_property
+    def content(self) -> bytes:
+        """A digest of what it computes; itself inside, a kernel is known by its name."""
+        vars(self)["content"] = self.__qualname__.encode()
+        return kept.content_of(self.py_func, self._settings, _content)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """numba's object that compiles it."""
+        from planner.base.compiling import root
+
+        return root(self.py_func, self._settings)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """numba's type of it, when another kernel calls it."""
+        from planner.base.compiling import type_inside
+
+        return type_inside(self)
+
+
+def _content(value: Any) -> bytes | None:
+    return value.content if isinstance(value, Kernel) else None
+
+
+class _Other:
+    """The kind of an argument whose numba type is not known here."""
+
+
+_other = _Other()
+
+
+def _kind(value: Any) -> Hashable:
+    """What numba's type of an argument depends on."""
+    of = type(value)
+    if of is np.ndarray:
+        return value.dtype, value.ndim, value.flags.num & _LAYOUT
+    if of in _SCALARS:
+        return _SCALARS[of]
+    if isinstance(value, tuple):
+        parts = tuple([_kind(part) for part in value])
+        return parts if of is tuple else (of, parts)
+    if isinstance(value, np.generic):
+        return value.dtype
+    return _other
+
+
+def _flat(kind: Hashable) -> list[Hashable]:
+    return [part for own in kind for part in _flat(own)] if isinstance(kind, tuple) else [kind]
+
+
+def _numba_s_own(function: Callable[..., Any], settings: dict[str, Any], cache: bool) -> Any:
+    import numba
+
+    try:
+        return numba.njit(cache=cache, **settings)(function)
+    except RuntimeError as fault:  # no directory can be written
         _warn(fault)
+        return numba.njit(**settings)(function)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._numba_s, name)
+
+_can_be_kept = True
 
 
 def _warn(fault: Exception) -> None:
-    global _warned
+    global _warned, _can_be_kept
+    _can_be_kept = False
     if not _warned:
         _warned = True
         said = getattr(fault, "strerror", None) or str(fault).partition(" for file ")[0]

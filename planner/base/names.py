@@ -74,28 +74,28 @@ OF_SHAPES = ("geometry", "corner", "effort", "rounds", "shaped")
 
 def method_name(name: str) -> str:
     """The method's present name. Raises InputError for a name that is neither a method nor an alias."""
-    return _known("method", METHOD_ALIASES.get(name, name), METHODS, METHOD_ALIASES)
+    return known_name("method", METHOD_ALIASES.get(name, name), METHODS, METHOD_ALIASES)
 
 
 def solver_name(name: str) -> str:
     """The name of a solver, as it is. Raises InputError for a name that no method has."""
-    return _known("solver", name, SOLVERS)
+    return known_name("solver", name, SOLVERS)
 
 
 def geometry_name(name: str) -> str:
     """The name of a geometry, as it is. Raises InputError for another name."""
-    return _known("geometry", name, GEOMETRIES)
+    return known_name("geometry", name, GEOMETRIES)
 
 
 def effort_name(name: str) -> str:
     """The name of an effort, as it is. Raises InputError for another name."""
-    return _known("effort", name, EFFORTS)
+    return known_name("effort", name, EFFORTS)
 
 
 def corner_name(name: str) -> str:
     """The name of a corner shape, or `auto` or `spline`, which are geometries and were corners in earlier versions. Raises InputError
     for another name."""
-    return name if name in (AUTO, SPLINE) else _known("corner shape", name, CORNER_SHAPES)
+    return name if name in (AUTO, SPLINE) else known_name("corner shape", name, CORNER_SHAPES)
 
 
 def users_of(setting: str) -> tuple[str, ...]:
@@ -130,7 +130,8 @@ def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None
     return SINGLE_CORNERS, corner
 
 
-def _known(kind: str, name: str, names: Iterable[str], aliases: Iterable[str] = ()) -> str:
+def known_name(kind: str, name: str, names: Iterable[str], aliases: Iterable[str] = ()) -> str:
+    """The name, as it is. Raises InputError if it is none of `names`, with one that is near among them and their aliases."""
     if name in (known := tuple(names)):
         return name
     near = difflib.get_close_matches(name, (*known, *aliases), n=1)

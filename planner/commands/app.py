@@ -7,10 +7,13 @@ from typing import Annotated
 import typer
 
 from planner.commands.compare import compare_command
+from planner.commands.expand import expand_command
+from planner.commands.export import export_command
 from planner.commands.info import info_command
-from planner.commands.machine import init_file, list_machines, show_machine
+from planner.commands.machine import import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
 from planner.commands.pulses import pulses_command
+from planner.commands.report import report_command
 from planner.commands.verify import verify_command
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
@@ -47,7 +50,10 @@ for name, command in {
     "compare": compare_command,
     "verify": verify_command,
     "info": info_command,
+    "expand": expand_command,
     "pulses": pulses_command,
+    "export": export_command,
+    "report": report_command,
 }.items():
     app.command(name)(command)
 
@@ -55,4 +61,5 @@ machine_app = typer.Typer(help="Machine files.", no_args_is_help=True, rich_mark
 machine_app.command("list")(list_machines)
 machine_app.command("show")(show_machine)
 machine_app.command("init")(init_file)
+machine_app.command("import")(import_file)
 app.add_typer(machine_app, name="machine")

@@ -19,6 +19,7 @@ from planner.commands.options import (
     QuietOption,
     ThreadsOption,
     ToleranceOption,
+    takes_reading,
 )
 from planner.commands.terminal import (
     BAD_INPUT,
@@ -30,6 +31,7 @@ from planner.commands.terminal import (
     say,
     show,
 )
+from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
     from planner.machine import Machine
@@ -40,6 +42,7 @@ ALL = "all"
 
 
 @guarded
+@takes_reading
 def compare_command(
     job: Job,
     machine: MachineOption = None,
@@ -56,6 +59,8 @@ def compare_command(
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Plan a program with several methods and compare cycle times, limits, errors and verdicts.
 
@@ -75,7 +80,7 @@ def compare_command(
     if output is not None:
         check_comparison_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     limits = load_machine(machine or DEFAULT_MACHINE)
-    program = read_program(job, limits)
+    program = read_program(job, limits, reading)
     rows = [_run(name, program, limits, tolerance, quiet) for name in methods]
     about = about_job(str(job), limits, tolerance)
     if output is not None:

@@ -1,8 +1,8 @@
 """The first run on a machine: a second process compiles what the first one will need later.
 
 Compiling is nearly all of a first run, and numba compiles one kernel at a time. So as soon as `planner plan` finds a kernel that is
-not compiled yet, it starts another Python, which plans a program of three lines, on corners that need no splines: so it comes to path,
-feedrate, samples and verdict while the command itself compiles the reading, the geometry and the splines.
+not compiled yet, it starts another Python, which plans three lines that need not be read, on corners that need no splines: so it comes
+to geometry, path, feedrate, samples and verdict while the command itself compiles the reading and the splines.
 Both keep their kernels in the same place, on disk, and each loads what it finds there. Neither waits for the other, so that nothing is
 lost where the second process fails or is not started: with one core, or where kernels cannot be kept.
 """
@@ -22,8 +22,10 @@ from planner.base.threads import cores
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
+    from planner.nc.program import Program
 
-PROGRAM = "G21 G90 G64\nG1 X1 F600\nY1\nX2\nM2\n"
+POINTS = ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (2.0, 1.0, 0.0))  # [mm]
+FEED = 10.0  # [mm/s]
 # Plans (method, geometry) that another process makes beside a plan of a method, the first ones first.
 BESIDE: dict[str, tuple[tuple[str, str | None], ...]] = {
     method: ((method, SINGLE_CORNERS),) for method in (OPTIMAL, SECOND_ORDER)
@@ -68,13 +70,36 @@ def compile_beside(machine: str, method: str) -> list[Plan]:
     """Make the plans of `BESIDE`."""
     from planner.machine import load_machine
     from planner.methods.registry import plan
-    from planner.nc.reader import parse_program
 
-    limits = load_machine(machine)
-    program = parse_program(PROGRAM, limits)
+    limits, program = load_machine(machine), three_lines()
     return [
         plan(program, limits, method=name, geometry=geometry) for name, geometry in BESIDE.get(method, OTHERS)
     ]
+
+
+def three_lines() -> Program:
+    """G1 moves through `POINTS`, from the origin."""
+    import numpy as np
+
+    from planner.nc.program import Kind, PathControl, Program
+
+    count = len(POINTS)
+    return Program(
+        source="three lines",
+        axes=("x", "y", "z"),
+        start=np.zeros(3),
+        kind=np.full(count, Kind.LINE),
+        end=np.array(POINTS),
+        feed=np.full(count, FEED),
+        dwell=np.zeros(count),
+        line=np.arange(1, count + 1),
+        path_control=np.full(count, PathControl.BLEND),
+        tolerance=np.full(count, np.nan),
+        arc_block=np.zeros(0),
+        arc_center=np.zeros((0, 3)),
+        arc_normal=np.zeros(0),
+        arc_sweep=np.zeros(0),
+    )
 
 
 def _end_with_the_first() -> None:

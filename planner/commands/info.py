@@ -6,19 +6,23 @@ import json
 
 import typer
 
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption
+from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption, takes_reading
 from planner.commands.terminal import BAD_INPUT, guarded, say, show
+from planner.nc.reading import Reading
 
 
 @guarded
-def info_command(job: Job, machine: MachineOption = None, as_json: JsonOption = False) -> None:
+@takes_reading
+def info_command(
+    job: Job, machine: MachineOption = None, as_json: JsonOption = False, *, reading: Reading
+) -> None:
     """Show what a program contains, and the line of every construct that is not supported."""
     from planner.machine import load_machine
     from planner.nc.info import inspect_program
     from planner.report.export import info_summary
     from planner.report.tables import info_table
 
-    found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE))
+    found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE), reading)
     if as_json:
         say(json.dumps(info_summary(found), indent=2, allow_nan=False))
     else:

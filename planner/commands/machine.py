@@ -34,6 +34,78 @@ def init_file(file: Annotated[Path, typer.Argument(metavar="FILE", help="file to
     from importlib import resources
 
     text = (resources.files("planner") / "templates" / "machine.toml").read_text(encoding="utf-8")
+    _write_new(file, text)
+    say(f"{file} written; plan with: planner plan JOB -m {file}")
+
+
+@guarded
+def import_file(
+    settings: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SETTINGS",
+            help="LinuxCNC's INI file, what $$ of grbl or M503 of Marlin printed, or Klipper's printer.cfg",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="machine file to write (.toml)")
+    ],
+    control: Annotated[
+        str | None,
+        typer.Option(
+            "--control", metavar="NAME", help="linuxcnc, grbl, klipper or marlin, where it is not recognised"
+        ),
+    ] = None,
+    ramp_time: Annotated[
+        float | None,
+        typer.Option(
+            "--ramp-time",
+            metavar="S",
+            help="time in which an axis builds up its acceleration [s], for jerks that the control does not know (default 0.04)",
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", metavar="MM", help="contour tolerance [mm]")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="AXIS.LIMIT=VALUE",
+            help="a limit in mm and s, such as z.jerk=1e4; repeat it for more",
+        ),
+    ] = None,
+) -> None:
+    """Make a machine file from the settings of a control, and say what they leave open."""
+    from planner.machine_import.convert import RAMP_TIME, import_machine
+
+    imported = import_machine(
+        settings,
+        control=control,
+        ramp_time=RAMP_TIME if ramp_time is None else ramp_time,
+        tolerance=tolerance,
+        given=_limits_given(set_ or []),
+    )
+    _write_new(output, imported.text)
+    for sentence in imported.assumed:
+        say(f"note: {sentence}")
+    say(f"{output} written; plan with: planner plan JOB -m {output}")
+
+
+def _limits_given(texts: list[str]) -> dict[str, float]:
+    """Limits by name, as `--set` has them. Raises InputError for what is no name and number."""
+    given = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            given[name.strip().removeprefix("axes.")] = float(value)
+        except ValueError:
+            raise InputError(f"--set {text}: write a limit and its value, such as z.jerk=1e4") from None
+    return given
+
+
+def _write_new(file: Path, text: str) -> None:
+    """Write a file that does not exist yet. Raises InputError if it does, or cannot be written."""
     try:
         with file.open("x", encoding="utf-8") as stream:
             stream.write(text)
@@ -43,4 +115,3 @@ def init_file(file: Annotated[Path, typer.Argument(metavar="FILE", help="file to
         ) from None
     except OSError as fault:
         raise InputError(f"cannot be written: {fault.strerror}", source=str(file)) from fault
-    say(f"{file} written; plan with: planner plan JOB -m {file}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
@@ -11,6 +13,7 @@ import typer
 
 from planner.base import names
 from planner.base.errors import InputError
+from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore_list
 
 DEFAULT_MACHINE = "mill"
 
@@ -114,3 +117,79 @@ ThreadsOption = Annotated[
 ]
 QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="print no progress")]
 ForceOption = Annotated[bool, typer.Option("--force", help="also overwrite files that planner did not write")]
+
+
+def _one_of(allowed: tuple[str, ...]) -> Callable[[str], str]:
+    def check(text: str) -> str:
+        if text not in allowed:
+            raise InputError(f"'{text}' is not known; allowed are {', '.join(allowed)}")
+        return text
+
+    return check
+
+
+# The settings of the reader as options: name and type of the field of `Reading`, and the option.
+_READING: dict[str, tuple[Any, Any]] = {
+    "strict": (bool, typer.Option("--strict", help="refuse whatever would be assumed in the program")),
+    "ignore": (
+        str,
+        typer.Option(
+            "--ignore",
+            metavar="CODE,...",
+            help="leave out what you know to be harmless: codes, axes, commands, such as M428,G187,A,$X",
+        ),
+    ),
+    "arc_centres": (
+        str,
+        _choice(
+            "--arc-centres",
+            _one_of(ARC_CENTRES),
+            "what I J K mean in a program without G90.1 and G91.1; auto: by what closes its arcs",
+            "|".join(ARC_CENTRES),
+        ),
+    ),
+    "extruder": (
+        str,
+        _choice(
+            "--extruder",
+            _one_of(EXTRUDERS),
+            "what to do with the E words of a 3-D printer",
+            "|".join(EXTRUDERS),
+        ),
+    ),
+    "dialect": (
+        str,
+        _choice(
+            "--dialect",
+            _one_of(DIALECTS),
+            "whose language parameters, expressions and subprograms are; auto: by what the program holds",
+            "|".join(DIALECTS),
+        ),
+    ),
+}
+
+
+def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of the reader; it gets them as one argument, `reading`."""
+    usual = Reading()
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> None:
+        given = {name: kwargs.pop(name) for name in _READING}
+        given["ignore"] = ignore_list(given["ignore"])
+        command(*args, reading=Reading(**given), **kwargs)
+
+    own = inspect.signature(command, eval_str=True)
+    options = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default="" if name == "ignore" else getattr(usual, name),
+            annotation=Annotated[kind, option],
+        )
+        for name, (kind, option) in _READING.items()
+    ]
+    parameters = [p for p in own.parameters.values() if p.name != "reading"] + options
+    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run

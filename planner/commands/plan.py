@@ -27,13 +27,16 @@ from planner.commands.options import (
     SolverOption,
     ThreadsOption,
     ToleranceOption,
+    takes_reading,
 )
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.nc.reading import Reading
 
 NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 
 
 @guarded
+@takes_reading
 def plan_command(
     job: Job,
     machine: MachineOption = None,
@@ -71,6 +74,9 @@ def plan_command(
         typer.Option("--format", help=f"format of the trajectory in DIR (default: {Format.parquet})"),
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="write pictures into DIR (PNG)")] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="write a page into DIR that opens in a browser (report.html)")
+    ] = False,
     corners: Annotated[
         bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18-20")
     ] = False,
@@ -86,10 +92,14 @@ def plan_command(
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
     force: ForceOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Plan the motion of a program, sample it and verify it."""
     if plot and output is None:
         raise InputError("--plot writes its pictures into the output directory: name one with -o DIR")
+    if report and output is None:
+        raise InputError("--report writes its page into the output directory: name one with -o DIR")
     if file_format is not None and output is None:
         raise InputError(
             "--format is the format of the trajectory in the output directory: name one with -o DIR"
@@ -102,7 +112,7 @@ def plan_command(
     form = file_format or Format.parquet
     if output is not None:
         inputs = [job, Path(machine or DEFAULT_MACHINE)]
-        check_places(output, inputs, file_format=form.value, plots=plot, force=force)
+        check_places(output, inputs, file_format=form.value, plots=plot, force=force, report=report)
     if trace is not None:
         trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
@@ -121,13 +131,16 @@ def plan_command(
             solver=solver,
             shaped=shaped,
             tolerance=tolerance,
+            reading=reading,
             progress=progress,
             log=steps if verbose or trace is not None else None,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)
-            written = write_plan(result, output, file_format=form.value, plots=plot, force=force)
+            written = write_plan(
+                result, output, file_format=form.value, plots=plot, report=report, force=force
+            )
 
     if trace is not None:
         trace_file.write_trace(trace, steps, result)

@@ -1,7 +1,8 @@
 """`planner verify`: judge a trajectory file.
 
 The command line says what to judge it against. Without -m and --tolerance a file that `plan` wrote is judged with its own machine and
-tolerance, and the output says so. With -m the tolerance is that of the machine, unless the program (G64 P) or --tolerance sets another.
+tolerance, and its program is read as it was for the plan, unless the command line has settings of the reader; the output says so. With
+-m the tolerance is that of the machine, unless the program (G64 P) or --tolerance sets another.
 Limits that a file declares as not kept are reported, and judged all the same.
 """
 
@@ -16,8 +17,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, QuietOption, ToleranceOption
+from planner.commands.options import (
+    DEFAULT_MACHINE,
+    Job,
+    JsonOption,
+    QuietOption,
+    ToleranceOption,
+    takes_reading,
+)
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.nc.reading import AS_USUAL, Reading
 
 if TYPE_CHECKING:
     from planner.machine import Machine
@@ -25,6 +34,7 @@ if TYPE_CHECKING:
 
 
 @guarded
+@takes_reading
 def verify_command(
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
@@ -49,6 +59,8 @@ def verify_command(
     ] = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.geometry.build import toolpath_from_program
@@ -68,7 +80,9 @@ def verify_command(
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)
     taken = says.tolerance if machine is None and tolerance is None else None
-    toolpath = toolpath_from_program(read_program(job, limits), limits, tolerance if taken is None else taken)
+    as_planned = reading == AS_USUAL
+    program = read_program(job, limits, says.reading if as_planned else reading)
+    toolpath = toolpath_from_program(program, limits, tolerance if taken is None else taken)
     if not len(toolpath):
         raise InputError("the program moves nothing: there is nothing to judge", source=str(job))
     motion, given, fitted = fit_axes(read.trajectory, read.given, toolpath)
@@ -82,7 +96,7 @@ def verify_command(
             progress=lambda fraction: progress("verify", fraction),
         )
     notes = [*read.notes, *fitted, *verdict.notes]
-    notes += [f"the file says: {text}" for text in says.sentences(from_file, taken is not None)]
+    notes += [f"the file says: {text}" for text in says.sentences(from_file, taken is not None, as_planned)]
     notes += says.remedies(verdict, unjudged)
     budgets = toolpath.tolerance
     if as_json:
@@ -124,11 +138,13 @@ class FileSays:
     machine     : its machine, as in a machine file, or None
     tolerance   : the tolerance it was planned with [mm], or None
     not_limited : quantities that its plan did not limit
+    reading     : how its program was read
     """
 
     machine: dict[str, Any] | None
     tolerance: float | None
     not_limited: tuple[str, ...]
+    reading: Reading = AS_USUAL
 
     @classmethod
     def of(cls, metadata: dict[str, Any]) -> FileSays:
@@ -142,9 +158,10 @@ class FileSays:
             not_limited=tuple(name for name in free if isinstance(name, str))
             if isinstance(free, list)
             else (),
+            reading=Reading.saved(metadata.get("reading")),
         )
 
-    def sentences(self, machine_taken: bool, tolerance_taken: bool) -> list[str]:
+    def sentences(self, machine_taken: bool, tolerance_taken: bool, reading_taken: bool) -> list[str]:
         """What the file says, and whether it was used."""
         said = []
         if self.machine is not None:
@@ -153,6 +170,10 @@ class FileSays:
         if self.tolerance is not None:
             taken = "taken" if tolerance_taken else "not taken, -m or --tolerance is given"
             said.append(f"tolerance {self.tolerance:g} mm ({taken})")
+        if self.reading != AS_USUAL:
+            taken = "taken" if reading_taken else "not taken, the command line has its own"
+            settings = ", ".join(f"{name} {value}" for name, value in self.reading.changed().items())
+            said.append(f"program read with {settings} ({taken})")
         if self.not_limited:
             said.append(
                 f"not limited: {', '.join(self.not_limited)} (judged all the same, unless --not-limited)"

@@ -6,6 +6,7 @@ parameters of its shape, what it uses of the tolerance, and the normal accelerat
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -135,6 +136,18 @@ class SmoothPath:
         """(R+1,) turning angle at each joint [rad]."""
         return self.toolpath.theta[self.legs.first]
 
+    def part(self, pieces: Array) -> SmoothPath:
+        """Some pieces (G,) between full stops one after the other, of a path without splines."""
+        if len(self.spline):
+            raise ValueError("SmoothPath.part: of a path without splines only")
+        stop = np.flatnonzero(self.joint == Joint.STOP)
+        legs = np.repeat(pieces, np.diff(stop))
+        joints = np.append(True, legs)  # with the joint behind each leg
+        toolpath = self.toolpath.part(np.repeat(legs, np.diff(self.legs.first)))
+        columns = {name: getattr(self, name)[joints] for name in ("joint", "d", "params", "scale")}
+        columns |= {name: getattr(self, name)[joints] for name in ("tol", "tol_ap", "normal_max")}
+        return dataclasses.replace(self, toolpath=toolpath, legs=legs_of(toolpath), **columns)
+
 
 def round_corners(
     toolpath: Toolpath,
@@ -156,7 +169,7 @@ def round_corners(
     at = legs.first
     joint = toolpath.joint[at].copy()
     if blend_tangents:
-        joint[(joint == Joint.SMOOTH) & _curvature_jumps(toolpath, at)] = Joint.CORNER
+        joint[(joint == Joint.SMOOTH) & curvature_jumps(toolpath, at)] = Joint.CORNER
     blend = joint == Joint.CORNER
     theta, tol = toolpath.theta[at], toolpath.tolerance[at]
     sin_half = np.sin(theta / 2)
@@ -216,9 +229,9 @@ def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
     return scale
 
 
-def _curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
+def curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
     """(R+1,) True where the curvature vector differs across the joints `at`."""
-    arcs = toolpath.arcs
+    arcs, curve = toolpath.arcs, np.flatnonzero(toolpath.curve >= 0)
     size = arcs.radius * arcs.rate**2
     angle = arcs.rate * toolpath.length[toolpath.arc >= 0]
     vectors = np.zeros((2, *toolpath.start.shape))  # at the start and at the end of every segment
@@ -227,6 +240,9 @@ def _curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
     vectors[1, curved] = -size[:, None] * (
         np.cos(angle)[:, None] * arcs.e1 + np.sin(angle)[:, None] * arcs.e2
     )
+    row, length = toolpath.curve[curve], toolpath.length[curve]
+    vectors[0, curve] = toolpath.curves.at(row, length, np.zeros(len(row)))[:, 2]
+    vectors[1, curve] = toolpath.curves.at(row, length, length)[:, 2]
     before, after = _neighbours(at, len(toolpath))
     jump = np.linalg.norm(vectors[0, after] - vectors[1, before], axis=1)
     return jump > SAME_CURVATURE * np.maximum(toolpath.curvature[before], toolpath.curvature[after])

@@ -19,9 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.rows import duration
 from planner.feedrate.solution import FeedrateSolution
 
@@ -35,21 +36,6 @@ class Lagrangian:
     acceleration: FloatArray
     jerk: FloatArray
     feed_sq_max: FloatArray
-
-
-class _Rows(NamedTuple):
-    """The problem at P points and A axes."""
-
-    ds: FloatArray  # (P,) of the interval behind each point
-    interval: Array  # (P,) False where there is none
-    x_max: FloatArray  # (P,)
-    d1: FloatArray  # (P, A), like the rest
-    d2_left: FloatArray
-    d2_right: FloatArray
-    d3_left: FloatArray
-    d3_right: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
 
 
 class _Profile(NamedTuple):
@@ -69,18 +55,6 @@ def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangi
     found = solution.multipliers
     if found is None:
         raise ValueError(f"lagrangian: {solution.solver} gives no multipliers")
-    rows = _Rows(
-        ds=np.diff(problem.s, append=problem.s[-1]),
-        interval=problem.interval,
-        x_max=problem.feed_sq_limit,
-        d1=problem.d1,
-        d2_left=problem.d2_left,
-        d2_right=problem.d2_right,
-        d3_left=problem.d3_left,
-        d3_right=problem.d3_right,
-        acceleration=acceleration_limits(problem),
-        jerk=problem.jerk_limit,
-    )
     profile = _Profile(
         x=solution.feed_sq,
         u=solution.acc_s,
@@ -89,33 +63,26 @@ def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangi
         feed=found.feed,
         pi=found.dynamics,
     )
-    value, of_acceleration, of_jerk, of_feed = _lagrangian(rows, profile)
+    value, of_acceleration, of_jerk, of_feed = _lagrangian(columns_of(problem), problem.interval, profile)
     return Lagrangian(value=value, acceleration=of_acceleration, jerk=of_jerk, feed_sq_max=of_feed)
 
 
-def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
-    """(P, A) axis accelerations at each point less the larger margin of the intervals at both sides of each point [mm/s2]."""
-    margin = problem.margin.copy()
-    margin[problem.piece[1:] - 1] = 0.0
-    before = np.concatenate([[0.0], margin[:-1]])
-    return problem.acceleration_limit * (1.0 - np.maximum(margin, before))[:, None]
-
-
 @njit(cache=True, error_model="numpy")
-def _lagrangian(problem, profile):
-    """Fields of `Lagrangian`, in their order."""
-    ds, interval, x_max, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk = problem
+def _lagrangian(columns, interval, profile):
+    """Fields of `Lagrangian`, in their order; interval (P,) is False behind the last point of a piece."""
+    _, s, x_max, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk = columns
     x, u, p, rows, feed, pi = profile
     points, axes = d1.shape
     value, of_feed = np.zeros(points), np.zeros(points)
     of_acceleration, of_jerk = np.zeros(axes), np.zeros(axes)
-    for i in range(len(ds)):
+    for i in range(points):
         if not interval[i]:
             continue
+        ds = s[i + 1] - s[i]
         v0, v1, u1 = np.sqrt(x[i]), np.sqrt(x[i + 1]), u[i] + p[i]
-        h = duration(v0, v1, p[i], ds[i])
+        h = duration(v0, v1, p[i], ds)
         q, j = p[i] * (2.0 * u[i] + p[i]), p[i] / h
-        total = h + pi[i] * (x[i] + (2.0 * u[i] + p[i]) * ds[i] + q * h * h / 12.0 - x[i + 1])
+        total = h + pi[i] * (x[i] + (2.0 * u[i] + p[i]) * ds + q * h * h / 12.0 - x[i + 1])
         for k in range(jerk.shape[1]):
             left = (d1[i, k] * u[i] + d2_right[i, k] * x[i]) / acceleration[i, k]
             right = (d1[i + 1, k] * u1 + d2_left[i + 1, k] * x[i + 1]) / acceleration[i + 1, k]

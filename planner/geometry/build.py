@@ -3,6 +3,9 @@
 A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
 or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
 tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
+
+A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
+the motion goes on as at smooth joints, in exact stop mode too; where the spline itself has a kink there is a corner.
 """
 
 from __future__ import annotations
@@ -13,9 +16,11 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
+from planner.geometry.curves import CHORD_SHARE, CurveSegments, curve_segments
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import Machine
-from planner.nc.program import Kind, PathControl, Program
+from planner.nc.bezier import homogeneous
+from planner.nc.program import MOVES, Kind, PathControl, Program
 
 # Turning angle below which two tangents are the same [rad]. Coordinates of 1e3 mm carry 1e-13 mm of rounding, so a segment of
 # 1e-4 mm has a direction good to 1e-9; at 1e-8 rad the velocity jump is 1e-6 mm/s at 100 mm/s, far below any drive's resolution.
@@ -49,13 +54,22 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     arc_of_block = np.full(len(program), -1, dtype=np.int64)
     arc_of_block[program.arc_block] = np.arange(len(program.arc_block))
     chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    moves = (program.kind == Kind.RAPID) | (program.kind == Kind.LINE) | (program.kind == Kind.ARC)
-    real = moves & ((chord > ZERO_LENGTH) | (arc_of_block >= 0))
-    block = np.flatnonzero(real)
+    moves = np.isin(program.kind, MOVES)
+    of_block = np.full(len(program), tolerance) if tolerance is not None else program.tolerance
+    of_block = np.where(np.isnan(of_block), machine.tolerance, of_block)
+    splines = _curves_of(program, of_block)
+    spline_block = program.splines.block[splines.owner]
+    count = np.where(program.kind == Kind.SPLINE, 0, chord > ZERO_LENGTH).astype(np.int64)
+    count[program.arc_block] = 1
+    np.add.at(count, spline_block, 1)
+    real = count > 0
+    block = np.repeat(np.arange(len(program)), count)  # of each segment
     if not len(block):
         raise InputError("the program moves nowhere: every move ends where it starts", source=program.source)
 
     start, end = position[block], position[block + 1]
+    is_curve = program.kind[block] == Kind.SPLINE
+    start[is_curve], end[is_curve] = splines.ends[:, 0, 0], splines.ends[:, 1, 0]
     arc_row = arc_of_block[block]
     is_arc = arc_row >= 0
     rows = arc_row[is_arc]
@@ -63,10 +77,14 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     arc = np.full(len(block), -1, dtype=np.int64)
     arc[is_arc] = np.arange(len(rows))
     length = chord[block].copy()
-    length[is_arc] = arc_length
+    length[is_arc], length[is_curve] = arc_length, splines.length
     tangent_start, tangent_end = _tangents(start, end, length, arc, arcs)
+    tangent_start[is_curve], tangent_end[is_curve] = splines.ends[:, 0, 1], splines.ends[:, 1, 1]
     curvature = np.zeros(len(block))
     curvature[is_arc] = _curvature_bound(arcs)
+    curvature[is_curve] = np.where(splines.chord, 0.0, splines.curvature)
+    curve = np.full(len(block), -1, dtype=np.int64)
+    curve[is_curve] = np.where(splines.chord, -1, np.arange(len(splines.length)))
 
     theta = np.zeros(len(block) + 1)
     theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
@@ -83,12 +101,14 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         line=program.line[block],
         arc=arc,
         arcs=_of_axes(arcs, axis),
+        curve=curve,
+        curves=dataclasses.replace(splines.curves, points=splines.curves.points[:, :, axis]),
         tangent_start=tangent_start[:, axis],
         tangent_end=tangent_end[:, axis],
         curvature=curvature,
         joint=joint,
         theta=theta,
-        tolerance=_tolerances(program, machine, block, tolerance),
+        tolerance=of_block[np.append(block[:1], block)],
         dwell=dwell,
         zero_length=np.flatnonzero(moves & ~real),
     )
@@ -104,6 +124,7 @@ def _axes_in_use(program: Program, machine: Machine) -> Array:
     moved = (program.end != program.start).any(axis=0)
     for normal in np.unique(program.arc_normal):
         moved[np.arange(len(moved)) != normal] = True
+    moved |= (np.ptp(program.splines.points, axis=1) > 0.0).any(axis=0)
     return np.flatnonzero(moved | [letter in machine.axes for letter in program.axes])
 
 
@@ -130,6 +151,15 @@ def _check_coordinates(program: Program) -> None:
             source=program.source,
             line=int(program.line[block]),
         )
+
+
+def _curves_of(program: Program, tolerance: FloatArray) -> CurveSegments:
+    """The segments of all splines, for tolerances (B,) of the blocks [mm]; pieces that go nowhere are left out."""
+    splines = program.splines
+    goes = np.flatnonzero(np.ptp(splines.points, axis=1).max(axis=1, initial=0.0) > ZERO_LENGTH)
+    near = CHORD_SHARE * tolerance[splines.block[goes]]
+    found = curve_segments(homogeneous(splines.points[goes], splines.weights[goes]), near)
+    return found._replace(owner=goes[found.owner])
 
 
 def _arcs(program: Program, start: FloatArray, end: FloatArray, rows: Array) -> tuple[Arcs, FloatArray]:
@@ -193,22 +223,15 @@ def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
     return feed
 
 
-def _tolerances(program: Program, machine: Machine, block: Array, tolerance: float | None) -> FloatArray:
-    """Budget at each joint: that of the block that ends there."""
-    if tolerance is not None:
-        return np.full(len(block) + 1, tolerance)
-    own = program.tolerance[block]
-    own = np.where(np.isnan(own), machine.tolerance, own)
-    return np.concatenate([own[:1], own])
-
-
 def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray) -> tuple[Array, FloatArray]:
     """Kind and dwell of every joint."""
     joint = np.where(theta < COLLINEAR_ANGLE, Joint.SMOOTH, Joint.CORNER).astype(np.uint8)
     joint[theta > REVERSAL_ANGLE] = Joint.STOP
+    inner = np.flatnonzero((block[1:] == block[:-1]) & (joint[1:-1] == Joint.SMOOTH)) + 1  # of splines
     control = program.path_control[block]
     joint[1:][(control == PathControl.EXACT_PATH) & (joint[1:] == Joint.CORNER)] = Joint.STOP
     joint[1:][control == PathControl.EXACT_STOP] = Joint.STOP
+    joint[inner] = Joint.SMOOTH
     if not machine.blend_rapids:
         rapid = program.kind[block] == Kind.RAPID
         joint[1:-1][rapid[:-1] != rapid[1:]] = Joint.STOP

@@ -1,8 +1,9 @@
-"""Arcs as chords, for motions that consist of straight legs and corners.
+"""Arcs and curves as chords, for motions that consist of straight legs and corners.
 
 A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices rise linearly along arc and
-chord alike. The sagitta is a given fraction of the tolerance of the arc, and is subtracted from the tolerance at the joints of the
-chords: corners rounded inside the polygon then keep the tolerance of the arc.
+chord alike. A chord over h of a curve's parameter stays within b h^2/8 of it, for the largest second derivative b. The sagitta is a
+given fraction of the tolerance of the segment, and is subtracted from the tolerance at the joints of the chords: corners rounded inside
+the polygon then keep the tolerance of the segment.
 """
 
 from __future__ import annotations
@@ -37,24 +38,30 @@ def arc_sagitta(toolpath: Toolpath, fraction: float) -> tuple[Array, FloatArray]
     Returns the number of chords (M,), 1 for lines, and their largest distance from the segment (M,) [mm].
     """
     arcs, curved = toolpath.arcs, toolpath.arc >= 0
+    least = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
     count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
     row = toolpath.arc[curved]
-    budget = fraction * np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved]
+    budget = fraction * least[curved]
     sweep = np.abs(arcs.rate[row]) * toolpath.length[curved]
     count[curved] = np.maximum(1, np.ceil(sweep / chord_angle(arcs.radius[row], budget) * (1.0 - 1e-9)))
     sagitta[curved] = 2.0 * arcs.radius[row] * np.sin(sweep / count[curved] / 4.0) ** 2
+    curve = toolpath.curve >= 0
+    bend, length = toolpath.curvature[curve], toolpath.length[curve]
+    most = np.minimum(np.sqrt(8.0 * fraction * least[curve] / bend), CHORD_ANGLE_MAX / bend)
+    count[curve] = np.maximum(1, np.ceil(length / most))
+    sagitta[curve] = bend * (length / count[curve]) ** 2 / 8.0
     return count, sagitta
 
 
 def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
-    """The same path with its arcs cut into chords.
+    """The same path with its arcs and curves cut into chords.
 
     fraction : sagitta over tolerance, 0 < fraction < 1 [-]
     whole    : (M,) True for arcs that stay arcs and get a full stop at both ends
     """
     count, sagitta = arc_sagitta(toolpath, fraction)
     count[whole], sagitta[whole] = 1, 0.0
-    cut = (toolpath.arc >= 0) & ~whole
+    cut = ~toolpath.straight & ~whole
     segment = np.repeat(np.arange(len(toolpath)), count)
     first = np.cumsum(count) - count
     number = np.arange(len(segment)) - first[segment]  # of a chord within its segment
@@ -62,9 +69,9 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     inner = np.flatnonzero(number > 0)
     at = segment[inner]
     along = toolpath.length[at] * number[inner] / count[at]
-    start[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(toolpath, at, along)
+    start[inner] = points_on(toolpath, at, along)
     end = np.vstack([start[1:], toolpath.end[-1:]])
-    straight = toolpath.arc[segment] < 0
+    straight = toolpath.straight[segment]
     chord = cut[segment]
     length = toolpath.length[segment].copy()
     length[chord] = np.linalg.norm(end - start, axis=1)[chord]
@@ -98,6 +105,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
         block=toolpath.block[segment],
         line=toolpath.line[segment],
         arc=np.where(straight | chord, -1, toolpath.arc[segment]),
+        curve=np.full(len(segment), -1),
         tangent_start=tangent_start,
         tangent_end=tangent_end,
         curvature=np.where(chord, 0.0, toolpath.curvature[segment]),
@@ -113,6 +121,20 @@ def parted_by_feed(toolpath: Toolpath) -> Toolpath:
     same_way = toolpath.joint[1:-1] == Joint.SMOOTH
     change = np.flatnonzero(same_way & (toolpath.feed[1:] != toolpath.feed[:-1])) + 1
     return toolpath.with_joints(change, Joint.CORNER)
+
+
+def points_on(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
+    """(n, A) points [mm] of arcs and curves.
+
+    segment : (n,) the arcs and curves, as segments of the toolpath
+    x       : (n,) their parameters [mm]
+    """
+    on_arc, out = toolpath.arc[segment] >= 0, np.empty((len(segment), len(toolpath.axes)))
+    at = segment[on_arc]
+    out[on_arc] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(toolpath, at, x[on_arc])
+    at = segment[~on_arc]
+    out[~on_arc] = toolpath.curves.at(toolpath.curve[at], toolpath.length[at], x[~on_arc])[:, 0]
+    return out
 
 
 def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:

@@ -1,7 +1,8 @@
-"""Legs: the straight lines and arcs between which corners are rounded.
+"""Legs: the straight lines, arcs and curves between which corners are rounded.
 
-A leg is one arc, or all collinear lines that follow one another. Collinear lines are joined because where a CAM system cut a straight
-line into blocks must not change the motion: a corner may reach back over several short blocks of the same line.
+A leg is one arc, one segment of a curve, or all collinear lines that follow one another. Collinear lines are joined because where a
+CAM system cut a straight line into blocks must not change the motion: a corner may reach back over several short blocks of the same
+line.
 
 The kernels see one numpy record per leg (`leg_dtype`): a single array argument costs numba nothing to pass on, whereas a tuple
 of ten arrays costs ten reference counts per call, measured at 0.25 us against 0.01 us.
@@ -15,6 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
+from planner.geometry.curves import curve_point, curve_tangent
 from planner.geometry.toolpath import Joint, Toolpath
 
 # Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
@@ -53,15 +55,20 @@ class Legs:
 
 
 def leg_dtype(axes: int) -> np.dtype:
-    """Record of one leg over `axes` axes; formulas and meaning of the fields: geometry/toolpath.py."""
+    """Record of one leg over `axes` axes; formulas and meaning of the fields: geometry/toolpath.py.
+
+    On a curve, which is `round` as well, start, direction, center and e1 are its control points, the first numbers of e2 and drift the
+    weights of the inner two, and radius and rate those of an arc that turns as fast as the curve anywhere.
+    """
     vectors = ("start", "direction", "center", "e1", "e2", "drift")
-    scalars = [("round", np.bool_), ("length", np.float64), ("radius", np.float64), ("rate", np.float64)]
+    flags = [("round", np.bool_), ("curve", np.bool_)]
+    scalars = [*flags, ("length", np.float64), ("radius", np.float64), ("rate", np.float64)]
     return np.dtype([*scalars, *((name, np.float64, (axes,)) for name in vectors)])
 
 
 def legs_of(toolpath: Toolpath) -> Legs:
     """The legs of a toolpath: collinear lines joined, every other segment a leg of its own."""
-    line = toolpath.arc < 0
+    line = toolpath.straight
     joined = (toolpath.joint[1:-1] == Joint.SMOOTH) & line[:-1] & line[1:]
     turned = np.cumsum(np.where(joined, toolpath.theta[1:-1], 0.0))
     joined[1:] &= np.diff(np.floor(turned / JOINED_ANGLE)) == 0
@@ -70,16 +77,27 @@ def legs_of(toolpath: Toolpath) -> Legs:
     along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
     offset = along[:-1] - along[first[:-1]][leg_of_segment]
     start, end = toolpath.start[first[:-1]], toolpath.end[first[1:] - 1]
-    arc = toolpath.arc[first[:-1]]
+    arc, straight = toolpath.arc[first[:-1]], line[first[:-1]]
     chord = np.linalg.norm(end - start, axis=1)
-    length = np.where(arc < 0, chord, toolpath.length[first[:-1]])
+    length = np.where(straight, chord, toolpath.length[first[:-1]])
     table = np.zeros(len(length), leg_dtype(len(toolpath.axes)))
-    table["length"], table["start"], table["round"] = length, start, arc >= 0
-    straight = arc < 0
+    table["length"], table["start"], table["round"] = length, start, ~straight
     table["direction"][straight] = (end - start)[straight] / chord[straight, None]
     for name in ("center", "e1", "e2", "drift", "radius", "rate"):
         table[name][arc >= 0] = getattr(toolpath.arcs, name)[arc[arc >= 0]]
+    _set_curves(table, toolpath, first[:-1])
     return Legs(first=first, offset=offset, length=length, table=table)
+
+
+def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:
+    """Write the curves among the legs (R,) that begin with the segments `segment` (R,) into their records, in place."""
+    leg = np.flatnonzero(toolpath.curve[segment] >= 0)
+    row, bend = toolpath.curve[segment[leg]], toolpath.curvature[segment[leg]]
+    for k, name in enumerate(("start", "direction", "center", "e1")):
+        table[name][leg] = toolpath.curves.points[row, k]
+    table["curve"][leg] = True
+    table["e2"][leg, 0], table["drift"][leg, 0] = toolpath.curves.weight[row].T
+    table["radius"][leg], table["rate"][leg] = 1.0 / bend, bend
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,6 +111,10 @@ def leg_point(legs, leg, x, out):
             out[1, k] = data.direction[k]
             out[2, k] = 0.0
             out[3, k] = 0.0
+        return
+    if data.curve:
+        p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
+        curve_point(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
         return
     rate, radius = data.rate, data.radius
     cos, sin = np.cos(rate * x), np.sin(rate * x)
@@ -112,6 +134,10 @@ def leg_tangent(legs, leg, x, out):
     if not data.round:
         for k in range(len(out)):
             out[k] = data.direction[k]
+        return
+    if data.curve:
+        p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
+        curve_tangent(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
         return
     across = data.radius * data.rate
     cos, sin = across * np.cos(data.rate * x), across * np.sin(data.rate * x)

@@ -16,6 +16,7 @@ At a knot derivatives may differ on both sides, and at one of full multiplicity 
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
@@ -27,7 +28,8 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
 from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
 from planner.machine import LINEAR_AXES
-from planner.nc.program import Kind, PathControl, Program
+from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
+from planner.nc.program import Kind, PathControl, Program, Splines
 
 # Gauss points of an arc length, and steps of a knot span that they are applied to: good to 1e-9 of the butterfly's length (tested).
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -226,6 +228,23 @@ class Nurbs:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")
         points = self.at(self.stations(sagitta))[:, 0]
         return chords(points, self.axes, feed, source)
+
+    def exact_program(self, feed: float, *, source: str = "NURBS") -> Program:
+        """The curve itself as a program of one block, as G6.2 is read: every method plans it.
+
+        feed : programmed feed [mm/s]
+
+        Raises InputError unless that is positive and finite, and for a degree above 3.
+        """
+        if not 0 < feed < np.inf:
+            raise InputError(f"feed {feed} mm/s; it must be positive and finite")
+        if self.degree > DEGREE_MAX:
+            raise InputError(f"NURBS of degree {self.degree}; exact curves have degree 1, 2 or {DEGREE_MAX}")
+        pieces = cubic_pieces(homogeneous(self.points, self.weights), self.knots, self.degree)
+        points, weights = pieces[..., :-1] / pieces[..., -1:], pieces[..., -1]
+        program = chords(points[[0, -1], [0, -1]], self.axes, feed, source)
+        splines = Splines(block=np.zeros(len(pieces)), points=points, weights=weights)
+        return dataclasses.replace(program, kind=np.full(1, Kind.SPLINE), splines=splines)
 
 
 def chords(points: FloatArray, axes: tuple[str, ...], feed: float, source: str) -> Program:

@@ -1,7 +1,7 @@
 """Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
 
-The path is a chain of straight links (arcs as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is for every
-point n a link i(n) that never goes back, within the link's budget, such that every vertex between i(n-1) and i(n) is within
+The path is a chain of straight links (arcs and curves as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is
+for every point n a link i(n) that never goes back, within the link's budget, such that every vertex between i(n-1) and i(n) is within
 `MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
 
     sum of |point - link|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
@@ -22,7 +22,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.geometry.chords import arc_point, arc_sagitta
+from planner.geometry.chords import arc_sagitta, points_on
 from planner.geometry.toolpath import Toolpath
 
 CHORD_FRACTION = 1e-3  # sagitta of an arc's chords over its tolerance [-]
@@ -69,9 +69,7 @@ def chain_of(toolpath: Toolpath) -> PathChain:
     part = np.arange(len(segment)) - first[segment]
     inner = np.flatnonzero(part)
     at = segment[inner]
-    vertex[inner] = toolpath.arcs.center[toolpath.arc[at]] + arc_point(
-        toolpath, at, toolpath.length[at] * part[inner] / count[at]
-    )
+    vertex[inner] = points_on(toolpath, at, toolpath.length[at] * part[inner] / count[at])
     budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
     at_vertex = np.append(budget, toolpath.tolerance[-1])
     at_vertex[first] = toolpath.tolerance
@@ -200,7 +198,7 @@ def in_order(chain, point, feed):
     return True, link, crossed
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _forward(chain, before, point, feed, fresh, low, high, cost):
     """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh` if there is none before.
 

@@ -1,4 +1,4 @@
-"""The record of the programmed path: M segments (lines, arcs, helices) and the M+1 joints around them.
+"""The record of the programmed path: M segments (lines, arcs, helices, curves) and the M+1 joints around them.
 
 Segment i runs from joint i to joint i+1. Every segment is a curve over its own parameter x in [0, length_i]:
 
@@ -9,7 +9,8 @@ Segment i runs from joint i to joint i+1. Every segment is a curve over its own 
 plane's normal; `drift` is the helix' rise per mm. Programs print arcs with rounded numbers, so that start and end lie on
 circles of slightly different radius; the gap is spread over the arc as a component of `drift` inside the plane, which makes the
 curve smooth and lets it end exactly on the programmed point. x is the arc length but for that gap (relative error gap/length),
-so nothing downstream may assume |dp/dx| = 1 on arcs.
+so nothing downstream may assume |dp/dx| = 1 on arcs. A curve of the program is several segments (geometry/curves.py); |dp/dx| is 1
+at their ends.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.geometry.curves import Curves
 
 
 class Joint(IntEnum):
@@ -63,10 +66,11 @@ class Toolpath:
     rapid           : (M,) True on G0 moves
     block           : (M,) index of the block of the program, non-decreasing
     line            : (M,) NC line of that block
-    arc             : (M,) row in `arcs`, or -1 for a line
+    arc             : (M,) row in `arcs`, or -1
+    curve           : (M,) row in `curves`, or -1; a segment that is neither arc nor curve is a line
     tangent_start   : (M, A) unit tangent at x = 0
     tangent_end     : (M, A) unit tangent at x = length
-    curvature       : (M,) bound of the curvature on the segment [1/mm], 0 on lines
+    curvature       : (M,) bound of the curvature and of |d2p/dx2| on the segment [1/mm], 0 on lines
     joint           : (M+1,) `Joint`; the first and the last are STOP
     theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
@@ -85,6 +89,8 @@ class Toolpath:
     line: Array
     arc: Array
     arcs: Arcs
+    curve: Array
+    curves: Curves
     tangent_start: FloatArray
     tangent_end: FloatArray
     curvature: FloatArray
@@ -105,6 +111,7 @@ class Toolpath:
         freeze(self, "block", np.int64, (segments,))
         freeze(self, "line", np.int32, (segments,))
         freeze(self, "arc", np.int64, (segments,))
+        freeze(self, "curve", np.int64, (segments,))
         freeze(self, "joint", np.uint8, (segments + 1,))
         for name in ("theta", "tolerance", "dwell"):
             freeze(self, name, np.float64, (segments + 1,))
@@ -117,8 +124,51 @@ class Toolpath:
     def __len__(self) -> int:
         return len(self.length)
 
+    @property
+    def straight(self) -> Array:
+        """(M,) True for lines."""
+        return (self.arc < 0) & (self.curve < 0)
+
+    @property
+    def block_first(self) -> Array:
+        """(N,) first segment of each block."""
+        return np.flatnonzero(np.append(True, self.block[1:] != self.block[:-1]))
+
+    def block_ends(self) -> Toolpath:
+        """One line for each block, from its start to its end, as long as the block: to time blocks, no path to be followed."""
+        first = self.block_first
+        if len(first) == len(self):
+            return self
+        last = np.append(first[1:], len(self)) - 1
+        at = np.append(first, len(self))
+        of_segment = ("start", "feed", "rapid", "block", "line", "tangent_start")
+        return dataclasses.replace(
+            self,
+            end=self.end[last],
+            tangent_end=self.tangent_end[last],
+            length=np.add.reduceat(self.length, first),
+            curvature=np.maximum.reduceat(self.curvature, first),
+            arc=np.full(len(first), -1),
+            curve=np.full(len(first), -1),
+            **{name: getattr(self, name)[first] for name in of_segment},
+            **{name: getattr(self, name)[at] for name in ("joint", "theta", "tolerance", "dwell")},
+        )
+
     def with_joints(self, at: Array | slice, how: Joint) -> Toolpath:
         """The same path with `how` for the joints `at` (indices, a mask or a slice)."""
         joint = self.joint.copy()
         joint[at] = how
         return dataclasses.replace(self, joint=joint)
+
+    def part(self, kept: Array) -> Toolpath:
+        """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of it: where some are left out,
+        the path jumps at a full stop."""
+        joints = np.append(
+            True, kept
+        )  # with the joint behind each segment; the first is a full stop, like all that begin a part
+        columns: dict[str, Any] = {}
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray) and field.name != "zero_length":
+                columns[field.name] = value[kept if len(value) == len(self) else joints]
+        return dataclasses.replace(self, **columns)

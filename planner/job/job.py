@@ -24,7 +24,7 @@ from planner.job.plan import Plan
 from planner.job.records import NO_TABLES, GridHistory, Tables
 from planner.job.stages import Stages
 from planner.job.trace import Tell
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
+from planner.lookahead.stop_moves import stop_time
 from planner.machine import Machine
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.shaping import ShapedMotion
@@ -111,8 +111,7 @@ class Job:
     def stop_time(self) -> float:
         """Cycle time if every block ran from rest to rest [s], dwells included: the baseline of the plan."""
         machine, toolpath = self.real
-        times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
-        return float(times.sum() + np.sum(toolpath.dwell))
+        return stop_time(toolpath, machine)
 
     def behind_filters(self, motion: TimedT) -> TimedT:
         """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""

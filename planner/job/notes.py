@@ -8,9 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.geometry.curves import CHORD_SHARE
 from planner.geometry.toolpath import Toolpath
+from planner.job.plausible import short_block_notes, unit_notes
 from planner.machine import Machine
-from planner.nc.program import Program
+from planner.nc.program import Kind, Program
 
 # A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is rounded by more has
 # little left of its shape.
@@ -18,8 +20,15 @@ TOLERANCE_OF_PART = 0.02
 
 
 def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
-    """Notes of the reader, on feeds that the machine lowers, and on a tolerance that is large beside the part."""
-    return [*program.notes, *_feed_notes(program, machine), *_tolerance_notes(toolpath)]
+    """Notes of the reader, on numbers that are hardly meant, on feeds that the machine lowers, and on a tolerance that is large beside
+    the part."""
+    return [
+        *program.notes,
+        *unit_notes(machine),
+        *_feed_notes(program, machine),
+        *_spline_notes(program, toolpath),
+        *(_tolerance_notes(toolpath) or short_block_notes(toolpath)),
+    ]
 
 
 def _feed_notes(program: Program, machine: Machine) -> list[str]:
@@ -35,12 +44,27 @@ def _feed_notes(program: Program, machine: Machine) -> list[str]:
     ]
 
 
+def _spline_notes(program: Program, toolpath: Toolpath) -> list[str]:
+    if not len(program.splines):
+        return []
+    chords = np.flatnonzero(toolpath.straight & (program.kind[toolpath.block] == Kind.SPLINE))
+    if not len(chords):
+        return []
+    return [
+        f"line {toolpath.line[chords[0]]}: the spline all but stands still, at a control point on its end or at a cusp, where its "
+        f"curvature has no bound; a chord of {toolpath.length[chords[0]]:.3g} mm stands for it there, within {CHORD_SHARE:.0%} of the "
+        f"tolerance ({len(chords):,} chords)"
+    ]
+
+
 def _tolerance_notes(toolpath: Toolpath) -> list[str]:
     if not len(toolpath):
         return []
     moved = ~toolpath.rapid if not toolpath.rapid.all() else np.ones(len(toolpath), bool)
     arc = toolpath.arc[moved & (toolpath.arc >= 0)]
-    points = np.vstack([toolpath.start[moved], toolpath.end[moved]])
+    points = np.vstack(
+        [toolpath.start[moved], toolpath.end[moved], toolpath.curves.points.reshape(-1, len(toolpath.axes))]
+    )
     swept = np.minimum(2.0 * toolpath.arcs.radius[arc], toolpath.length[moved & (toolpath.arc >= 0)])
     part = float(max(np.ptp(points, axis=0).max(), swept.max(initial=0.0)))
     joint = int(toolpath.tolerance.argmax())

@@ -6,7 +6,8 @@ At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k 
 
 besides the bounds on kappa v^2 of eq. (18)-(20), the chord error and the programmed feed (constraints/assemble.py). The maxima of
 r'' and r''' are taken from five samples per grid interval; with the samples g_i of one component a smooth function exceeds them by
-at most max |g_{i-1} - 2 g_i + g_{i+1}| / 8 but for terms of fourth order, which is added.
+at most max |g_{i-1} - 2 g_i + g_{i+1}| / 8 but for terms of fourth order, which is added. What is added depends on where intervals end:
+a block border inside a corner changed its speed by 1.1e-4 on one random path.
 """
 
 from __future__ import annotations

@@ -64,7 +64,8 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest axis limit must hold
     for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with
     kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a/sqrt2 <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
-    (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well.
+    (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve
+    kappa changes, and a bound of |r'''| takes the place of kappa^2.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
@@ -72,8 +73,10 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
         (machine.limits(q, axes) / np.maximum(direction, AT_REST)).min(axis=1)
         for q in ("velocity", "acceleration", "jerk")
     )
-    curved = toolpath.arc >= 0
+    curved = ~toolpath.straight
     kappa = toolpath.curvature[curved]
+    twist, on_curve = kappa**2, toolpath.curve[curved] >= 0
+    twist[on_curve] = np.maximum(twist[on_curve], toolpath.curves.twist[toolpath.curve[curved][on_curve]])
     v_all, a_all, j_all = (machine.limits(q, axes).min() for q in ("velocity", "acceleration", "jerk"))
     half = np.sqrt(0.5)
     budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
@@ -82,7 +85,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
         [
             np.full(len(kappa), v_all),
             np.sqrt(across / kappa),
-            np.cbrt(half * j_all / (2 * kappa**2)),
+            np.cbrt(half * j_all / (2 * twist)),
             j_all / (3 * kappa * a_all),
         ],
         axis=0,

@@ -1,6 +1,7 @@
 """Method `kinematic`: paper 003's jerk-limited corners between straight legs, and a look-ahead over their speeds.
 
-1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where that is faster.
+1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where that is faster; curves are
+   always cut.
 2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry acceleration, entry
    deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the vertex itself at that step.
 3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full stop, so that the whole
@@ -68,6 +69,7 @@ class KinematicMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
+        job.note(*_curve_notes(job.toolpath, exact))
         with job.stage("solve"):
             chain = self._chain(job.toolpath, job.machine, exact)
             motion = _motion(chain, job.toolpath.axes)
@@ -135,6 +137,18 @@ class _Chain:
         """(n+1,) True where there is a corner to be taken."""
         at = self.path.first
         return (self.lines.joint[at] == Joint.CORNER) & (self.lines.theta[at] >= COLLINEAR_ANGLE)
+
+
+def _curve_notes(toolpath: Toolpath, exact: Array) -> list[str]:
+    """What is to be said of splines whose blocks are among the `exact` (M,) ones."""
+    found = np.flatnonzero((toolpath.curve >= 0) & exact)
+    if not len(found):
+        return []
+    blocks = len(np.unique(toolpath.block[found]))
+    return [
+        f"line {toolpath.line[found[0]]}: G61 asks for the exact path; method kinematic runs splines as chords within the tolerance "
+        f"({blocks} blocks)"
+    ]
 
 
 def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack, cast
 
 from planner.base.errors import InputError
 from planner.base.names import (
@@ -28,8 +28,31 @@ from planner.job.trace import Log
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.nc.reading import AS_USUAL, Reading
 
 DEFAULT_MACHINE = "mill"
+
+
+class MethodSettings(TypedDict, total=False):
+    """Settings of methods "optimal" and "second-order"; None, or left out, for the method's own.
+
+    geometry : how the path is smoothed: "spline" (one spline from stop to stop), "corners" (each corner by itself) or "auto" (splines,
+               or corners where they take less time); None for "auto", or for "corners" where `corner` is given
+    corner   : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
+    solver   : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
+               the first of them
+    effort   : "quick", "normal" or "best": how fine the grids are and how many rounds splines are reshaped; None for "normal"
+    rounds   : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for those of
+               the effort, fewer where they gain nothing
+    shaped   : deliver setpoints that leave the machine's vibration modes at rest
+    """
+
+    geometry: str | None
+    corner: str | CornerShape | None
+    solver: str | None
+    effort: str | None
+    rounds: int | None
+    shaped: bool | None
 
 
 def plan(
@@ -37,36 +60,23 @@ def plan(
     machine: Machine | str | Path | None = None,
     *,
     method: str | Method = "optimal",
-    geometry: str | None = None,
-    corner: str | CornerShape | None = None,
-    solver: str | None = None,
-    effort: str | None = None,
-    rounds: int | None = None,
-    shaped: bool = False,
     limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
+    reading: Reading = AS_USUAL,
     progress: Progress | None = None,
     log: Log | None = None,
+    **settings: Unpack[MethodSettings],
 ) -> Plan:
     """Plan, sample and verify the motion of an NC program.
 
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
-    geometry  : how the path is smoothed, for "optimal" and "second-order": "spline" (one spline from stop to stop), "corners" (each
-                corner by itself) or "auto" (splines, or corners where they take less time); None for "auto", or for "corners" where
-                `corner` is given
-    corner    : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
-    solver    : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
-                the first of them
-    effort    : "quick", "normal" or "best", for "optimal" and "second-order": how fine the grids are and how many rounds splines are
-                reshaped; None for "normal"
-    rounds    : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for those of
-                the effort, fewer where they gain nothing
-    shaped    : deliver setpoints that leave the machine's vibration modes at rest, for "optimal" and "second-order"
+    settings  : geometry, corner, solver, effort, rounds, shaped: `MethodSettings`
     limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order" keep them,
                 the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
+    reading   : what is refused, left out and assumed in a program file
     progress  : called with the stage's name and the fraction done (0 to 1)
     log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
@@ -78,82 +88,63 @@ def plan(
     """
     if isinstance(method, str):
         method = method_name(method)
-    _check_used(
-        method,
-        geometry=geometry,
-        corner=corner,
-        solver=solver,
-        effort=effort,
-        rounds=rounds,
-        shaped=shaped or None,
-    )
+    given = _given(settings)
+    _check_used(method, given)
     if isinstance(method, str):
-        method = make_method(
-            method,
-            geometry=geometry,
-            corner=corner,
-            solver=solver,
-            effort=effort,
-            rounds=rounds,
-            shaped=shaped,
-        )
+        method = make_method(method, **given)
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
     if limits:
         machine = machine.with_own((*machine.own, *limits))
     if isinstance(program, Program):
+        if reading != AS_USUAL:
+            raise InputError("reading: the program is read already; give the settings to read_program")
         return method.plan(program, machine, tolerance, progress, log)
-    reading = Stages(progress)
-    with reading.stage("read"):
-        program = read_program(program, machine)
+    stages = Stages(progress)
+    with stages.stage("read"):
+        program = read_program(program, machine, reading)
     made = method.plan(program, machine, tolerance, progress, log)
-    return dataclasses.replace(made, timings=reading.timings | made.timings)
+    return dataclasses.replace(made, timings=stages.timings | made.timings)
 
 
-def make_method(
-    name: str,
-    *,
-    geometry: str | None = None,
-    corner: str | CornerShape | None = None,
-    solver: str | None = None,
-    effort: str | None = None,
-    rounds: int | None = None,
-    shaped: bool = False,
-) -> Method:
-    """The method of that name; the settings are those of `plan`, None for the method's own.
+def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
+    """The method of that name with these settings.
 
     Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort, and for a negative number of rounds.
     """
+    given = _given(settings)
     entry = METHODS[method_name(name)]
-    settings: dict[str, Any] = dict(entry.settings)
+    made: dict[str, Any] = dict(entry.settings)
     if entry.shapes:
-        kind, shape = _smoothing(geometry, corner)
+        kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
+        rounds = given.get("rounds")
         if rounds is not None and rounds < 0:
             raise InputError(f"{rounds} rounds; it must be 0 or more")
-        settings |= {"corner": shape or kind, "rounds": rounds, "shaped": shaped}
-        if effort is not None:
-            settings["effort"] = effort_name(effort)
-    if entry.solvers and solver is not None:
-        settings["solver"] = solver_name(solver)
+        made |= {"corner": shape or kind, "rounds": rounds, "shaped": bool(given.get("shaped"))}
+        if (effort := given.get("effort")) is not None:
+            made["effort"] = effort_name(effort)
+    if entry.solvers and (solver := given.get("solver")) is not None:
+        made["solver"] = solver_name(solver)
     module, _, class_name = entry.home.partition(":")
-    made = getattr(import_module(module), class_name)(**settings)
-    assert isinstance(made, Method)
-    return made
+    method = getattr(import_module(module), class_name)(**made)
+    assert isinstance(method, Method)
+    return method
 
 
-def _check_used(
-    method: str | Method,
-    *,
-    geometry: str | None,
-    corner: str | CornerShape | None,
-    rounds: int | None,
-    **others: str | int | None,
-) -> None:
+def _given(settings: MethodSettings) -> MethodSettings:
+    """The settings that are set. Raises TypeError for others than those of `MethodSettings`."""
+    unknown = settings.keys() - MethodSettings.__annotations__.keys()
+    if unknown:
+        raise TypeError(
+            f"unexpected keyword argument '{min(unknown)}'; settings are {', '.join(MethodSettings.__annotations__)}"
+        )
+    given = {name: value for name, value in settings.items() if value is not None and value is not False}
+    return cast(MethodSettings, given)
+
+
+def _check_used(method: str | Method, given: MethodSettings) -> None:
     """Raise InputError for a setting that the method would ignore."""
-    given = {"geometry": geometry, "corner": corner, "rounds": rounds} | others
     for setting, value in given.items():
-        if value is None:
-            continue
         if isinstance(method, Method):
             raise InputError(
                 f"{setting} = {value} beside a method with settings of its own: {method!r}; set it there"
@@ -166,10 +157,10 @@ def _check_used(
             raise InputError(
                 f"solver = {value}: method {method} does not use it; it has {', '.join(METHODS[method].solvers)}"
             )
-    if rounds is not None:
-        kind, shape = _smoothing(geometry, corner)
+    if "rounds" in given:
+        kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
         if kind == SINGLE_CORNERS:
-            raise InputError(f"rounds = {rounds}: they reshape splines; {shape} corners have none")
+            raise InputError(f"rounds = {given['rounds']}: they reshape splines; {shape} corners have none")
 
 
 def _smoothing(

@@ -13,24 +13,28 @@ from planner.geometry.toolpath import Joint
 from planner.job.job import Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_phases
-from planner.motion.time_law import law_of_phases
+from planner.lookahead.stop_moves import block_moves, stop_phases
+from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion
 from planner.path.samples import sample_path
 
 
 @dataclass(frozen=True, kw_only=True)
 class StopMethod(Method):
-    """A full stop at the end of every block."""
+    """A full stop at the end of every block, and where a spline has a kink or a jump of its curvature."""
 
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):
-            exact = job.toolpath.with_joints(slice(None), Joint.STOP)
+            moves = block_moves(job.toolpath)
+            exact = job.toolpath.with_joints(moves, Joint.STOP)
             samples = sample_path(round_corners(exact, machine, BezierCorner()), machine)
         with job.stage("solve"):
-            lengths = np.diff(samples.s[np.append(samples.piece[:-1], len(samples) - 1)])
-            law = law_of_phases(samples, *rest_to_rest_phases(lengths, *block_limits(exact, machine)))
+            interval = samples.intervals
+            interval = interval[np.searchsorted(samples.segment[interval], np.arange(len(exact)))]
+            at = np.append(samples.s[interval], samples.s[-1])  # where segments begin
+            run = np.repeat(np.arange(len(moves) - 1), np.diff(moves))
+            law = law_of_moves(samples, run, at[:-1], *stop_phases(exact, machine, np.diff(at)))
             motion = Motion(samples=samples, law=law)
         made = job.deliver(job.behind_filters(motion))
         return job.plan(

@@ -7,12 +7,10 @@ q = (s - s0)/h and W = (w - w0)/(w1 - w0) it matches W and three derivatives at 
     dw/ds = 1/S,     d2w/ds2 = -S'/S^3,     d3w/ds3 = (3 S'^2 - S S'')/S^5,
     S' = B'.B''/S,     S'' = (B''.B'' + B'.B''' - S'^2)/S.
 
-How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule. Where that is more than
-`LENGTH_ROUNDING`, every sample takes a step from there by the slope of the polynomial, and where that is not enough, steps by the
-curve itself (`_refine`).
-
-Of a span, which most intervals of a long job lie on, the coefficients are copied once per interval, and all nodes of Gauss' rule are
-evaluated side by side.
+How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule; where it is, a polynomial
+q^4 (1-q)^4 (c_8 + c_9 (q - 1/2) + c_10 (q - 1/2)^2) is added that makes it right there, and what is left is measured between these
+places. Where that is more than `LENGTH_ROUNDING`, every sample takes a step from there by the slope of the polynomial, and where that
+is not enough, steps by the curve itself (`_refine`). The samples themselves are in lots.py.
 """
 
 from __future__ import annotations
@@ -23,39 +21,28 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.base.search import last_not_after
 from planner.corners.elements import (
     GAUSS_NODES,
     GAUSS_WEIGHTS,
     element_length,
     element_point,
     is_straight,
-    to_arc_length,
 )
 from planner.geometry.spline import DEGREE
 
 # Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of coordinates, so that
 # accelerations by differences of nearby positions are as good as the columns.
 LENGTH_ROUNDING = 1e-13
-# The polynomial's slope is off by at most 4 times what its values are off by [share of the interval]: 256 q^4 (1-q)^4, the shape of
-# their error, is nowhere steeper. Where they are off by less than this, a step by its slope leaves less than `LENGTH_ROUNDING`.
-ONE_STEP = 1e-7
+# The polynomial's slope is off by at most 14 times what its values are off by [share of the interval]: the shape of their error,
+# q^4 (1-q)^4 (q - 1/4) (q - 1/2) (q - 3/4), is nowhere steeper. Where they are off by less than this, a step by its slope leaves less
+# than `LENGTH_ROUNDING`.
+ONE_STEP = 8e-8
+S_ROUNDING = 2.0**-52  # of s itself [-], which is not an error of the polynomial
+COEFFICIENTS = 11  # of an interval's polynomial, with how far it is off
 # Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
 CUBE_ROOT_ROUNDING = 4e-5
-
-
-class Law(NamedTuple):
-    """The fields of `TimeLaw`."""
-
-    t: FloatArray
-    s: FloatArray
-    feed: FloatArray
-    acc_s: FloatArray
-    jerk_s: FloatArray
-    run: Array
-    end: float
 
 
 class Grid(NamedTuple):
@@ -94,7 +81,7 @@ class _Room(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _room(axes):
+def room_for(axes):
     return _Room(
         np.empty((DEGREE + 1, axes)),
         np.empty((DEGREE, axes)),
@@ -106,7 +93,7 @@ def _room(axes):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _interval(table, grid, i, room):
+def interval_of(table, grid, i, room):
     """Interval i of the grid, with the coefficients of its span in `room`."""
     legs, _, spans = table
     span = grid.element[i] - len(legs)
@@ -157,25 +144,26 @@ def _point(table, on, room, w, out):
         out[3, k] = (t[2, k] * w + t[1, k]) * w + t[0, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def inverses(table, grid, axes):
-    """(P, 8) for the interval to the right of each point: how far the polynomial is off [share of the interval], c_1 .. c_7 of
-    W = sum c_n q^n; zeros at the ends of pieces."""
-    found = np.zeros((len(grid.s), 8))
-    room, out = _room(axes), np.empty((4, axes))
+    """(P, `COEFFICIENTS`) for the interval to the right of each point: how far the polynomial is off [share of the interval],
+    c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces."""
+    found = np.zeros((len(grid.s), COEFFICIENTS))
+    room, out = room_for(axes), np.empty((4, axes))
     for g in range(len(grid.piece) - 1):
         for i in range(grid.piece[g], grid.piece[g + 1] - 1):
-            on = _interval(table, grid, i, room)
+            on = interval_of(table, grid, i, room)
             if is_straight(table[0], on.element):
                 found[i, 1] = 1.0
             else:
                 _invert(table, on, room, out, found[i])
+                found[i, 0] = max(found[i, 0] - S_ROUNDING * grid.s[i + 1] / on.h, 0.0)
     return found
 
 
 @njit(cache=True, error_model="numpy")
 def _invert(table, on, room, out, c):
-    """The polynomial of an interval on a curve, into c (8,) as `inverses` has it."""
+    """The polynomial of an interval on a curve, into c (`COEFFICIENTS`,) as `inverses` has it."""
     w0, dw, h = on.w0, on.w1 - on.w0, on.h
     slope, bend, third = np.empty(2), np.empty(2), np.empty(2)  # derivatives of W by q at both ends
     for e in range(2):
@@ -196,29 +184,68 @@ def _invert(table, on, room, out, c):
     a, j = bend[1] - 2.0 * c[2] - 6.0 * c[3], third[1] - 6.0 * c[3]
     c[4], c[5] = 35.0 * p - 15.0 * v + 2.5 * a - j / 6.0, -84.0 * p + 39.0 * v - 7.0 * a + 0.5 * j
     c[6], c[7] = 70.0 * p - 34.0 * v + 6.5 * a - 0.5 * j, -20.0 * p + 10.0 * v - 2.0 * a + j / 6.0
-    c[0] = 0.0
-    for q in (0.5, 0.25, 0.75):
-        w = w0 + dw * _at(c, q)
-        if not w0 <= w <= on.w1:
-            c[0] = np.inf
-            return
-        c[0] = max(c[0], abs(_length(table, on, room, w, out) / h - q))
+    for n in range(8, COEFFICIENTS):
+        c[n] = 0.0
+    off = _off(table, on, room, out, c, (0.25, 0.5, 0.75))
+    c[0] = max(abs(off[0]), abs(off[1]), abs(off[2]))
+    if not c[0] > LENGTH_ROUNDING or c[0] == np.inf:
+        return
+    less, same, more = (
+        -off[0] * _slope_at(c, 0.25) / _hump(0.25),
+        -off[1] * _slope_at(c, 0.5) / _hump(0.5),
+        -off[2] * _slope_at(c, 0.75) / _hump(0.75),
+    )
+    c[8], c[9], c[10] = same, 2.0 * (more - less), 8.0 * (more - 2.0 * same + less)
+    off = _off(table, on, room, out, c, (0.375, 0.625, 0.5))
+    left = max(abs(off[0]), abs(off[1]), abs(off[2]))
+    if left < c[0]:
+        c[0] = left
+    else:
+        c[8] = c[9] = c[10] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _off(table, on, room, out, c, shares):
+    """How far the polynomial's arc length is off at three shares of the interval [share of it]; inf where it leaves the interval."""
+    first, second, third = np.inf, np.inf, np.inf
+    for n in range(3):
+        q = shares[n]
+        w, off = on.w0 + (on.w1 - on.w0) * _at(c, q), np.inf
+        if on.w0 <= w <= on.w1:
+            off = _length(table, on, room, w, out) / on.h - q
+        if n == 0:
+            first = off
+        elif n == 1:
+            second = off
+        else:
+            third = off
+    return first, second, third
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _hump(q):
+    p = q * (1.0 - q)
+    return p * p * p * p
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _at(c, q):
-    return q * (c[1] + q * (c[2] + q * (c[3] + q * (c[4] + q * (c[5] + q * (c[6] + q * c[7]))))))
+    d = q - 0.5
+    more = _hump(q) * (c[8] + d * (c[9] + d * c[10]))
+    return q * (c[1] + q * (c[2] + q * (c[3] + q * (c[4] + q * (c[5] + q * (c[6] + q * c[7])))))) + more
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _slope_at(c, q):
+    d, p = q - 0.5, q * (1.0 - q)
     high = 4.0 * c[4] + q * (5.0 * c[5] + q * (6.0 * c[6] + q * 7.0 * c[7]))
-    return c[1] + q * (2.0 * c[2] + q * (3.0 * c[3] + q * high))
+    more = -8.0 * d * p * p * p * (c[8] + d * (c[9] + d * c[10])) + _hump(q) * (c[9] + 2.0 * d * c[10])
+    return c[1] + q * (2.0 * c[2] + q * (3.0 * c[3] + q * high)) + more
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _parameter(table, on, room, c, ds, out):
-    """The parameter w at the arc length ds into the interval, from its polynomial c (8,)."""
+    """The parameter w at the arc length ds into the interval, from its polynomial c."""
     dw, q = on.w1 - on.w0, ds / on.h
     w = on.w0 + dw * _at(c, q)
     if c[0] <= LENGTH_ROUNDING:
@@ -259,61 +286,10 @@ def _refine(table, on, room, w, ds, out):
     return w
 
 
-@njit(cache=True, error_model="numpy")
-def sample(table, law, grid, inverse, times, axes):
-    """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that each lies at; an interval
-    of a span may cover several.
-
-    inverse : (P, 8), from `inverses`
-    """
-    legs, _, spans = table
-    t, s_law, feed, acc_s, jerk_s, run, end = law
-    piece, s, element, w0, w1, of_interval, passed = grid
-    count = len(times)
-    out_position, out_velocity = np.empty((count, axes)), np.empty((count, axes))
-    out_acceleration, out_jerk = np.empty((count, axes)), np.empty((count, axes))
-    out_s, out_feed, segment = np.empty(count), np.empty(count), np.empty(count, np.int64)
-    here, room = np.empty((4, axes)), _room(axes)
-    on, on_of = _Interval(element[0], w0[0], w1[0], 0.0, False), -1
-    begin, width = 0.0, 0.0  # of the span, along the programmed path
-    m = last_not_after(t, times[0], 0, len(t) - 1)
-    i, joint = -1, 0
-    for n in range(count):
-        while m + 1 < len(t) and t[m + 1] <= times[n]:
-            m += 1
-        tau = max(times[n] - t[m], 0.0)
-        u, j = acc_s[m] + jerk_s[m] * tau, jerk_s[m]
-        v = max(feed[m] + tau * (acc_s[m] + 0.5 * jerk_s[m] * tau), 0.0)
-        s_here = s_law[m] + tau * (feed[m] + tau * (acc_s[m] / 2.0 + jerk_s[m] * tau / 6.0))
-        if m + 1 < len(t):
-            s_here = min(s_here, s_law[m + 1])
-        if times[n] >= end:
-            s_here, v, u, j = s[-1], 0.0, 0.0, 0.0
-        elif times[n] < t[m]:  # a dwell before the first move
-            v, u, j = 0.0, 0.0, 0.0
-        first, last = piece[run[m]], piece[run[m] + 1] - 2  # the intervals of this run
-        if i < first:
-            i = last_not_after(s, s_here, first, last)
-        while i < last and s[i + 1] <= s_here:
-            i += 1
-        if on_of != i:
-            on, on_of = _interval(table, grid, i, room), i
-            if on.span:
-                begin, width = spans[element[i] - len(legs)].begin, spans[element[i] - len(legs)].width
-        ds = min(max(s_here - s[i], 0.0), on.h)
-        w = _parameter(table, on, room, inverse[i], ds, here)
-        segment[n] = of_interval[i]
-        if on.span:
-            place = begin + width * w
-            if joint + 1 >= len(passed) or passed[joint + 1] <= place or passed[joint] > place:
-                joint = last_not_after(passed, place, 0, len(passed) - 2)
-            segment[n] = joint
-        _point(table, on, room, w, here)
-        to_arc_length(here)
-        for k in range(axes):
-            out_position[n, k] = here[0, k]
-            out_velocity[n, k] = here[1, k] * v
-            out_acceleration[n, k] = here[1, k] * u + here[2, k] * v * v
-            out_jerk[n, k] = here[1, k] * j + 3.0 * here[2, k] * v * u + here[3, k] * v * v * v
-        out_s[n], out_feed[n] = s[i] + ds, v
-    return out_position, out_velocity, out_acceleration, out_jerk, out_s, out_feed, segment
+@njit(cache=True, error_model="numpy", nogil=True)
+def place_of(table, on, room, c, ds, out):
+    """Place and w-derivatives at the arc length ds into an interval, into out (4, A), from its polynomial c; returns the parameter
+    w there."""
+    w = _parameter(table, on, room, c, ds, out)
+    _point(table, on, room, w, out)
+    return w

@@ -44,6 +44,11 @@ class TimeLaw:
             freeze(self, name, np.float64, (pieces,))
         freeze(self, "run", np.int64, (pieces,))
 
+    @property
+    def columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, Array, float]:
+        """The fields in their order, arrays (L,), for compiled functions."""
+        return self.t, self.s, self.feed, self.acc_s, self.jerk_s, self.run, float(self.end)
+
 
 def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw:
     """The time law of a solution of any order, dwells included. Raises NotSolvedError without a solution."""
@@ -58,18 +63,6 @@ def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw
         jerk_s=solution.jerk_s,
         run=np.repeat(np.arange(len(samples.piece) - 1), np.diff(samples.piece)),
         end=float(dwell[0] + duration.sum()),
-    )
-
-
-def law_of_phases(samples: PathSamples, duration: FloatArray, jerk_s: FloatArray) -> TimeLaw:
-    """The time law of moves from rest to rest, one per piece of the path, dwells included.
-
-    duration : (G, F) durations of the F phases of each move [s]
-    jerk_s   : (G, F) jerk along the path in each phase [mm/s3]
-    """
-    moves = len(duration)
-    return law_of_moves(
-        samples, np.arange(moves), samples.s[samples.piece[:-1]], np.zeros(moves), duration, jerk_s
     )
 
 

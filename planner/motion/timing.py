@@ -22,8 +22,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.search import nearest
+from planner.motion.lots import sample
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.motion.sampling import Grid, Law, inverses, sample
+from planner.motion.sampling import Grid, inverses
 from planner.motion.time_law import TimeLaw
 from planner.motion.trajectory import Trajectory
 from planner.path.samples import PathSamples
@@ -157,7 +158,6 @@ def _sample_times(end: float, dt: float) -> tuple[int, FloatArray | None]:
 def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     samples, law = motion.samples, motion.law
     toolpath, axes = samples.path.toolpath, samples.position.shape[1]
-    timed = Law(law.t, law.s, law.feed, law.acc_s, law.jerk_s, law.run, float(law.end))
     grid = Grid(
         samples.piece,
         samples.s,
@@ -169,7 +169,7 @@ def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     )
     if samples not in _inverses:
         _inverses[samples] = inverses(samples.table, grid, axes)
-    *columns, segment = sample(samples.table, timed, grid, _inverses[samples], times, axes)
+    *columns, segment = sample(samples.table, law.columns, grid, _inverses[samples], times, axes)
     names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
     return Trajectory(
         axes=toolpath.axes,

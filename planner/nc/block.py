@@ -8,21 +8,33 @@ interpreter's business.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from planner.nc import codes
+from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
+from planner.nc.commands import MESSAGE, command, homed
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
+from planner.nc.settings import ALWAYS_READ, EVERYTHING, EXTRUDER_MODES, TEXTS, setting
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
 NUMBER_MAX = 1e9
 CODE_MAX = 1e4  # larger G and M numbers are all unknown
 _CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
-_MOTION_LETTERS = "XYZ"
-_ARC_LETTERS = "IJKR"
+_ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code beside them
 
 Report = Callable[[int, str], None]
+
+NAME_SHOWN = 20  # characters of a name in a note
+PROGRAM_NAME = codes.Assumption("program name", "program names", "nothing is done with them")
+PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, nothing is done with them")
+OFFSET_NUMBER = codes.Assumption(
+    "number of an offset (D, H) without a code that uses it",
+    "numbers of offsets (D, H) without a code that uses them",
+    "left out",
+)
 
 
 @dataclass(slots=True)
@@ -37,6 +49,10 @@ class Block:
     foreign : a code that is not supported uses the line's words; no move is read from it
     refused_motion : such a code is a motion code and stays in force
     partial : some words were reported and left out; others may have belonged to them
+    events  : letter and number of words that move nothing and are kept, in their order
+    homing  : axes that go to their home position
+    stops   : one of `events` is a full stop
+    own     : letters of the words that codes of the line use
     """
 
     line: int
@@ -48,6 +64,10 @@ class Block:
     foreign: bool = False
     refused_motion: bool = False
     partial: bool = False
+    events: list[tuple[str, float]] = field(default_factory=list)
+    homing: str = ""
+    stops: bool = False
+    own: frozenset[str] = frozenset()
 
     def has(self, letters: str) -> bool:
         """Whether the block has a word with one of the letters."""
@@ -58,36 +78,58 @@ class Block:
         return min(self.at[letter] for letter in letters if letter in self.at)
 
     def motion_word(self) -> int:
-        """Index of the word that makes the block move: its motion code, else its first coordinate."""
-        return self.at["motion"] if "motion" in self.at else self.first_of("XYZIJKR")
+        """Index of the word that makes the block move: its motion code, else its first coordinate, or its first word."""
+        if "motion" in self.at:
+            return self.at["motion"]
+        return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
 
 
-def read_block(words: Words, row: int, report: Report) -> Block | None:
-    """Read a row of words. Faults go to `report(word, message)`; None if the row cannot be read as a
-    whole."""
+def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Block | None:
+    """Read a row of words. Faults go to `report(word, message)`, what is assumed to `assumed`; None if the row cannot be read as a
+    whole, or holds nothing."""
     block = Block(line=int(words.line[row]))
     first, last = int(words.first[row]), int(words.first[row + 1])
+    owned = ""  # letters that belong to a setting
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])
+        if owned == MESSAGE or (owned == EVERYTHING and code == FAULT):
+            break
         if code == FAULT:
+            if homed(words, word, block, assumed) or command(words, word, block, report, assumed):
+                break
             report(word, _unreadable(words, word))
             return None
         letter = chr(code)
         if letter == "%":
-            if last - first > 1:
+            name = words.rest(word).partition("(")[0].partition(";")[0].strip()
+            if word > first or (name and assumed.strict):
                 report(word, "a % stands alone on its line: it starts and ends a program")
                 return None
+            if name:
+                assumed.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
             block.ended = True
+        elif letter == "O":
+            if not _program_number(words, word, last, block, report, assumed):
+                return None
         elif letter == "N":
             if word > first:
                 report(word, "a line number comes first on its line, once")
                 return None
         elif letter in "GM":
-            block.partial |= _add_code(block, letter, value, word, report)
-        elif letter in codes.LETTERS_REFUSED:
+            owned = ""
+            taken = None
+            if value * 10.0 not in ALWAYS_READ[letter] or assumed.reading.ignore:
+                taken = _settle(words, word, (first, last), block, assumed)
+            if taken is not None:
+                owned = taken
+            else:
+                block.partial |= _add_code(block, letter, value, word, report, assumed)
+        elif letter in owned or (assumed.treatment[code] == LEFT_OUT and letter != "E"):
+            continue
+        elif assumed.treatment[code] == REFUSED and letter != "E":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
-        elif letter in block.value:
+        elif letter in block.value and (assumed.strict or block.value[letter] != value):
             report(word, f"a second {letter} word on this line; write one")
             return None
         elif abs(value) > NUMBER_MAX:
@@ -96,23 +138,76 @@ def read_block(words: Words, row: int, report: Report) -> Block | None:
         else:
             block.value[letter], block.at[letter] = value, word
     if not block.partial:
-        _check_used(block, report)
+        _check_used(words, block, report, assumed)
     return block
 
 
-def _add_code(block: Block, letter: str, value: float, word: int, report: Report) -> bool:
+def _program_number(
+    words: Words, word: int, last: int, block: Block, report: Report, assumed: Assumed
+) -> bool:
+    """Keep the number of a program as an event; False, after a report, for another O word."""
+    number = float(words.value[word])
+    statement = number < 0 or (words.letter[word:last] == FAULT).any()
+    if statement or assumed.strict or number > NUMBER_MAX:
+        report(word, str(codes.LETTERS_REFUSED["O"]))
+        return False
+    assumed.count(PROGRAM_NUMBER, words.text(word), block.line)
+    block.events.append(("O", number))
+    return True
+
+
+def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed: Assumed) -> str | None:
+    """Keep a code that moves nothing, or that the user knows to be harmless, as an event.
+
+    Returns the letters behind it that are its own, or `MESSAGE` for all that follows; None for a code that is to be read.
+    """
+    letter, value = chr(words.letter[word]), float(words.value[word])
+    code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
+    if abs(value * 10.0 - code) > 10.0 * _CODE_ROUNDING:
+        return None
+    name = f"{letter}{codes.number(code)}"
+    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
+    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
+    if assumed.ignores(name):
+        assumed.count(LEFT_OUT_BY_USER, name, block.line)
+        block.events.append((letter, code / 10))
+        block.partial = True
+        block.foreign |= letter == "G"
+        alone = letter == "M" and code not in codes.M_GROUP and not before
+        return found.own if found else EVERYTHING if alone else ""
+    if found is None or assumed.strict:
+        return None
+    assumed.count(found.what, words.text(word), block.line)
+    assumed.printer |= letter == "M" and code // 10 in EXTRUDER_MODES
+    block.events.append((letter, code / 10))
+    block.stops |= found.stops
+    return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.own
+
+
+def _letters(words: Words, first: int, last: int) -> str:
+    return bytes(words.letter[first:last]).decode("latin-1")
+
+
+def _behind(words: Words, word: int, last: int) -> str:
+    """The letters from a word on, up to the next code."""
+    return re.split("[GM]", _letters(words, word, last), maxsplit=1)[0]
+
+
+def _add_code(block: Block, letter: str, value: float, word: int, report: Report, assumed: Assumed) -> bool:
     """Put a G or M code into its group; True if it was reported instead."""
     code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
     known, refused = (codes.G_GROUP, codes.G_REFUSED) if letter == "G" else (codes.M_GROUP, codes.M_REFUSED)
     exact = abs(value * 10.0 - code) <= 10.0 * _CODE_ROUNDING
     if not exact or code not in known:
         refusal = refused.get(code) if exact else None
-        refusal = refusal or codes.unknown(letter, code)
+        refusal = refusal or codes.unknown(letter, code, strict=assumed.strict or not exact)
         report(word, str(refusal))
         block.foreign |= refusal.takes_axes
         block.refused_motion |= refusal.takes_axes and 330 <= code <= 890
         return True
     group, groups = known[code], block.g if letter == "G" else block.m
+    if groups.get(group) == code and not assumed.strict:  # said twice
+        return False
     if group in groups:
         report(
             word,
@@ -125,24 +220,27 @@ def _add_code(block: Block, letter: str, value: float, word: int, report: Report
     return False
 
 
-def _check_used(block: Block, report: Report) -> None:
-    """Report words that no code of the line uses. I J K and R may belong to an arc code in force: the
-    interpreter looks."""
-    one_shot, motion = block.g.get("one-shot"), block.g.get("motion", block.g.get("cycle end"))
-    path, arc = block.g.get("path control"), motion in (20, 30)
-    used = {
-        "P": arc or motion is None or one_shot == 40 or path == 640,
-        "Q": path == 640,
-        "H": block.g.get("tool length") == 430,
-        **dict.fromkeys(_ARC_LETTERS, arc or motion is None),
-    }
-    for letter, allowed in used.items():
-        if letter in block.value and not allowed:
-            report(
-                block.at[letter],
-                f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it",
-            )
-            del block.value[letter]
+def _check_used(words: Words, block: Block, report: Report, assumed: Assumed) -> None:
+    """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no motion code, the one in force
+    may use them: the interpreter looks."""
+    named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
+    block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
+    in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
+    if "E" in block.own:
+        assumed.used("E")
+    for letter in sorted(block.value.keys() - block.own - _ALWAYS - set(in_force), key=block.at.__getitem__):
+        if letter in "DH" and not assumed.strict:
+            assumed.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
+        elif assumed.treatment[ord(letter)] != LEFT_OUT:
+            report(block.at[letter], unused(letter))
+        del block.value[letter]
+
+
+def unused(letter: str) -> str:
+    """What is said of a word that no code of its block uses."""
+    if letter in codes.LETTERS_REFUSED:
+        return str(codes.LETTERS_REFUSED[letter])
+    return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
 
 
 def _unreadable(words: Words, word: int) -> str:

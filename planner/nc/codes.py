@@ -25,122 +25,131 @@ class Refusal:
         return f"{self.what} not supported; {self.remedy}"
 
 
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """Something counted and said once: its name for one and for many, and what is assumed of it."""
+
+    one: str
+    many: str
+    said: str
+
+
 G_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 30), "motion"),
-    **dict.fromkeys((40, 280, 300, 530, 920, 921, 922, 923), "one-shot"),
+    **dict.fromkeys((50, 51, 52, 53, 62), "motion"),
+    **dict.fromkeys((330, 331, 730, 740, 760, *range(810, 900, 10)), "motion"),
+    **dict.fromkeys((40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923), "one-shot"),
     **dict.fromkeys((170, 180, 190), "plane"),
     **dict.fromkeys((200, 210), "units"),
     **dict.fromkeys((900, 910), "distance mode"),
     **dict.fromkeys((901, 911), "arc centre mode"),
     **dict.fromkeys((540, 550, 560, 570, 580, 590, 591, 592, 593), "work offset"),
     **dict.fromkeys((610, 611, 640), "path control"),
-    **dict.fromkeys((430, 490), "tool length"),
-    400: "cutter compensation",
-    940: "feed mode",
-    970: "spindle mode",
+    **dict.fromkeys((430, 431, 432, 490), "tool length"),
+    **dict.fromkeys((400, 410, 411, 420, 421), "cutter compensation"),
+    **dict.fromkeys((930, 940, 950), "feed mode"),
+    **dict.fromkeys((960, 970), "spindle mode"),
     **dict.fromkeys((980, 990), "retract mode"),
-    80: "lathe diameter mode",
+    **dict.fromkeys((70, 80), "lathe diameter mode"),
     800: "cycle end",  # a motion code on its line beats it
 }
 
-# Codes that change nothing here and are kept as events: spindle speed in rpm, retract modes of canned cycles,
-# lathe radius mode.
-G_EVENTS = frozenset((970, 980, 990, 80))
+# Codes that are kept as events: what S means, revolutions per minute or surface speed.
+G_EVENTS = frozenset((960, 970))
+
+ARCS = frozenset((20, 30))
+CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS = 50, 51, 52, 53, 62
+SPLINES = frozenset((CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS))
+THREADS = frozenset((330, 331))
+THREADING = 760  # the cycle of many passes
+CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
+
+# Words beside X Y Z F S T N that a code uses, by its group letter and tenths.
+WORDS: dict[tuple[str, int], str] = {
+    **{("G", code): "IJKRP" for code in ARCS},
+    ("G", 50): "IJPQ", ("G", 51): "IJ", ("G", 52): "PL", ("G", 62): "PKR",
+    ("G", 40): "P", ("G", 100): "LPRQIJ", ("G", 640): "PQ", ("G", 430): "H", ("G", 432): "H", ("G", 960): "D",
+    **{("G", code): "D" for code in (410, 420)}, **{("G", code): "DL" for code in (411, 421)},
+    ("G", 330): "K", ("G", 331): "KI", ("G", 760): "PIJKRQHEL",
+    ("G", 730): "RLQ", ("G", 740): "RP", ("G", 810): "RL", ("G", 820): "RLP", ("G", 830): "RLQ", ("G", 840): "RLP",
+    ("G", 850): "RL", ("G", 860): "RLP", ("G", 870): "RLIJK", ("G", 880): "RLP", ("G", 890): "RLP",
+    **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
+    ("M", 610): "Q",
+}  # fmt: skip
+MOTION_WORDS = "IJKRPQLH"  # that a motion code in force may use
 
 M_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),
     **dict.fromkeys((30, 40, 50), "spindle"),
     60: "tool change",
+    190: "spindle orientation",
     **dict.fromkeys((70, 80, 90), "coolant"),
-    **dict.fromkeys((480, 490), "override"),
+    **dict.fromkeys((480, 490, 500, 510, 520, 530), "override"),
+    **dict.fromkeys(range(620, 690, 10), "signals"),
+    610: "tool number",
 }
-M_EVENTS = frozenset((30, 40, 50, 70, 80, 90, 480, 490))
 
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
 _POST = "choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
-_CYCLE = Refusal("a canned cycle is", _STRAIGHT, True)
-_SPLINE = Refusal("a spline is", _STRAIGHT, True)
 _PROBE = Refusal(
     "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
 )
-_THREAD = Refusal("motion synchronised with the spindle is", "plan the parts before and after it", True)
-_CUTTER = Refusal("cutter radius compensation is", "let the CAM system compensate and write G40")
-_LATHE = Refusal("diameter programming is", "write radii and G8")
-_STORED = Refusal("storing a position in the control is", "give it as [positions] in the machine file", True)
-_OFFSETS = Refusal(
-    "setting offsets from the program is", "give them as [work_offsets] and [tools] in the machine file", True
-)
 
 G_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys((50, 51, 52, 53), _SPLINE),
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
-    70: _LATHE,
-    100: _OFFSETS,
-    **dict.fromkeys((281, 301), _STORED),
-    **dict.fromkeys((330, 331), _THREAD),
     **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
-    **dict.fromkeys((410, 411, 420, 421), _CUTTER),
-    **dict.fromkeys(
-        (431, 432), Refusal("a tool offset given in the program is", "use G43 H and [tools]", True)
-    ),
-    **dict.fromkeys((500, 510), Refusal("scaling is", "write the scaled coordinates out")),
-    520: Refusal("a local coordinate system is", "use G92 or one of G54 to G59.3", True),
+    500: Refusal("presetting coordinates with G50 is", "write G92", True),
+    510: Refusal("scaling is", "write the scaled coordinates out"),
     **dict.fromkeys(
         (680, 690), Refusal("rotating the coordinate system is", "write the rotated coordinates out", True)
     ),
     **dict.fromkeys((700, 710, 711, 712, 720, 721, 722), Refusal("a lathe cycle is", _STRAIGHT, True)),
-    **dict.fromkeys((730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890), _CYCLE),
-    930: Refusal("inverse-time feed is", "write feeds in length per minute (G94)"),
-    950: Refusal("feed per revolution is", "write feeds in length per minute (G94)"),
-    960: Refusal("constant surface speed is", "write a spindle speed (G97)"),
 }
 
 M_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys(
-        (500, 510, 520, 530),
-        Refusal("switching overrides is", "remove it: a plan is made for the programmed feed"),
-    ),
-    190: Refusal("orienting the spindle is", "plan the parts before and after it"),
-    610: Refusal("setting the tool number is", "write T and M6"),
-    **dict.fromkeys(
-        range(620, 690, 10),
-        Refusal("reading or writing the control's signals is", "plan the parts before and after it"),
-    ),
     **dict.fromkeys((700, 710, 720, 730), Refusal("saving and restoring modes is", "write the modes out")),
     **dict.fromkeys((980, 990), Refusal("a subprogram is", "write its blocks out")),
 }
 
 
-def unknown(letter: str, code: int) -> Refusal:
-    """The refusal of a code that no table names."""
+def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
+    """The refusal of a code that no table names; one that is not refused by `strict` alone may move."""
+    if letter == "M" and not strict:
+        what = "an M code that this reader does not know, and that may move with its words or by itself, is"
+        return Refusal(what, f"write G0 or G1, or give --ignore M{number(code)} if nothing moves", True)
     if letter == "M":
         if 1000 <= code <= 1990:
             return Refusal("a command that each machine defines for itself is", "remove it if nothing moves")
         return Refusal("an M code that RS274NGC does not know is", "remove it if nothing moves")
-    return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
+    what, remedy = "a G code that RS274NGC does not know is", "write it with the codes of RS274NGC"
+    return Refusal(what, f"{remedy}, or give --ignore G{number(code)} if nothing moves", True)
 
 
 # Letters that no supported code uses.
 LETTERS_REFUSED: dict[str, Refusal] = {
-    **dict.fromkeys("ABC", Refusal("a rotary axis is", _POST)),
-    **dict.fromkeys("UVW", Refusal("a second linear axis is", _POST)),
+    **dict.fromkeys("ABC", Refusal("a rotary axis that moves is", _POST)),
+    **dict.fromkeys("UVW", Refusal("a second linear axis that moves is", _POST)),
     "E": Refusal(
-        "an extruder axis (or a number with an exponent) is", "remove E words, write numbers out in digits"
+        "an extruder axis is", "give --extruder ignore to plan the motion of the other axes without it"
     ),
-    "D": Refusal("a cutter radius number is", "let the CAM system compensate and remove it"),
-    "L": Refusal("a repetition or parameter word is", "remove it, or write the repetitions out"),
     "O": Refusal("a subprogram or O word is", "write its blocks out, or remove a mere program number"),
 }
 
+# Axes that are not planned: they may be named as long as they stand still.
+PARKABLE = "ABCUVW"
+
 # Letters that only some words use: "I word without G2 or G3".
 LETTER_NEEDS = {
-    "I": "G2 or G3",
-    "J": "G2 or G3",
-    "K": "G2 or G3",
-    "R": "G2 or G3",
-    "P": "G4, G64, G2 or G3",
-    "Q": "G64",
-    "H": "G43",
+    "I": "G2, G3, G5, G5.1, G10, G33.1, G76 or G87",
+    "J": "G2, G3, G5, G5.1, G10, G76 or G87",
+    "K": "G2, G3, G6.2, G33, G33.1, G76 or G87",
+    "R": "G2, G3, G6.2, G10 or a canned cycle",
+    "P": "G4, G10, G64, G2, G3, G5, G5.2, G6.2, a canned cycle that dwells or M62 to M66",
+    "Q": "G5, G10, G64, G73, G76, G83, M61 or M66 to M68",
+    "H": "G43, G43.2 or G76",
+    "D": "G41, G42 or G96",
+    "L": "G5.2, G10, G41.1, G42.1, M66 or a canned cycle",
+    "E": "G76 or M66 to M68",
 }
 
 # Characters that start no word, and what they mean in the dialects that use them.
@@ -148,13 +157,14 @@ CHARACTERS: dict[str, str] = {
     "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
     "[": "expressions are not supported; write the number out",
     "<": "named parameters are not supported; write the number out",
-    "$": "commands to the control ($H, $J ...) are not supported; remove the line if nothing moves, else write G0 or G1",
+    "$": "this command to the control is not supported: it may move ($J does); write G0 or G1, or give --ignore $ if nothing moves",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     "@": "polar coordinates are not supported; write x and y",
     "^": "polar coordinates are not supported; write x and y",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
+    ",": "corner roundings and chamfers (,R and ,C) are not supported; write the arc or the line",
     "!": "a comment starts with ( or ;",
 }
 

@@ -1,47 +1,26 @@
-"""Languages that are not RS274NGC, by what only they contain.
+"""Languages that are not RS274NGC, by what only they contain, and files that are no programs at all.
 
-Conversational Heidenhain programs and Siemens programs with their commands and assignments cannot be read word by word: a message
-about their first odd letter would not help. Plotter files (HPGL) are read, by `planner.nc.hpgl`. The marks below occur in no
-RS274NGC program outside comments.
+Conversational Heidenhain programs and Siemens programs with their commands and assignments are read by `planner.nc.language`, plotter
+files (HPGL) by `planner.nc.hpgl`. The marks below occur in no RS274NGC program outside comments.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
-from planner.nc.faults import Fault
+from planner.base.errors import InputError
 from planner.nc.hpgl.lexer import CONTROL
-
-
-@dataclass(frozen=True)
-class _Dialect:
-    name: str
-    mark: re.Pattern[bytes]
-    remedy: str
-
+from planner.nc.reading import HEIDENHAIN, SIEMENS
 
 _LOOKED_AT = 20_000  # bytes at the start of a file that tell its language
-_RS274 = "choose a post-processor for RS274NGC (LinuxCNC, grbl, Mach3) in the CAM system"
-
-_DIALECTS = (
-    _Dialect(
-        "a conversational Heidenhain program",
-        re.compile(
-            rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b",
-            re.MULTILINE | re.IGNORECASE,
-        ),
-        _RS274,
-    ),
-    _Dialect(
-        "a Siemens (Sinumerik) program",
-        re.compile(
-            rb"^[ \t]*(?:N\d+[ \t]*)?(DEF[ \t]+(?:REAL|INT|BOOL|STRING)|PROC[ \t]|EXTERN[ \t]|CYCLE\d+[ \t]*\(|MSG[ \t]*\(|"
-            rb"WORKPIECE[ \t]*\(|SUPA\b|TRAFOOF\b|TRANS[ \t]|STOPRE\b|%_N_|[XYZABC]=)",
-            re.MULTILINE | re.IGNORECASE,
-        ),
-        _RS274,
-    ),
+_CONVERSATIONAL = re.compile(
+    rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b", re.MULTILINE | re.IGNORECASE
+)
+_SIEMENS = re.compile(
+    rb"^[ \t]*(?:N\d+[ \t]*)?(DEF[ \t]+(?:REAL|INT|BOOL|STRING)|PROC[ \t]|EXTERN[ \t]|M?CALL[ \t]+CYCLE|CYCLE\d+[ \t]*\(|MSG[ \t]*\(|"
+    rb"WORKPIECE[ \t]*\(|SUPA\b|TRAFOOF\b|TRANS[ \t]|STOPRE\b|%_N_|[XYZABC]=|R\d+=|(?:ENDIF|ENDWHILE|ENDLOOP|ENDFOR)\b|"
+    rb"GOTO[FB]\b)",
+    re.MULTILINE | re.IGNORECASE,
 )
 
 
@@ -56,6 +35,39 @@ _NC = re.compile(rb"\A(?:[%\s]|;[^\n]*|\([^)\n]*\)|/)*[GMNOFST][ \t]*\d", re.IGN
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
 
 
+_CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
+_MODELS = (
+    # name, what only such a file starts with, what to do
+    (
+        "a drawing (DXF)",
+        re.compile(rb"\A\s*(?:999\s*\n[^\n]*\n\s*)*0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF"),
+        _CAM,
+    ),
+    ("a model (STL)", re.compile(rb"\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", re.IGNORECASE), _CAM),
+    ("a model (STEP)", re.compile(rb"\A\s*ISO-10303-21\s*;"), _CAM),
+    (
+        "a drawing (SVG)",
+        re.compile(rb"\A\s*(?:<\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*<svg\b", re.DOTALL),
+        _CAM,
+    ),
+    ("a document (PDF)", re.compile(rb"\A%PDF-\d"), _CAM),
+    ("an archive (ZIP, 3MF)", re.compile(rb"\APK\x03\x04"), "unpack it and give the program in it"),
+)
+# A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
+_STL_HEAD, _STL_TRIANGLE = 84, 50
+
+
+def refuse_models(data: bytes, source: str) -> None:
+    """Raise InputError for a drawing or a model: files that people have beside their programs."""
+    head = data[:_LOOKED_AT]
+    triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+    if triangles and len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
+        raise InputError(f"this is a model (STL), not a program; {_CAM}", source=source)
+    for name, mark, remedy in _MODELS:
+        if mark.search(head):
+            raise InputError(f"this is {name}, not a program; {remedy}", source=source)
+
+
 def is_plotter_file(data: bytes, source: str) -> bool:
     """Whether a text is HPGL: by its content where that is clear, else by the suffix of its name."""
     head = data[:_LOOKED_AT]
@@ -64,17 +76,9 @@ def is_plotter_file(data: bytes, source: str) -> bool:
     return source.lower().endswith(PLOTTER_SUFFIXES) and not _NC.match(head)
 
 
-def recognise(data: bytes) -> Fault | None:
-    """The fault that names the language of a program, if it is not RS274NGC."""
+def language_of(data: bytes) -> str | None:
+    """`HEIDENHAIN` for conversational programs, `SIEMENS` for those of a Sinumerik; None for all others."""
     head = data[:_LOOKED_AT]
-    for dialect in _DIALECTS:
-        found = dialect.mark.search(head)
-        if found:
-            at = found.start(1)
-            line = head.count(b"\n", 0, at) + 1
-            column = at - head.rfind(b"\n", 0, at)
-            word = found.group(1).decode("latin-1").strip()
-            return Fault(
-                line, column, word, f"this looks like {dialect.name}, which is not read; {dialect.remedy}"
-            )
-    return None
+    if _CONVERSATIONAL.search(head):
+        return HEIDENHAIN
+    return SIEMENS if _SIEMENS.search(head) else None

@@ -17,12 +17,14 @@ class Fault:
     line, column : 1-based place in the source
     word         : the word found, as it is written
     message      : what it is, what is allowed and what to do
+    source       : name of the file, if it is not the main program's
     """
 
     line: int
     column: int
     word: str
     message: str
+    source: str = ""
 
     def __str__(self) -> str:
         return f"{self.word}: {self.message}" if self.word else self.message
@@ -31,8 +33,8 @@ class Fault:
 class FaultList(Sequence[Fault]):
     """Faults by word; a `Fault` is made when it is looked at (a rotary program has 220,000)."""
 
-    def __init__(self, words: Words, found: list[tuple[int, str]]):
-        self._words, self._found = words, found
+    def __init__(self, found: list[tuple[Words, int, str]]):
+        self._found = found
 
     def __len__(self) -> int:
         return len(self._found)
@@ -44,9 +46,9 @@ class FaultList(Sequence[Fault]):
     def __getitem__(self, index: int | slice) -> Fault | Sequence[Fault]:
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
-        word, message = self._found[index]
-        line = int(self._words.line[self._words.row(word)])
-        return Fault(line, self._words.column(word), self._words.text(word), message)
+        words, word, message = self._found[index]
+        line = int(words.line[words.row(word)])
+        return Fault(line, words.column(word), words.text(word), message, words.file(word))
 
 
 def require_none(faults: Sequence[Fault], source: str) -> None:
@@ -56,5 +58,5 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
     first, more = faults[0], len(faults) - 1
     text = str(first)
     if more:
-        text += f" ({more} more in this program; 'planner info' lists them all)"
-    raise InputError(text, source=source, line=first.line, column=first.column)
+        text += f" ({more} more in this program; 'planner info' shows them)"
+    raise InputError(text, source=first.source or source, line=first.line, column=first.column)

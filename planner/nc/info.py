@@ -7,6 +7,7 @@ tangents; moves of length zero are passed over, and a rapid, dwell or stop betwe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,13 +16,17 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine
 from planner.nc.arcs import IN_PLANE
+from planner.nc.bezier import at, homogeneous, lengths
 from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
-from planner.nc.program import Kind, Program
+from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program
 from planner.nc.reader import interpret, load
+from planner.nc.reading import AS_USUAL, Reading
 
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
+PLACES_SHOWN = 100  # of what is not supported, in tables and summaries; the others are counted
+SPLINE_PLACES = 513  # on a piece of a spline, at which its extent is looked at: good to 5e-7 of its size
 _NOWHERE = 1e-9  # a move shorter than this turns no corner [mm]: the rounding of coordinates around 1e3 mm
 
 
@@ -31,11 +36,11 @@ class ProgramInfo:
 
     source           : file name
     lines            : source lines
-    blocks           : number of blocks by `Kind` name, in lower case
+    blocks           : number of blocks by `Kind` name, in lower case; "spline" only where there are some
     full_circles     : arcs of a full turn and more;  helices : arcs that rise along their axis
     events           : number of events by letter or code ("S", "T", "M3" ...)
-    extent_min, _max : (3,) box around the start and all motion, arcs included [mm]
-    length           : path length by kind "rapid", "line", "arc" [mm]
+    extent_min, _max : (3,) box around the start and all motion, arcs and splines included [mm]
+    length           : path length by kind "rapid", "line", "arc", and "spline" where there are some [mm]
     feed             : (least, largest) programmed feed [mm/s]; inf where a plotter file gives none
     feed_changes     : number of feed moves whose feed differs from the one before
     segment_length   : quantiles LENGTH_QUANTILES of the feed moves' lengths [mm]
@@ -44,6 +49,7 @@ class ProgramInfo:
     dwell            : sum of all dwells [s]
     tools            : tool numbers in the order of their T words
     notes            : what the reader assumed
+    expansion        : what was expanded: calls, turns of loops, lines executed; None where nothing was
     unsupported      : every construct that is not supported or not valid
     """
 
@@ -64,32 +70,37 @@ class ProgramInfo:
     dwell: float
     tools: tuple[int, ...]
     notes: tuple[str, ...]
-    unsupported: tuple[Fault, ...]
+    expansion: Expansion | None
+    unsupported: Sequence[Fault]
 
 
 def inspect_program(
-    path: str | Path, machine: Machine | None = None, *, block_delete: bool = True
+    path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL
 ) -> ProgramInfo:
     """Read a program as far as it can be read and describe it.
 
     Raises InputError only if the file cannot be read, is empty or is not a text.
     """
     data = load(path)
-    program, faults = interpret(data, machine, source=str(path), block_delete=block_delete)
-    return describe(program, lines=len(data.splitlines()), unsupported=tuple(faults))
+    program, faults = interpret(data, machine, reading, source=str(path))
+    return describe(program, lines=len(data.splitlines()), unsupported=faults)
 
 
-def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = ()) -> ProgramInfo:
+def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ()) -> ProgramInfo:
     """The figures of a program that has been read."""
     start = np.vstack([program.start, program.end])[:-1]
     length = _lengths(program, start)
-    is_feed = np.isin(program.kind, (Kind.LINE, Kind.ARC))
+    is_feed = np.isin(program.kind, FEED_MOVES)
     feed = program.feed[is_feed]
     low, high = _extents(program, start)
     return ProgramInfo(
         source=program.source,
         lines=lines,
-        blocks={kind.name.lower(): int((program.kind == kind).sum()) for kind in Kind},
+        blocks={
+            kind.name.lower(): int((program.kind == kind).sum())
+            for kind in Kind
+            if kind != Kind.SPLINE or len(program.splines)
+        },
         full_circles=int((np.abs(program.arc_sweep) >= 2 * np.pi - 1e-9).sum()),
         helices=int((np.abs(_rise(program, start)) > _NOWHERE).sum()),
         events=_count_events(program),
@@ -97,7 +108,8 @@ def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = (
         extent_max=high,
         length={
             kind.name.lower(): float(length[program.kind == kind].sum())
-            for kind in (Kind.RAPID, Kind.LINE, Kind.ARC)
+            for kind in MOVES
+            if kind != Kind.SPLINE or len(program.splines)
         },
         feed=(float(feed.min()), float(feed.max())) if len(feed) else (np.nan, np.nan),
         feed_changes=int((feed[1:] != feed[:-1]).sum()),
@@ -105,10 +117,11 @@ def describe(program: Program, *, lines: int, unsupported: tuple[Fault, ...] = (
             float(q) for q in (np.quantile(length[is_feed], LENGTH_QUANTILES) if len(feed) else [np.nan] * 5)
         ),
         corners=_corners(program, start, length, is_feed),
-        zero_moves=int(((length <= _NOWHERE) & (program.kind <= Kind.ARC)).sum()),
+        zero_moves=int(((length <= _NOWHERE) & np.isin(program.kind, MOVES)).sum()),
         dwell=float(program.dwell.sum()),
         tools=tuple(int(event.text[1:]) for event in program.events if event.text[0] == "T"),
         notes=program.notes,
+        expansion=program.expansion,
         unsupported=unsupported,
     )
 
@@ -125,6 +138,10 @@ def _lengths(program: Program, start: FloatArray) -> FloatArray:
     from_start, from_end = _spokes(program, start)
     radius = (np.hypot(*from_start) + np.hypot(*from_end)) / 2.0
     length[program.arc_block] = np.hypot(radius * program.arc_sweep, _rise(program, start))
+    splines = program.splines
+    if len(splines):
+        length[np.unique(splines.block)] = 0.0
+        np.add.at(length, splines.block, lengths(homogeneous(splines.points, splines.weights)))
     return length
 
 
@@ -144,8 +161,10 @@ def _plane_axes(program: Program) -> Array:
 
 def _extents(program: Program, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The box around all motion. An arc reaches centre + radius along an axis where its sweep passes that
-    direction."""
-    points = np.vstack([program.start, program.end])
+    direction; a spline is looked at in `SPLINE_PLACES` places of each piece."""
+    splines = program.splines
+    on, _, _ = at(homogeneous(splines.points, splines.weights), np.linspace(0.0, 1.0, SPLINE_PLACES))
+    points = np.vstack([program.start, program.end, on.reshape(-1, program.end.shape[1])])
     low, high = points.min(axis=0), points.max(axis=0)
     (ua, ub), to_end = _spokes(program, start)
     radius = np.maximum(np.hypot(ua, ub), np.hypot(*to_end))
@@ -175,13 +194,27 @@ def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: A
         tangent[k, axes[0]] = -spoke[1] * program.arc_sweep / size
         tangent[k, axes[1]] = spoke[0] * program.arc_sweep / size
         tangent[k, n] = _rise(program, start)[rows] / size
-    parts = (length > _NOWHERE) | (program.kind > Kind.ARC)  # what joins or separates
+    _set_spline_tangents(program, leaving, arriving)
+    parts = (length > _NOWHERE) | ~np.isin(program.kind, MOVES)  # what joins or separates
     leaving, arriving, is_feed = leaving[parts], arriving[parts], is_feed[parts]
     joint = is_feed[:-1] & is_feed[1:]
     before, after = arriving[:-1][joint], leaving[1:][joint]
     # atan2 of the half angle's sine and cosine: exact at 0 and at 180 degrees, and lengths cancel
     theta = 2.0 * np.arctan2(np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1))
     return {limit: int((np.rad2deg(theta) > limit).sum()) for limit in CORNER_DEGREES}
+
+
+def _set_spline_tangents(program: Program, leaving: FloatArray, arriving: FloatArray) -> None:
+    """Write the unit tangents at both ends of splines into those of the blocks (B, A), in place."""
+    splines = program.splines
+    if not len(splines):
+        return
+    blocks, first = np.unique(splines.block, return_index=True)
+    last = np.append(first[1:], len(splines)) - 1
+    _, rate, _ = at(homogeneous(splines.points, splines.weights), np.array([0.0, 1.0]))
+    for tangent, row, end in ((leaving, first, 0), (arriving, last, 1)):
+        size = np.linalg.norm(rate[row, end], axis=1, keepdims=True)
+        tangent[blocks] = rate[row, end] / np.maximum(size, _NOWHERE)
 
 
 def _count_events(program: Program) -> dict[str, int]:

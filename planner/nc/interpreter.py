@@ -1,7 +1,7 @@
 """Executing blocks in the order of RS274NGC, as LinuxCNC's interpreter has it:
 
-    F, S, T, M6, M3-M9, M48/M49, G4, plane, units, G40, tool length, work offset, path control, distance modes, G28/G30/G92,
-    motion, M0/M1/M60/M2/M30
+    feed mode, F, S, T, M62-M68, M6, M61, M3-M9, M48/M49, G4, plane, units, G7/G8, G40-G42, tool length, work offset, path control,
+    distance modes, G98/G99, G10/G28/G30/G52/G92, motion, M0/M1/M60/M2/M30
 
 Two consequences surprise. F is read in the units in force *before* a G20 or G21 on its line. M3 and M8 act before the line's move
 and M0 after it. G53 holds for its line only; a motion code alone on a line moves nothing.
@@ -12,22 +12,33 @@ next line, so that `info` can show them all; `reader` refuses a program that has
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from planner.base.units import SECONDS_PER_MINUTE
+from planner.base.arrays import FloatArray
+from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc import codes, moves
-from planner.nc.block import Block, read_block
+from planner.nc import codes, compensation, drilling, feeds, homing, moves, offsets, signals, threads
+from planner.nc.assumed import Assumed
+from planner.nc.block import OFFSET_NUMBER, Block, read_block
+from planner.nc.cutter import Cutter, CutterFault
 from planner.nc.faults import FaultList
 from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, integer
 from planner.nc.plain import run_plain
-from planner.nc.program import Kind, PathControl, Program
+from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
+from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
+_COVET_AXES = (100, 280, 300, 520, 920)
 _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-_ROWS_AT_ONCE = 2  # blocks that one line can give beyond one per line (G28 through an intermediate point, a dwell, M6, M0)
+# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
+# make room for themselves.
+_ROWS_AT_ONCE = 4
+_SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
 
 
 _WHY_NO_MOTION = {
@@ -37,59 +48,114 @@ _WHY_NO_MOTION = {
 
 
 class Interpreter:
-    """Runs the words of one program. After `run`: `program()`, `faults()`, `notes`."""
+    """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`, `faults()`, `notes`.
 
-    def __init__(self, words: Words, machine: Machine | None, source: str):
-        self.words, self.source = words, source
+    Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
+
+    open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
+    ended : M2, M30 or a second % was executed; later chunks are not
+    """
+
+    def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
+        self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
         self.state = self.setup.start()
-        self.store = Store(len(words.line), len(words.letter))
+        self.store = Store()
+        self.assumed = Assumed(reading)
+        self.state.strict = reading.strict
+        self.state.absolute_centre = reading.arc_centres == ABSOLUTE
+        self.open_arcs: list[tuple[int, bool]] = []
+        self.ended = False
+        self._cutter: Cutter | None = None
+        self._words: Words | None = None  # of the last chunk
+        self._splines = SplineReader()
+        self._begun = False
+        self._read = 0  # rows of the last chunk
+        self._units_at: int | None = None  # number of blocks before the first G20 or G21
         self._reports: list[tuple[int, str]] = []
+        self._found: list[tuple[Words, int, str]] = []
+        self._said: set[tuple[int, str]] = set()
         self._notes: dict[str, list[int]] = {}  # in their order: first line, times
 
-    def program(self) -> Program:
-        """The program that was read; call it after `run`, and if there are no faults."""
-        return self.store.finish(self.source, self.notes)
+    def program(self, frames: Sequence[Frame] = ()) -> Program:
+        """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
+        self._note_units()
+        self._end_compensation()
+        return self.store.finish(self.source, self.notes, frames, self.reading)
+
+    def _end_compensation(self) -> None:
+        """Settle the last move, if the program just ends while compensation is on."""
+        if self._cutter is None or self._words is None:
+            return
+        try:
+            self._cutter.fix()
+        except CutterFault as fault:
+            self._found.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed, each once, with its first line and how often."""
-        found = sorted(self._notes.items(), key=lambda note: note[1][0])
-        return tuple(
-            f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}" for text, (line, times) in found
-        )
+        found = [
+            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
+            for text, (line, times) in self._notes.items()
+        ]
+        return tuple(text for _, text in sorted(found + self.assumed.notes(), key=lambda note: note[0]))
 
-    def run(self) -> None:
-        """Read all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
-        row, rows, begun, ended = 0, len(self.words.line), False, False
-        while row < rows and not ended:
+    def execute(self, words: Words) -> None:
+        """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
+        row, rows, self._words = 0, len(words.line), words
+        self.store.begin(len(words.letter))
+        while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
-            after = run_plain(self.words, row, self.state, self.store)
-            begun |= after > row
+            after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
+            self._begun |= after > row
             if after < rows:
-                block = read_block(self.words, after, self.report)
+                self.store.frame = int(words.frame[after])
+                block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:
-                    ended = begun  # the first % starts the program
+                    self.ended = self._begun  # the first % starts the program
                 elif block is not None:
-                    ended = self._execute_or_report(block)
-                begun = True
+                    self.ended = self._execute_or_report(block)
+                self._begun = True
                 after += 1
             row = after
-        if not (self.words.letter[self.words.first[row] :] == ord("%")).all():
-            end, after = int(self.words.line[row - 1]), int(self.words.line[row])
+        self._read = row
+        self._splines.keep(words)
+        self._keep_faults(words)
+        self.assumed.count_letters(words, row)
+
+    def note_what_follows(self, words: Words) -> None:
+        """Say it if the last chunk, `words`, goes on after the end of the program."""
+        row = self._read
+        if not (words.letter[words.first[row] :] == ord("%")).all():
+            end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
-        self._note_units()
+
+    @property
+    def all_arcs_close_otherwise(self) -> bool:
+        """Whether there are arcs that do not close, and all of them would with their centres read the other way."""
+        return bool(self.open_arcs) and all(otherwise for _, otherwise in self.open_arcs)
 
     def report(self, word: int, message: str) -> None:
-        """Keep a fault of a word, by its index."""
+        """Keep a fault of a word of the chunk, by its index."""
         self._reports.append((word, message))
 
     def faults(self) -> FaultList:
-        """All faults in the order of the program."""
+        """All faults in the order of the program; a line that is executed many times is named once."""
+        return FaultList(self._found + self._splines.faults())
+
+    def _keep_faults(self, words: Words) -> None:
+        """Keep the chunk's faults in the order of its words."""
         refused = self.store.refused_word[: self.store.refusals]
-        letters = self.words.letter[refused]
+        letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
-        return FaultList(self.words, sorted(found + self._reports))
+        for word, message in sorted(found + self._reports):
+            key = (int(words.at[word]), message)
+            if key not in self._said:
+                self._said.add(key)
+                self._found.append((words, word, message))
+        self._reports.clear()
 
     def note(self, text: str, line: int) -> None:
         """Keep what was assumed on a line."""
@@ -97,58 +163,49 @@ class Interpreter:
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
-        moves = np.flatnonzero(self.store.block.kind[: self.store.blocks] <= Kind.ARC)
-        if not len(moves):
-            return
-        line = int(self.store.block.line[moves[0]])
-        before = slice(0, self.words.first[np.searchsorted(self.words.line, line, side="right")])
-        code = np.rint(10.0 * self.words.value[before])
-        if not ((self.words.letter[before] == ord("G")) & ((code == 200.0) | (code == 210.0))).any():
-            self.note("no G20 or G21 before the first move: mm", line)
+        moves = np.flatnonzero(np.isin(self.store.block.kind[: self.store.blocks], MOVES))
+        if len(moves) and (self._units_at is None or moves[0] < self._units_at):
+            self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
             return self._execute(block)
         except WordFault as fault:
+            if isinstance(fault, moves.ArcFault):
+                self.open_arcs.append((block.line, fault.otherwise))
             self.report(fault.word, fault.message)
+            return block.m.get("stopping") in (20, 300)
+        except CutterFault as fault:
+            self.report(min(block.at.values()), str(fault))
+            self._cutter = self.state.actual = None  # what follows is read without compensation
             return block.m.get("stopping") in (20, 300)
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
-        self._feed(block)
+        if self._cutter is not None:
+            compensation.check_words(self.state, block)
+        feeds.set_feed(self.state, block, self.note)
         self._events(block)
         if block.g.get("one-shot") == 40:
             self._dwell(block)
         self._modes(block)
         if not block.foreign:
+            self._check_parked(block)
+            homing.go_to_switches(self.state, self.store, block, self.note)
             self._one_shot(block)
             self._motion(block)
         stop = block.m.get("stopping")
-        if stop in (0, 10, 600):
+        if stop is not None and self._cutter is not None:
+            self._cutter.fix()
+        if stop == 600:
+            self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
     # --- what is said before anything moves -------------------------------------------------------------------------------
-
-    def _feed(self, block: Block) -> None:
-        if "F" not in block.value:
-            return
-        feed = block.value["F"]
-        if not feed > 0:
-            raise WordFault(
-                block.at["F"],
-                "a feed must be positive; write the feed of the moves that follow, such as F1000",
-            )
-        self.state.feed = feed * self.state.unit / SECONDS_PER_MINUTE
-        code = block.g.get("units")
-        if code is not None and (code == 200) != (self.state.unit != 1.0):
-            unit = "mm" if self.state.unit == 1.0 else "inch"
-            self.note(
-                f"F{feed:g} is {unit} per minute: F acts before G{codes.number(code)} on the same line",
-                block.line,
-            )
 
     def _events(self, block: Block) -> None:
         state, store, line = self.state, self.store, block.line
@@ -158,22 +215,42 @@ class Interpreter:
                     block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
                 )
             store.add_event("S", block.value["S"], line)
+            state.spindle.speed = block.value["S"]
         if "T" in block.value:
             state.tool_selected = integer(block, "T", 0)
             store.add_event("T", state.tool_selected, line)
+        if "signals" in block.m:
+            signals.signal(self.store, block)
+        if "tool number" in block.m:
+            if "Q" not in block.value:
+                raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
+            state.tool_loaded = integer(block, "Q", 0)
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
             store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop that takes no time", line)
-        for group in ("spindle", "coolant", "override"):
+            self.note("a tool change is a full stop that takes no time and moves nothing", line)
+        for letter, value in block.events:
+            store.add_event(letter, value, line)
+        for group in ("spindle", "spindle orientation", "coolant", "override"):
             if group in block.m:
                 store.add_event("M", block.m[group] / 10, line)
+        state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
+        if "spindle mode" in block.g:
+            state.spindle.surface_speed = block.g["spindle mode"] == 960
+            if state.spindle.surface_speed and "S" not in block.value:
+                raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
         for code in block.g.values():
             if code in codes.G_EVENTS:
                 store.add_event("G", code / 10, line)
 
     def _dwell(self, block: Block) -> None:
         seconds = block.value.get("P")
+        if seconds is not None and self.assumed.printer:
+            seconds *= MILLISECOND
+            self.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        elif seconds is None and not self.assumed.strict and (self.assumed.printer or "S" in block.value):
+            seconds = block.value.get("S", 0.0)
+            self.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
         if seconds is None or seconds < 0:
             word = block.at["one-shot"] if seconds is None else block.at["P"]
             raise WordFault(
@@ -187,11 +264,17 @@ class Interpreter:
             state.normal = {170: 2, 180: 1, 190: 0}[g["plane"]]
         if "units" in g:
             set_units(state, g["units"])
+            if self._units_at is None:
+                self._units_at = self.store.blocks
+        if "lathe diameter mode" in g:
+            state.diameters = g["lathe diameter mode"] == 70
+        if "cutter compensation" in g:
+            self._cutter = compensation.switch(state, self.store, block, self._cutter, self.note)
         if "tool length" in g:
-            state.tool_length = self._tool_length(block) if g["tool length"] == 430 else 0.0
+            offsets.set_tool_offset(state, block, self.note)
         if "work offset" in g:
             state.system = g["work offset"]
-            if state.system not in self.setup.systems and state.system != 540:
+            if state.system not in state.systems and state.system != 540:
                 self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0", block.line)
         if "path control" in g:
             self._path_control(block)
@@ -199,13 +282,9 @@ class Interpreter:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
             state.absolute_centre = g["arc centre mode"] == 901
-        self.setup.apply_offsets(state)
-
-    def _tool_length(self, block: Block) -> float:
-        tool = integer(block, "H", 0) if "H" in block.value else self.state.tool_loaded
-        if tool not in self.setup.tools and tool != 0:
-            self.note(f"tool {tool} has no length in the machine file: 0", block.line)
-        return self.setup.tools.get(tool, 0.0)
+        if "retract mode" in g:
+            state.to_level, state.retract_given = g["retract mode"] == 980, True
+        state.apply_offsets()
 
     def _path_control(self, block: Block) -> None:
         state = self.state
@@ -227,78 +306,148 @@ class Interpreter:
         code = block.g.get("one-shot")
         if code is None or code in (40, 530):
             return
-        covets_axes = code in (280, 300, 920)
         motion = block.g.get("motion")
-        if covets_axes and motion is not None:
+        if code in (280, 300) and motion == 0 and not self.state.strict:
+            self.note(
+                f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
+            )
+        elif code in _COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
             )
         if code in (280, 300):
-            self._go_home(block, code)
+            homing.go_home(self.state, self.store, block, self.note)
+        elif code in (281, 301):
+            offsets.store_position(self.state, code)
+        elif code == 100:
+            offsets.set_data(self.state, block, self.note)
         else:
-            self._shift_origin(block, code)
+            offsets.shift_origin(self.state, block)
 
-    def _go_home(self, block: Block, code: int) -> None:
-        """G28, G30: through the intermediate point, if there is one, to the machine's position (of the axes given)."""
-        state, name = self.state, f"G{codes.number(code)}"
-        if code not in self.setup.positions:
-            self.note(f"{name} has no position in the machine file: machine zero", block.line)
-        home = self.setup.positions.get(code, np.zeros(3))
-        if block.has("XYZ"):
-            state.position[:] = moves.target(self.state, block)
-            self.store.add(Kind.RAPID, block.line, state)
-        for axis, letter in enumerate("XYZ"):
-            if letter in block.value or not block.has("XYZ"):
-                state.position[axis] = home[axis]
-        self.store.add(Kind.RAPID, block.line, state)
-
-    def _shift_origin(self, block: Block, code: int) -> None:
-        """G92 makes the current position have the given coordinates; G92.1, G92.2 take that back, G92.3 brings it again."""
-        state = self.state
-        if code == 920:
-            if not block.has("XYZ"):
-                raise WordFault(
-                    block.at["one-shot"],
-                    "G92 needs at least one of X, Y and Z: the coordinates to give to this place",
-                )
-            for axis, letter in enumerate("XYZ"):
-                if letter in block.value:
-                    without = state.offset[axis] - state.g92[axis]
-                    state.g92[axis] = state.position[axis] - block.value[letter] * state.unit - without
-            state.g92_saved = state.g92.copy()
-        else:
-            state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
-            if code == 921:
-                state.g92_saved = np.zeros(3)
-        self.setup.apply_offsets(state)
+    def _check_parked(self, block: Block) -> None:
+        """Report words of axes that are not planned and would move."""
+        for letter in codes.PARKABLE:
+            if letter in block.value and not self.assumed.may_stand(
+                letter, block.value[letter], absolute=self.state.absolute
+            ):
+                self.assumed.moved.add(letter)
+                self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
 
     def _motion(self, block: Block) -> None:
         state, one_shot = self.state, block.g.get("one-shot")
         if "motion" in block.g:
-            state.motion = block.g["motion"] // 10
+            code = block.g["motion"]
+            state.motion = code // 10 if code <= 30 else code
         elif "cycle end" in block.g:
-            state.motion = NO_MOTION
-        if one_shot in (280, 300, 920):
+            state.motion, state.series = NO_MOTION, None
+        if one_shot in _COVET_AXES or self._gives_offsets(block):
             return
         if one_shot == 530:
             moves.check_machine_coordinates(state, block)
-        if state.motion not in (2, 3):
-            moves.check_no_arc_words(state, block)
+        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
+        moves.check_words(state, block)
+        if state.motion in codes.SPLINES or (self._splines.open and "motion" in block.g):
+            self._spline(block)
+            return
         if not moves.is_move(state, block):
+            if "motion" in block.g and state.motion > 3:
+                found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
+                raise WordFault(block.at["motion"], found)
             return
         if state.motion < 0:
             raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
-        if state.motion > 0 and not state.feed > 0:
-            found = f"G{state.motion} moves without a feed; write an F word on this line or before it"
-            raise WordFault(block.motion_word(), found)
-        target = moves.target(state, block)
-        if state.motion < 2:
-            state.position[:] = target
-            self.store.add(Kind.LINE if state.motion == 1 else Kind.RAPID, block.line, state)
+        if not self.assumed.strict:
+            self._take_default_feed(block)
+        if state.motion not in codes.CYCLES:
+            state.series = None
+        if state.in_thread and state.motion not in codes.THREADS:
+            threads.stop(state, self.store, block.line)
+        if self._cutter is not None:
+            compensation.check_motion(state, block)
+        if state.motion in codes.THREADS:
+            threads.thread(state, self.store, block, self.note)
+        elif state.motion == codes.THREADING:
+            threads.cut_thread(state, self.store, block, self.note)
+        elif state.motion in codes.CYCLES:
+            feeds.check_feed(state, block)
+            drilling.drill(state, self.store, block, self.note)
+        else:
+            self._move(block)
+
+    def _take_default_feed(self, block: Block) -> None:
+        """The machine's feed for a feed move before the first F word."""
+        state, default = self.state, self.setup.feed_default
+        if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
             return
+        state.feed = default
+        feed = default * SECONDS_PER_MINUTE / state.unit
+        self.note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
+
+    def _move(self, block: Block) -> None:
+        """G0, G1, G2, G3."""
+        state, cutter = self.state, self._cutter
+        target = moves.target(state, block)
+        kind = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)[state.motion]
+        if kind != Kind.RAPID:
+            feeds.check_feed(state, block)
+        if kind == Kind.ARC:
+            self._arc(block, target)
+            return
+        if kind == Kind.LINE:
+            feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+        if cutter is not None:
+            cutter.line(target, kind, block.line)
+            return
+        state.position[:], state.actual = target, None
+        self.store.add(kind, block.line, state)
+
+    def _arc(self, block: Block, target: FloatArray) -> None:
+        state = self.state
+        if self._cutter is None and state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
+            )
         try:
-            arc = moves.arc(state, block, target)
+            arc, normal = moves.arc(state, block, target)
+            feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
+            if self._cutter is not None:
+                self._cutter.arc(target, arc, block.line)
         finally:
             state.position[:] = target
-        self.store.add_arc(arc, block.line, state)
+        if self._cutter is None:
+            self.store.add_arc(arc, normal, block.line, state)
+
+    def _spline(self, block: Block) -> None:
+        """A line of a spline; the curve is a block of its first line."""
+        state = self.state
+        if not is_spline_line(block):
+            return
+        if self._cutter is not None:
+            raise WordFault(
+                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
+            )
+        if state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
+            )
+        state.series = None
+        if state.in_thread:
+            threads.stop(state, self.store, block.line)
+        found = self._splines.read(state, block, self.store.blocks)
+        if found is None:
+            return
+        if not self.assumed.strict:
+            self._take_default_feed(block)
+        feeds.check_feed(state, block)
+        (points, weights), line = found
+        state.position[:] = points[-1, -1]
+        self.store.add_spline(points, weights, line, state)
+
+    @staticmethod
+    def _gives_offsets(block: Block) -> bool:
+        """Whether the axis words are those of G43.1 or G43.2."""
+        return block.g.get("tool length") in (431, 432) and "motion" not in block.g

@@ -1,7 +1,11 @@
 """From bytes to words, as RS274NGC splits a program: a letter and a number, spaces without meaning.
 
-    line    = [/] word* [comments]        word = letter number        number = [+|-] digits [. digits]
+    line    = [/] word* [comments]        word = letter number        number = [+|-] digits [. digits] [e +|- digits]
     comment = ( anything but a parenthesis )   or   ; to the end of the line
+
+Beyond RS274NGC: a % at the start of a line may have a name after it, which is not read; :1000 is O1000; $ inside a line is a letter
+(the spindle's number, M3 $1); and a number may have an exponent with its sign, as programs that print numbers write small ones:
+-8.775e-05. It has no space before it, and E two digits or more: X1E-2 is a coordinate of 1 and an extruder's word.
 
 A word takes 13 bytes: letter, value and place in the source. Columns and texts come from the source when a message needs them.
 What cannot be read becomes a word too, with the letter `FAULT` and a code as its value, and the rest of its line is left out:
@@ -15,6 +19,7 @@ compiled loop and read by Python.
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -23,7 +28,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 
-# The longest source line [bytes]. RS274NGC stops at 255; programs with long comments exist, a line beyond this is not a program's.
+# The longest source line without its comments [bytes]. RS274NGC stops at 255; a line beyond this is not a program's.
 LINE_MAX = 4096
 FAULT = 0
 
@@ -35,19 +40,21 @@ class Unreadable(IntEnum):
     NUMBER = 2  # a letter without a number
     COMMENT_OPEN = 3  # "(" without ")"
     COMMENT_NESTED = 4  # "(" inside a comment
-    LONG = 5  # a line longer than LINE_MAX
+    LONG = 5  # a line longer than LINE_MAX without its comments
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Words:
-    """W words on R rows; a row is a source line with at least one word.
+    """W words on R rows; a row is a source line with at least one word. An expanded program has rows of one line many times.
 
-    letter : (W,) upper case letter code, b"%"[0], or `FAULT`
+    letter : (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number follows it
     value  : (W,) number, as written (no unit applied)
     at     : (W,) byte offset of the letter in `data`
     line   : (R,) 1-based source line
     first  : (R+1,) index of a row's first word; row r holds words first[r] ... first[r+1]-1
     data   : the source
+    frame  : (R,) index of the call that the row stands in (`Program.frames`); 0 in the main program
+    files  : further files in `data`: where each begins, and its name, ascending
     """
 
     letter: Array
@@ -56,6 +63,13 @@ class Words:
     line: Array
     first: Array
     data: bytes
+    frame: Array
+    files: tuple[tuple[int, str], ...] = ()
+
+    def file(self, word: int) -> str:
+        """The file that a word stands in; empty for the main program."""
+        found = bisect_right(self.files, int(self.at[word]), key=lambda file: file[0])
+        return self.files[found - 1][1] if found else ""
 
     def row(self, word: int) -> int:
         """The row that holds a word."""
@@ -73,6 +87,12 @@ class Words:
         found = _WORD.match(self.data, at)
         return found.group().decode("ascii").strip() if found else ""
 
+    def rest(self, word: int) -> str:
+        """What follows the letter of a word on its line, comments included."""
+        at = int(self.at[word]) + 1
+        end = self.data.find(b"\n", at)
+        return self.data[at : end if end >= 0 else len(self.data)].decode("utf-8", "replace").strip()
+
     def _line_before(self, word: int) -> bytes:
         at = int(self.at[word])
         start = self.data.rfind(b"\n", 0, at) + 1
@@ -80,7 +100,8 @@ class Words:
 
 
 _BOM = b"\xef\xbb\xbf"
-_WORD = re.compile(rb"[A-Za-z%][ \t]*[-+]?[\d \t]*\.?[\d \t]*")
+NUMBER = rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*(?:(?<=[\d.])(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
+_WORD = re.compile(rb"[A-Za-z%$:]" + NUMBER)
 
 
 def split_words(data: bytes, *, block_delete: bool) -> Words:
@@ -108,12 +129,27 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
         line=line[:rows],
         first=first[: rows + 1],
         data=data,
+        frame=np.zeros(rows, dtype=np.int32),
+    )
+
+
+def text_alone(data: bytes) -> Words:
+    """A text without words, for languages that are not split into words."""
+    none = np.zeros(0, dtype=np.int64)
+    return Words(
+        letter=none.astype(np.uint8),
+        value=np.zeros(0),
+        at=none,
+        line=none.astype(np.int32),
+        first=np.zeros(1, dtype=np.int64),
+        data=data,
+        frame=none.astype(np.int32),
     )
 
 
 _NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
 _OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
-_LETTER_O = 79
+_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR = 79, 69, 101, 58, 36
 _CHARACTER, _NUMBER, _COMMENT_OPEN, _COMMENT_NESTED, _LONG = (int(code) for code in Unreadable)
 _POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
 _MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
@@ -124,11 +160,33 @@ def _count(source):  # pragma: no cover - compiled
     """Upper bounds of the number of words and of lines."""
     letters, lines = 0, 1
     for c in source:
-        if 97 <= c <= 122 or 65 <= c <= 90 or c == _PERCENT:
+        if 97 <= c <= 122 or 65 <= c <= 90 or c in (_PERCENT, _COLON, _DOLLAR):
             letters += 1
         elif c == _NEWLINE:
             lines += 1
     return letters + lines, lines  # a line has at most one word that is not a letter's: its fault
+
+
+@njit(cache=True)
+def _digit_follows(source, i):  # pragma: no cover - compiled
+    """Whether the next character after blanks from i on is a digit."""
+    while i < len(source) and source[i] in (_SPACE, _TAB):
+        i += 1
+    return i < len(source) and 48 <= source[i] <= 57
+
+
+@njit(cache=True)
+def _exponent(source, i):  # pragma: no cover - compiled
+    """The number of characters of an exponent at i, behind a digit or a point; 0 if there is none."""
+    if not (48 <= source[i - 1] <= 57 or source[i - 1] == _POINT):
+        return 0
+    if i + 2 >= len(source) or source[i + 1] not in (_PLUS, _MINUS):
+        return 0
+    k = i + 2
+    while k < len(source) and 48 <= source[k] <= 57:
+        k += 1
+    enough = k - i - 2 >= (1 if source[i] == _SMALL_E else 2)
+    return k - i if enough and not (k < len(source) and source[k] == _POINT) else 0
 
 
 @njit(cache=True)
@@ -137,7 +195,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
     words, rows, line_number = 0, 0, 0
     while i < end:
         line_number += 1
-        line_start, row_first, blank, reading = i, words, True, True
+        line_start, row_first, blank, reading, comments = i, words, True, True, 0
         while i < end and source[i] != _NEWLINE:
             c = source[i]
             if not reading or c in (_SPACE, _TAB, _RETURN, _DOS_END):
@@ -148,9 +206,12 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 blank = False
                 i += 1
                 continue
-            blank = False
+            blank, starts = False, words == row_first
             if c == _SEMICOLON:
-                reading = False
+                comments -= i
+                while i < end and source[i] != _NEWLINE:
+                    i += 1
+                comments += i
                 continue
             if c == _OPEN:
                 fault, close = _COMMENT_OPEN, i + 1
@@ -163,6 +224,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                         break
                     close += 1
                 if fault == 0:
+                    comments += close + 1 - i
                     i = close + 1
                     continue
                 if fault == _COMMENT_NESTED:
@@ -177,15 +239,20 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 letter[words], value[words], at[words] = c, 0.0, i
                 words += 1
                 i += 1
+                reading = not starts
                 continue
-            if not 65 <= c <= 90:
+            if starts and c == _COLON and _digit_follows(source, i + 1):
+                c = _LETTER_O
+            if not (65 <= c <= 90 or (c == _DOLLAR and not starts)):
                 letter[words], value[words], at[words] = FAULT, _CHARACTER, i
                 words += 1
                 reading = False
                 continue
 
-            if c == _LETTER_O:  # names and expressions may follow: the line cannot be split into words
-                letter[words], value[words], at[words] = c, 0.0, i
+            if c == _LETTER_O and not _digit_follows(
+                source, i + 1
+            ):  # names and expressions may follow: the line cannot be split into words
+                letter[words], value[words], at[words] = c, -1.0, i
                 words += 1
                 reading = False
                 continue
@@ -217,6 +284,10 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 elif d in (_PLUS, _MINUS) and not (signed or point or digits):
                     signed = True
                     negative = d == _MINUS
+                elif d in (_LETTER_E, _SMALL_E) and digits and _exponent(source, i):
+                    exact = False
+                    i += _exponent(source, i)
+                    break
                 elif d != _SPACE and d != _TAB:
                     break
                 i += 1
@@ -232,7 +303,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 else:
                     value[words] = np.nan
             words += 1
-        if i - line_start > LINE_MAX:
+        if i - line_start - comments > LINE_MAX:
             words = row_first
             letter[words], value[words], at[words] = FAULT, _LONG, line_start
             words += 1

@@ -1,18 +1,34 @@
-"""Where a block's words lead: end points, centres, arcs, and what G53 and the arc words ask of the state.
+"""Where a block's words lead: end points, centres, arcs, and what G53 and the words of motion codes ask of the state.
 
 A coordinate is absolute (G90: plus the offsets), relative to the last position (G91) or a machine coordinate (G53). I J K are
-relative to the start (G91.1), or absolute like the coordinates of G90 (G90.1), whatever G90 and G91 say.
+relative to the start (G91.1), or absolute like the coordinates of G90 (G90.1), whatever G90 and G91 say. In diameter mode (G7) X words
+are halved; I, K and R stay radii.
+
+A rotated work system turns the plane of an arc with it. An arc in G18 or G19 then lies in a plane of two axes only if the rotation is
+a quarter turn; the record of an arc knows no other planes, and other angles are refused there.
 """
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_from_radius, closes
-from planner.nc.block import Block
+from planner.nc.block import Block, unused
 from planner.nc.state import REFUSED_MOTION, State
 
-_ROUNDING = {"T": 1e-4, "H": 1e-4, "P": 1e-3}  # what RS274NGC rounds away from a whole number
+_CLOSES_IF = "the arc would close if its centre were"
+_ROUNDING = {
+    "T": 1e-4,
+    "H": 1e-4,
+    "D": 1e-4,
+    "L": 1e-4,
+    "Q": 1e-4,
+    "P": 1e-3,
+}  # what RS274NGC rounds away from a whole number
 
 
 class WordFault(Exception):
@@ -23,39 +39,89 @@ class WordFault(Exception):
         self.word, self.message = word, message
 
 
+class ArcFault(WordFault):
+    """The words of an arc contradict each other; `otherwise` if it would close with its centre read the other way (G90.1, G91.1)."""
+
+    def __init__(self, word: int, message: str, *, otherwise: bool):
+        super().__init__(word, message)
+        self.otherwise = otherwise
+
+
 def is_move(state: State, block: Block) -> bool:
     """Whether the block moves. A motion code alone does not, except for an arc, which then lacks its words."""
     arc = state.motion in (2, 3) and ("motion" in block.g or block.has("IJKR"))
     return arc or block.has("XYZ")
 
 
+def coordinate(state: State, block: Block, axis: int) -> float:
+    """The length that the word of an axis gives [mm]; of a diameter its half."""
+    length = block.value["XYZ"[axis]] * state.unit
+    return length / 2.0 if axis == 0 and state.diameters else length
+
+
 def target(state: State, block: Block) -> FloatArray:
     """Where the block's axis words lead, (3,) in machine coordinates [mm]."""
+    in_machine = block.g.get("one-shot") == 530
+    if state.rotated and not in_machine:
+        return _rotated_target(state, block)
     end = state.position.copy()
     for axis, letter in enumerate("XYZ"):
         if letter in block.value:
-            length = block.value[letter] * state.unit
-            if block.g.get("one-shot") == 530:
+            length = coordinate(state, block, axis)
+            if in_machine:
                 end[axis] = length
             else:
                 end[axis] = length + (state.offset[axis] if state.absolute else end[axis])
     return end
 
 
-def arc(state: State, block: Block, end: FloatArray) -> Arc:
-    """The arc of a block to `end` (3,) [mm]. Raises WordFault if its words are missing or contradict each other."""
+def _rotated_target(state: State, block: Block) -> FloatArray:
+    point = state.programmed()
+    for axis, letter in enumerate("XYZ"):
+        if letter in block.value:
+            point[axis] = coordinate(state, block, axis) + (0.0 if state.absolute else point[axis])
+    end = state.machine(point)
+    if not block.has("XY"):
+        end[:2] = state.position[:2]
+    return end
+
+
+def arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
+    """The arc of a block to `end` (3,) [mm], and the index of its normal axis. Raises WordFault if its words are missing or contradict
+    each other."""
     try:
         return _arc(state, block, end)
     except ArcError as fault:
-        raise WordFault(block.motion_word(), str(fault)) from fault
+        raise ArcFault(block.motion_word(), str(fault), otherwise=_CLOSES_IF in str(fault)) from fault
 
 
-def _arc(state: State, block: Block, end: FloatArray) -> Arc:
-    start, normal, unit, clockwise = state.position, state.normal, state.unit, state.motion == 2
+def plane_of(state: State) -> tuple[int, bool]:
+    """The normal axis of the plane in the machine's axes, and whether it points against that axis.
+
+    Raises ArcError if the plane is turned to where no axis is normal to it.
+    """
+    if not state.rotated or state.normal == 2:
+        return state.normal, False
+    normal = state.work_system().turn(np.eye(3)[state.normal])
+    axis = int(np.abs(normal).argmax())
+    if abs(normal[axis]) != 1.0:
+        angle = state.work_system().rotation
+        raise ArcError(
+            f"an arc in G{17 + 2 - state.normal} while the work system is rotated by {angle:g} degrees is not supported; "
+            "only quarter turns are"
+        )
+    return axis, bool(normal[axis] < 0)
+
+
+def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
+    turned, opposite = plane_of(state)
+    start, normal, unit = state.position, state.normal, state.unit
+    clockwise = (state.motion == 2) != opposite
     a, b = IN_PLANE[normal]
     plane = f"{AXES[a]} {AXES[b]}"
-    turns = integer(block, "P", 1) if "P" in block.value and block.g.get("one-shot") != 40 else 1
-    if "IJK"[normal] in block.value:
+    turns = integer(block, "P", 1) if "P" in block.value else 1
+    along = block.value.get("IJK"[normal])  # many programs write K0 in G17
+    if along is not None and (along != 0.0 or state.strict):
         raise ArcError(
             f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
         )
@@ -65,38 +131,48 @@ def _arc(state: State, block: Block, end: FloatArray) -> Arc:
         if not block.has("XYZ"[a] + "XYZ"[b]):
             raise ArcError(f"an arc with R needs an end point in the {plane} plane")
         radius = block.value["R"] * unit
-        return arc_from_radius(start, end, radius, normal=normal, clockwise=clockwise, turns=turns, unit=unit)
+        arc = arc_from_radius(start, end, radius, normal=turned, clockwise=clockwise, turns=turns, unit=unit)
+        return arc, turned
     if not block.has("IJK"):
         raise ArcError(f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R")
     centre = _centre(state, block, absolute=state.absolute_centre)
     try:
-        return arc_from_centre(start, end, centre, normal=normal, clockwise=clockwise, turns=turns, unit=unit)
+        arc = arc_from_centre(start, end, centre, normal=turned, clockwise=clockwise, turns=turns, unit=unit)
     except ArcError as fault:
-        raise ArcError(f"{fault}; {_remedy(state, block, end)}") from fault
+        raise ArcError(f"{fault}; {_remedy(state, block, end, turned)}") from fault
+    return arc, turned
+
+
+def arc_length(start: FloatArray, end: FloatArray, arc: Arc, normal: int) -> float:
+    """Length of an arc from start to end (3,), the rise along its axis included [mm]."""
+    a, b = IN_PLANE[normal]
+    radius = math.hypot(start[a] - arc.centre[a], start[b] - arc.centre[b])
+    return math.hypot(radius * arc.sweep, end[normal] - start[normal])
 
 
 def _centre(state: State, block: Block, *, absolute: bool) -> FloatArray:
-    centre = state.position.copy()
+    centre = state.programmed() if state.rotated else state.position.copy()
+    origin = np.zeros(3) if state.rotated else state.offset
     for axis in IN_PLANE[state.normal]:
         letter = "IJK"[axis]
         if letter in block.value:
             length = block.value[letter] * state.unit
-            centre[axis] = length + (state.offset[axis] if absolute else centre[axis])
+            centre[axis] = length + (origin[axis] if absolute else centre[axis])
         elif absolute:
             raise ArcError(f"{letter} is missing; with absolute centres (G90.1) both are needed")
-    return centre
+    return state.machine(centre) if state.rotated else centre
 
 
-def _remedy(state: State, block: Block, end: FloatArray) -> str:
+def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
     """Whether I J K are meant the other way: many programs have absolute centres and do not say so."""
     try:
         other = _centre(state, block, absolute=not state.absolute_centre)
     except ArcError:
         return "correct the centre or the end point"
-    if not closes(state.position, end, other, normal=state.normal, unit=state.unit):
+    if not closes(state.position, end, other, normal=normal, unit=state.unit):
         return "correct the centre or the end point"
     way = "incremental: write G91.1" if state.absolute_centre else "absolute: write G90.1"
-    return f"the arc would close if its centre were {way} before it"
+    return f"{_CLOSES_IF} {way} before it"
 
 
 def check_machine_coordinates(state: State, block: Block) -> None:
@@ -107,17 +183,20 @@ def check_machine_coordinates(state: State, block: Block) -> None:
         raise WordFault(block.at["one-shot"], "G53 goes with absolute coordinates only; write G90 before it")
 
 
-def check_no_arc_words(state: State, block: Block) -> None:
-    """I J K R, and a P that no G4 or G64 uses, need an arc. Raises WordFault."""
-    taken = block.g.get("one-shot") == 40 or block.g.get("path control") == 640
-    for letter in "IJKR" if taken else "IJKRP":
-        if letter in block.value and state.motion != REFUSED_MOTION and not block.partial:
+def used_in_force(state: State) -> set[str]:
+    """Letters that the motion code in force uses beside the axes."""
+    code = 10 * state.motion if state.motion <= 3 else state.motion
+    return set(codes.WORDS.get(("G", code), ""))
+
+
+def check_words(state: State, block: Block) -> None:
+    """Words that neither a code of the line nor the motion code in force uses. Raises WordFault for the first."""
+    if state.motion == REFUSED_MOTION or block.partial:
+        return
+    used = block.own | used_in_force(state)
+    for letter in codes.MOTION_WORDS:
+        if letter in block.value and letter not in used:
             raise WordFault(block.at[letter], unused(letter))
-
-
-def unused(letter: str) -> str:
-    """What is said of a word that no code of its block uses."""
-    return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
 
 
 def integer(block: Block, letter: str, least: int) -> int:

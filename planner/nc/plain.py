@@ -1,5 +1,5 @@
-"""The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused whatever stands beside them
-(rotary axes, extruders). Everything else stops it.
+"""The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused, left out or parked whatever
+stands beside them (rotary axes, extruders; see `planner.nc.assumed`). Everything else stops it.
 
 This is what programs are long with (249,000 of 249,132 lines of a relief, 110,000 S words of a laser engraving). It follows the
 same rules as the interpreter: feed first, then S, then the straight move; whatever is not certainly right is left to the
@@ -15,16 +15,14 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc.assumed import LEFT_OUT, PARKED, REFUSED, Assumed
 from planner.nc.block import NUMBER_MAX
-from planner.nc.codes import LETTERS_REFUSED
 from planner.nc.lexer import Words
 from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.store import Store
 
-_F, _G, _N, _S, _X, _Z = 70, 71, 78, 83, 88, 90
-_REFUSED = np.zeros(256, dtype=np.bool_)
-_REFUSED[[ord(letter) for letter in LETTERS_REFUSED if letter != "O"]] = True
+_F, _G, _N, _O, _S, _X, _Z = 70, 71, 78, 79, 83, 88, 90
 _RAPID, _LINE = int(Kind.RAPID), int(Kind.LINE)
 
 
@@ -35,6 +33,7 @@ class _Rows(NamedTuple):
     value: FloatArray
     line: Array
     first: Array
+    frame: Array
 
 
 class _Fixed(NamedTuple):
@@ -45,6 +44,13 @@ class _Fixed(NamedTuple):
     path_control: int
     tolerance: float
     offset: FloatArray
+
+
+class _Others(NamedTuple):
+    """The fields of `Assumed` that the loop uses; it sets where axes are parked."""
+
+    treatment: Array
+    parked: FloatArray
 
 
 class _Counts(NamedTuple):
@@ -58,22 +64,30 @@ class _Counts(NamedTuple):
     feed: float
 
 
-def run_plain(words: Words, row: int, state: State, store: Store) -> int:
+def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assumed) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
-    rows = _Rows(words.letter, words.value, words.line, words.first)
+    if not state.is_plain:
+        return row
+    rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
     fixed = _Fixed(state.absolute, state.unit, int(state.path_control), state.tolerance, state.offset)
     begin = _Counts(row, store.blocks, store.events, store.refusals, state.motion, state.feed)
-    end = _run(rows, begin, fixed, state.position, store.block, store.event, store.refused_word, _REFUSED)
+    others = _Others(assumed.treatment, assumed.parked)
+    end = _run(rows, begin, fixed, state.position, store.block, store.event, store.refused_word, others)
+    if end.blocks > begin.blocks:
+        state.series = None
+    if end.events > begin.events:
+        state.spindle.speed = float(store.event.value[end.events - 1])  # plain rows have no other events
     store.blocks, store.events, store.refusals = end.blocks, end.events, end.refusals
     state.motion, state.feed = end.motion, end.feed
     return int(end.row)
 
 
 @njit(cache=True)
-def _run(rows, begin, fixed, position, block, event, refused_word, is_refused):  # pragma: no cover - compiled
+def _run(rows, begin, fixed, position, block, event, refused_word, others):  # pragma: no cover - compiled
     """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
-    letter, value, line, first = rows
+    letter, value, line, first, frame = rows
     absolute, unit, path_control, tolerance, offset = fixed
+    treatment, parked = others
     row, blocks, events, refusals, motion, feed = begin
     given = np.empty(3)
     while row < len(line):
@@ -92,9 +106,17 @@ def _run(rows, begin, fixed, position, block, event, refused_word, is_refused): 
                 new_feed = v
             elif c == _S and speed < 0 and 0 <= v <= NUMBER_MAX:
                 speed = v
-            elif is_refused[c]:
+            elif treatment[c] == PARKED:
+                if absolute and np.isnan(parked[c]):
+                    parked[c] = v
+                if v != (parked[c] if absolute else 0.0):
+                    refused_word[refused] = word
+                    refused += 1
+            elif treatment[c] == REFUSED and c != _O:
                 refused_word[refused] = word
                 refused += 1
+            elif treatment[c] == LEFT_OUT:
+                pass
             elif c != _N or word > first[row]:
                 is_plain = False
                 break
@@ -123,6 +145,7 @@ def _run(rows, begin, fixed, position, block, event, refused_word, is_refused): 
             block.line[blocks] = line[row]
             block.path_control[blocks] = path_control
             block.tolerance[blocks] = tolerance
+            block.frame[blocks] = frame[row]
             blocks += 1
         row += 1
     return _Counts(row, blocks, events, refusals, motion, feed)

@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.nc.reading import AS_USUAL, Reading
 
 
 class Kind(IntEnum):
@@ -23,6 +24,11 @@ class Kind(IntEnum):
     ARC = 2  # circular or helical (G2, G3)
     DWELL = 3  # stand still (G4)
     STOP = 4  # come to a full stop without a dwell: M0, M1, M2, M30, M6
+    SPLINE = 5  # along a spline (G5, G5.1, G5.2, G6.2)
+
+
+MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.SPLINE)
+FEED_MOVES = MOVES[1:]
 
 
 class PathControl(IntEnum):
@@ -40,6 +46,68 @@ class Event:
     block: int  # it happens before this block; equal to the number of blocks at the end of the program
     line: int  # 1-based source line
     text: str  # as normalised: "M3", "S12000", "T2"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """A call that was open while blocks were made; the main program is the first.
+
+    name   : what was called, as the program names it; empty for the main program
+    source : the file that the blocks' lines belong to
+    line   : the line of the call, in the caller's file; 0 for the main program
+    caller : index of the calling frame; -1 for the main program
+    """
+
+    name: str
+    source: str
+    line: int
+    caller: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expansion:
+    """What was expanded to make a program of one that computes.
+
+    dialect : whose language it is: "linuxcnc" or "fanuc"
+    calls   : subprograms in the order of their first call, and how often each was called
+    turns   : turns of loops, jumps and calls
+    rows    : lines executed, each as often as it was
+    """
+
+    dialect: str
+    calls: tuple[tuple[str, int], ...]
+    turns: int
+    rows: int
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Splines:
+    """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
+
+    block   : (K,) block of each, not decreasing: a block has one after the other
+    points  : (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is where it ends itself
+    weights : (K, 4) > 0 [-]
+    """
+
+    block: Array
+    points: FloatArray
+    weights: FloatArray
+
+    def __post_init__(self) -> None:
+        pieces, _, axes = np.shape(self.points)
+        freeze(self, "block", np.int64, (pieces,))
+        freeze(self, "points", np.float64, (pieces, 4, axes))
+        freeze(self, "weights", np.float64, (pieces, 4))
+        if not (self.weights > 0).all():
+            raise ValueError("Splines.weights: every weight must be positive")
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+
+def no_splines(axes: int) -> Splines:
+    """The splines of a program that has none, over `axes` axes."""
+    return Splines(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,8 +128,13 @@ class Program:
     arc_center   : (K, A) centre in the plane; the axial coordinate is that of the start [mm]
     arc_normal   : (K,) index of the axis normal to the plane of the arc: 2 for G17, 1 for G18, 0 for G19
     arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
+    splines      : of the blocks of kind SPLINE
     events       : words without influence on the motion
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
+    frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
+    frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
+    expansion    : what was expanded; None where nothing was
+    reading      : the settings it was read with
     """
 
     source: str
@@ -78,8 +151,13 @@ class Program:
     arc_center: FloatArray
     arc_normal: Array
     arc_sweep: FloatArray
+    splines: Splines = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
+    frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    frames: tuple[Frame, ...] = ()
+    expansion: Expansion | None = None
+    reading: Reading = AS_USUAL
 
     def __post_init__(self) -> None:
         axes = len(self.axes)
@@ -97,8 +175,24 @@ class Program:
         freeze(self, "arc_center", np.float64, (arcs, axes))
         freeze(self, "arc_normal", np.int64, (arcs,))
         freeze(self, "arc_sweep", np.float64, (arcs,))
+        if not len(self.splines):
+            object.__setattr__(self, "splines", no_splines(axes))
+        if self.splines.points.shape[2] != axes:
+            raise ValueError(f"Program.splines: {self.splines.points.shape[2]} axes, expected {axes}")
+        freeze(self, "frame", np.int32, (blocks if self.frames else 0,))
         if not (self.feed > 0).all():
             raise ValueError("Program.feed: every feed must be positive")
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def place(self, block: int) -> str:
+        """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost first."""
+        text = f"line {self.line[block]}"
+        frame = int(self.frame[block]) if self.frames else 0
+        while frame > 0:
+            at = self.frames[frame]
+            elsewhere = f" in {at.source}" if at.source != self.source else ""
+            text += f"{elsewhere} ({at.name}), called from line {at.line}"
+            frame = at.caller
+        return text

@@ -4,62 +4,117 @@ and what to do. The content of a text says which of the two it is, and its name 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.machine import Machine
-from planner.nc.dialects import is_plotter_file, recognise
+from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
+from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
-from planner.nc.lexer import split_words
+from planner.nc.language.detect import dialect_of
+from planner.nc.leader import without_leader
+from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.program import Program
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, SIEMENS, Reading
 
 
-def read_program(path: str | Path, machine: Machine | None = None, *, block_delete: bool = True) -> Program:
+def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
     """Read an NC program or a plotter file.
 
-    machine      : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
-                   None for zeros and blending
-    block_delete : leave out the lines that start with "/"
+    machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
+              None for zeros and blending
+    reading : what is refused, left out and assumed
 
     Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.
     """
-    return parse_program(load(path), machine, source=str(path), block_delete=block_delete)
+    return parse_program(load(path), machine, reading, source=str(path))
 
 
 def parse_program(
-    text: bytes | str, machine: Machine | None = None, *, source: str = "<text>", block_delete: bool = True
+    text: bytes | str, machine: Machine | None = None, reading: Reading = AS_USUAL, *, source: str = "<text>"
 ) -> Program:
     """Read an NC program given as text; like `read_program`."""
-    program, faults = interpret(text, machine, source=source, block_delete=block_delete)
+    program, faults = interpret(text, machine, reading, source=source)
     require_none(faults, source)
     return program
 
 
 def interpret(
-    text: bytes | str, machine: Machine | None, *, source: str, block_delete: bool
+    text: bytes | str, machine: Machine | None, reading: Reading = AS_USUAL, *, source: str
 ) -> tuple[Program, Sequence[Fault]]:
     """Run a program to its end, past everything that is not supported.
 
-    Returns the program and the faults, in the order of the lines. A program in another language is one fault, and nothing of it is run.
+    Returns the program and the faults, in the order of the lines.
 
     Raises InputError for an empty or binary text.
     """
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
+    refuse_models(data, source)
     _check_text(data, source)
     if is_plotter_file(data, source):
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
-        return read_drawing(data, machine, source)
-    foreign = recognise(data)
-    words = split_words(b"" if foreign else data, block_delete=block_delete)
-    if not foreign and not len(words.line):
+        return read_drawing(data, machine, source, reading)
+    run, program, faults = execute(data, machine, reading, source)
+    if reading.arc_centres == AUTO and not reading.strict and run.all_arcs_close_otherwise:
+        absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
+        other, as_absolute, found = execute(data, machine, absolute, source)
+        if not other.open_arcs:
+            return _with_note(as_absolute, run.open_arcs), found
+    return program, faults
+
+
+def execute(
+    data: bytes,
+    machine: Machine | None,
+    reading: Reading,
+    source: str,
+    tee: Callable[[Words], None] | None = None,
+) -> tuple[Interpreter, Program, Sequence[Fault]]:
+    """Execute a program once, as `reading` says.
+
+    tee : gets the expanded rows of a program that computes, chunk by chunk
+
+    Raises InputError if there is no word in it.
+    """
+    interpreter = Interpreter(machine, source, reading)
+    language = language_of(data) if reading.dialect == AUTO else reading.dialect
+    if language == HEIDENHAIN:
+        from planner.nc.language.expand import expand  # 8 ms, for programs that compute
+
+        return interpreter, *expand(
+            interpreter, text_alone(data), HEIDENHAIN, integers_of(machine, HEIDENHAIN), tee
+        )
+    if language != SIEMENS and not reading.strict:
+        data, leader = without_leader(data)
+        if leader:
+            interpreter.note(f"the text before the first % is not read ({leader!r})", 1)
+    words = split_words(data, block_delete=reading.block_delete)
+    if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    interpreter = Interpreter(words, machine, source)
-    interpreter.run()
-    return interpreter.program(), [foreign] if foreign else interpreter.faults()
+    dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
+    integers = integers_of(machine, dialect)
+    words = integers.applied(words)
+    if dialect is not None:
+        from planner.nc.language.expand import expand
+
+        return interpreter, *expand(interpreter, words, dialect, integers, tee)
+    interpreter.execute(words)
+    interpreter.note_what_follows(words)
+    return interpreter, interpreter.program(), interpreter.faults()
+
+
+def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Program:
+    """The program, with the arcs for whose sake it was read with absolute centres."""
+    note = (
+        f"line {open_arcs[0][0]}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
+        "(--arc-centres absolute|incremental says which)"
+    )
+    return dataclasses.replace(program, notes=(note, *program.notes))
 
 
 def load(path: str | Path) -> bytes:

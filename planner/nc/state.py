@@ -1,13 +1,16 @@
 """The modal state of the interpreter, and where the offsets put a coordinate.
 
-    machine position = programmed coordinate * unit + G5x offset + G92 offset + tool length (z only)
+    machine position = origin of the work system + tool offset + R (programmed coordinate * unit + G92 offset)
 
-All lengths are kept in mm and all positions in machine coordinates, so that changing an offset moves nothing.
+R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm and all positions in machine coordinates, so
+that changing an offset moves nothing.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -25,21 +28,82 @@ _PATH_CONTROL = {
     "exact_stop": PathControl.EXACT_STOP,
 }
 _SYSTEMS = {f"g{n}": 10 * n for n in range(54, 60)} | {"g59.1": 591, "g59.2": 592, "g59.3": 593}
+_QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
+FeedMode = Literal["per minute", "inverse time", "per turn"]
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool: offset (3,) that G43 adds and diameter, both in mm."""
+
+    offset: FloatArray
+    diameter: float = 0.0
+
+
+@dataclass(frozen=True)
+class System:
+    """A work coordinate system: origin (3,) in machine coordinates [mm] and rotation about z [degrees]."""
+
+    origin: FloatArray
+    rotation: float = 0.0
+
+    def turn(self, vector: FloatArray, sign: float = 1.0) -> FloatArray:
+        """A vector (3,) of the system in the machine's axes; with sign -1 the other way."""
+        if self.rotation == 0.0:
+            return vector
+        cosine, sine = _QUARTERS.get(self.rotation % 360.0) or (  # type: ignore[call-overload]
+            math.cos(math.radians(self.rotation)),
+            math.sin(math.radians(self.rotation)),
+        )
+        x, y, z = vector
+        return np.array([cosine * x - sign * sine * y, sign * sine * x + cosine * y, z])
+
+
+@dataclass(slots=True)
+class Spindle:
+    """What the spindle does: speed [1/min], turning (+1 M3, -1 M4, 0), and whether S is a surface speed (G96)."""
+
+    speed: float = 0.0
+    turning: int = 0
+    surface_speed: bool = False
+
+
+@dataclass(slots=True)
+class Series:
+    """Canned cycles one after the other: the motion code, the words of that code in force, and the level before the first of them,
+    all as programmed."""
+
+    code: int
+    words: dict[str, float]
+    level: float
 
 
 @dataclass(slots=True)
 class State:
-    """Modal state; starts as RS274NGC does: G21 G90 G17 G94 G40 G49 G54 G91.1 and no motion code.
+    """Modal state; starts as RS274NGC does: G21 G90 G17 G94 G40 G49 G54 G91.1 G99 G8 and no motion code.
 
-    motion       : 0 ... 3, NO_MOTION or REFUSED_MOTION
+    motion       : 0 ... 3, the tenths of another motion code (81 is 810), NO_MOTION or REFUSED_MOTION
     normal       : index of the axis normal to the arc plane
     unit         : mm per programmed length unit
+    diameters    : X words are diameters (G7)
     feed         : [mm/s], 0 where none has been given
+    feed_per_turn : F of G95 [mm]
     tolerance    : P of G64 [mm], NaN where none
     position     : (3,) machine position [mm]
-    offset       : (3,) sum of the offsets below [mm]
+    offset       : (3,) machine position of the programmed zero, without rotation [mm]
+    rotated      : whether the work system in force is rotated
     g92_saved    : what G92.3 brings back [mm]
-    tool_length  : in force (G43) [mm]
+    tool_offset  : (3,) in force (G43) [mm]
+    systems      : work systems by code (54 is 540)
+    homes        : (3,) machine positions of G28 (280) and G30 (300) [mm]
+    tools        : by number
+    to_level     : canned cycles retract to the level before them (G98), not to R (G99)
+    retract_given : a G98 or G99 was read
+    series       : canned cycles in force
+    cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
+    actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
+    strict       : nothing is assumed (`Reading.strict`)
+    in_thread    : the last block was cut in step with the spindle
     """
 
     motion: int = NO_MOTION
@@ -47,27 +111,84 @@ class State:
     unit: float = 1.0
     absolute: bool = True
     absolute_centre: bool = False
+    diameters: bool = False
     feed: float = 0.0
+    feed_mode: FeedMode = "per minute"
+    feed_per_turn: float = 0.0
+    spindle: Spindle = field(default_factory=Spindle)
     path_control: PathControl = PathControl.BLEND
     tolerance: float = np.nan
     position: FloatArray = field(default_factory=lambda: np.zeros(3))
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
+    rotated: bool = False
     system: int = 540
+    systems: dict[int, System] = field(default_factory=dict)
     g92: FloatArray = field(default_factory=lambda: np.zeros(3))
     g92_saved: FloatArray = field(default_factory=lambda: np.zeros(3))
-    tool_length: float = 0.0
+    homes: dict[int, FloatArray] = field(default_factory=dict)
+    tools: dict[int, Tool] = field(default_factory=dict)
+    tool_offset: FloatArray = field(default_factory=lambda: np.zeros(3))
     tool_selected: int = 0
     tool_loaded: int = 0
+    to_level: bool = False
+    retract_given: bool = False
+    series: Series | None = None
+    cycle_dwell: float = 0.0
+    actual: FloatArray | None = None
+    in_thread: bool = False
+    strict: bool = False
+
+    @property
+    def place(self) -> FloatArray:
+        """(3,) where the tool is [mm]."""
+        return self.position if self.actual is None else self.actual
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether straight moves need nothing but offsets, units and F: what the compiled loop knows."""
+        return self.feed_mode == "per minute" and not (
+            self.rotated or self.diameters or self.in_thread or self.actual is not None
+        )
+
+    def work_system(self, code: int = 0) -> System:
+        """A work system by its code, or the one in force."""
+        return self.systems.get(code or self.system) or System(np.zeros(3))
+
+    def apply_offsets(self) -> None:
+        """Sum the offsets in force into `offset`."""
+        system = self.work_system()
+        self.rotated = system.rotation % 360.0 != 0.0
+        self.offset[:] = self.g92 + system.origin + self.tool_offset
+
+    def in_system(self, code: int = 0) -> FloatArray:
+        """(3,) the position in a work system, or the one in force, before G92 is taken off [mm]."""
+        system = self.work_system(code)
+        return system.turn(self.position - system.origin - self.tool_offset, -1.0)
+
+    def programmed(self) -> FloatArray:
+        """(3,) the position in programmed coordinates [mm]."""
+        if not self.rotated:
+            return self.position - self.offset
+        return self.in_system() - self.g92
+
+    def machine(self, point: FloatArray) -> FloatArray:
+        """(3,) machine position of programmed coordinates (3,) [mm]."""
+        if not self.rotated:
+            return point + self.offset
+        system = self.work_system()
+        return system.origin + self.tool_offset + system.turn(point + self.g92)
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What the machine says about a program: offsets, positions and tools; all zero without a machine."""
+    """What the machine says about a program: offsets, positions and tools, all zero without a machine; a feed [mm/s] where the program
+    gives none."""
 
     path_control: PathControl = PathControl.BLEND
     systems: dict[int, FloatArray] = field(default_factory=dict)
     positions: dict[int, FloatArray] = field(default_factory=dict)
-    tools: dict[int, float] = field(default_factory=dict)
+    tools: dict[int, Tool] = field(default_factory=dict)
+    feed_default: float | None = None
 
     @classmethod
     def of(cls, machine: Machine | None) -> Setup:
@@ -78,21 +199,23 @@ class Setup:
             path_control=_PATH_CONTROL[machine.path_control],
             systems={_SYSTEMS[name]: _vector(given) for name, given in machine.work_offsets.items()},
             positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
-            tools={int(tool): length for tool, length in machine.tools.items()},
+            feed_default=machine.feed_default,
+            tools={
+                int(number): Tool(np.array([tool.x, 0.0, tool.length]), tool.diameter)
+                for number, tool in machine.tools.items()
+            },
         )
 
     def start(self) -> State:
         """The modal state at the start of a program."""
-        state = State(path_control=self.path_control)
-        self.apply_offsets(state)
+        state = State(
+            path_control=self.path_control,
+            systems={code: System(origin) for code, origin in self.systems.items()},
+            homes=dict(self.positions),
+            tools=dict(self.tools),
+        )
+        state.apply_offsets()
         return state
-
-    def apply_offsets(self, state: State) -> None:
-        """Sum the offsets in force into `state.offset`."""
-        state.offset[:] = state.g92
-        if state.system in self.systems:
-            state.offset += self.systems[state.system]
-        state.offset[2] += state.tool_length
 
 
 def set_units(state: State, code: int) -> None:

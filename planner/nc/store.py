@@ -11,7 +11,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
-from planner.nc.program import Kind, Program
+from planner.nc.program import FEED_MOVES, Frame, Kind, Program, Splines
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
 
@@ -24,6 +25,7 @@ class BlockColumns(NamedTuple):
     line: Array  # int32
     path_control: Array  # uint8
     tolerance: FloatArray
+    frame: Array  # int32
 
     @classmethod
     def of_size(cls, rows: int) -> BlockColumns:
@@ -35,6 +37,7 @@ class BlockColumns(NamedTuple):
             line=np.empty(rows, dtype=np.int32),
             path_control=np.empty(rows, dtype=np.uint8),
             tolerance=np.empty(rows),
+            frame=np.empty(rows, dtype=np.int32),
         )
 
 
@@ -58,20 +61,28 @@ class EventColumns(NamedTuple):
 
 
 class Store:
-    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used.
+    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used. New blocks stand in the
+    call `frame`.
 
     The compiled loop over plain rows writes into the columns directly and sets the counts.
     """
 
-    def __init__(self, rows: int, words: int):
+    def __init__(self) -> None:
         self.blocks = 0
         self.events = 0
         self.refusals = 0
-        self.block = BlockColumns.of_size(rows)
-        self.event = EventColumns.of_size(rows)
-        self.refused_word = np.empty(words, dtype=np.int64)  # found by the compiled loop
+        self.frame = 0
+        self.block = BlockColumns.of_size(0)
+        self.event = EventColumns.of_size(0)
+        self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
+        self.splines: list[tuple[int, FloatArray, FloatArray]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
+
+    def begin(self, words: int) -> None:
+        """Be ready for a chunk of so many words."""
+        self.refusals = 0
+        self.refused_word = np.empty(words, dtype=np.int64)
 
     def make_room(self, rows: int) -> None:
         """Make sure that `rows` more blocks and `rows` more events fit."""
@@ -81,20 +92,26 @@ class Store:
             self.event = EventColumns(*(_grown(column, self.events + rows) for column in self.event))
 
     def add(self, kind: Kind, line: int, state: State) -> None:
-        """Append a block that ends at the state's position."""
+        """Append a block that ends where the tool is."""
         block, k = self.block, self.blocks
         block.kind[k] = kind
-        block.end[k] = state.position
-        block.feed[k] = state.feed if kind in (Kind.LINE, Kind.ARC) else np.inf
+        block.end[k] = state.place
+        block.feed[k] = state.feed if kind in FEED_MOVES else np.inf
         block.line[k] = line
         block.path_control[k] = state.path_control
         block.tolerance[k] = state.tolerance
+        block.frame[k] = self.frame
         self.blocks += 1
 
-    def add_arc(self, arc: Arc, line: int, state: State) -> None:
-        """Append an arc that ends at the state's position."""
-        self.arcs.append((self.blocks, arc.centre, state.normal, arc.sweep))
+    def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
+        """Append an arc about a normal axis that ends where the tool is."""
+        self.arcs.append((self.blocks, arc.centre, normal, arc.sweep))
         self.add(Kind.ARC, line, state)
+
+    def add_spline(self, points: FloatArray, weights: FloatArray, line: int, state: State) -> None:
+        """Append a spline that ends at the state's position: control points (K, 4, 3) [mm] and weights (K, 4) of its pieces."""
+        self.splines += [(self.blocks, p, w) for p, w in zip(points, weights, strict=True)]
+        self.add(Kind.SPLINE, line, state)
 
     def add_dwell(self, seconds: float, line: int, state: State) -> None:
         """A dwell; one of no duration is a full stop."""
@@ -111,8 +128,13 @@ class Store:
         event.value[k] = value
         self.events += 1
 
-    def finish(self, source: str, notes: Sequence[str]) -> Program:
-        """The program read so far; the arrays are cut to size, so that the spare room is given back."""
+    def finish(
+        self, source: str, notes: Sequence[str], frames: Sequence[Frame] = (), reading: Reading = AS_USUAL
+    ) -> Program:
+        """The program read so far; the arrays are cut to size, so that the spare room is given back.
+
+        frames : the calls that the blocks stand in, for an expanded program
+        """
         used, seen = slice(0, self.blocks), slice(0, self.events)
         dwell = np.zeros(self.blocks)
         for block, seconds in self.dwells:
@@ -132,6 +154,11 @@ class Store:
             arc_center=np.array([arc[1] for arc in self.arcs]).reshape(-1, 3),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
+            splines=Splines(
+                block=np.array([spline[0] for spline in self.splines], dtype=np.int64),
+                points=np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3),
+                weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),
+            ),
             events=EventTable(
                 block=self.event.block[seen].copy(),
                 line=self.event.line[seen].copy(),
@@ -139,6 +166,9 @@ class Store:
                 value=self.event.value[seen].copy(),
             ),
             notes=tuple(notes),
+            reading=reading,
+            frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
+            frames=tuple(frames),
         )
 
 

@@ -2,8 +2,9 @@
 
 An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it. One is written where
 a block's feed is not the one in force, in those units, and where the source has one on the block's line its number is replaced. A block
-that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. F words
-on lines without a feed move (alone on a line, beside G0) stay, they are what the source says.
+that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. Lines
+under G93 and G95, and threads, have no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a
+line, beside G0) stay, they are what the source says.
 
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
 up to 0.1 % longer than asked.
@@ -19,8 +20,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.nc.lexer import Words, split_words
-from planner.nc.program import Kind, Program
+from planner.nc.leader import without_leader
+from planner.nc.lexer import NUMBER, Words, split_words
+from planner.nc.program import FEED_MOVES, Program
 
 SIGNIFICANT = 4  # digits of a feed
 # The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
@@ -29,36 +31,57 @@ FEED_MIN = 0.01
 SAME_FEED = 1e-6
 
 _F, _G = ord("F"), ord("G")
-_NUMBER = re.compile(rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*")
+_NUMBER = re.compile(NUMBER)
 
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
 
-def retimed(source: bytes, program: Program, feeds: FloatArray, *, block_delete: bool = True) -> bytes:
+def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
     """The program `source` with new feeds.
 
-    program      : what the reader made of `source`
-    feeds        : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
-                   never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
-    block_delete : as the program was read
+    program : what the reader made of `source`, with the settings that it was read with
+    feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
+              never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
-    moving = np.flatnonzero((program.kind == Kind.LINE) | (program.kind == Kind.ARC))
+    moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES))
     asked = np.asarray(feeds, dtype=np.float64)
     if asked.shape != (len(program),):
         raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
     if (asked < 0).any():
         raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
-    words = split_words(source, block_delete=block_delete)
+    reading = program.reading
+    read = source if reading.strict else without_leader(source)[0]
+    words = split_words(read, block_delete=reading.block_delete)
     row = _rows(words, program.line[moving])
     unit = _unit_before(words)
     f_word = _f_words(words)
     programmed = _f_in_force(words, f_word, unit)[row]
+    own = _has_feed_of_f(program.feed[moving], programmed * unit[row], _per_minute(words)[row])
+    moving, row, programmed = moving[own], row[own], programmed[own]
     wanted = np.maximum(asked[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
-    return _spliced(source, _edits(words, f_word, unit, row, np.where(slower, wanted, np.nan), programmed))
+    # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them decides
+    rows, first, place = np.unique(row, return_index=True, return_inverse=True)
+    fastest = np.zeros(len(rows))
+    np.maximum.at(fastest, place, np.where(slower, wanted, np.inf))
+    fastest[np.isinf(fastest)] = np.nan
+    return _spliced(source, _edits(words, f_word, unit, rows, fastest, programmed[first]))
+
+
+def _has_feed_of_f(feed: FloatArray, f_word: FloatArray, per_minute: Array) -> Array:
+    """(n,) whether the feed of a move [mm/s] is that of its F word [mm per minute]: not under G93 and G95, and not in a thread."""
+    return per_minute & (np.abs(feed * SECONDS_PER_MINUTE - f_word) <= SAME_FEED * f_word)
+
+
+def _per_minute(words: Words) -> Array:
+    """(R,) whether F is a length per minute (G94) on each row."""
+    code = np.rint(words.value * 10.0)
+    switch = np.flatnonzero((words.letter == _G) & np.isin(code, (930.0, 940.0, 950.0)))
+    mode = np.append(True, code[switch] == 940.0)
+    return mode[np.searchsorted(_row_of_word(words)[switch], np.arange(len(words.line)), side="right")]
 
 
 def _edits(

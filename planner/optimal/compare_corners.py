@@ -1,15 +1,16 @@
 """Single corners instead of splines, on the runs between full stops where they are faster.
 
-The motion without jerk limits on a coarse grid gives a lower bound on the time of single corners. If the bound is above the time of the
-splines, there is nothing to compare. Otherwise the corners are planned. That takes at least the points of their own grid, of which
-corners of a few um need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up to
-`COMPARED_POINTS`, and the notes say which runs were left out.
+A closed form (corner_times.py) and, on shorter paths, the motion without jerk limits on a coarse grid give a lower bound on the time
+of single corners. If the bound is above the time of the
+splines, there is nothing to compare. Otherwise the corners are planned, by themselves: on the grid of the rounds, those that are still
+close to the splines on the final one, and those that win with the whole path. That takes at least the points of their own grid, of
+which corners of a few um need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up
+to `COMPARED_POINTS`, and the notes say which runs were left out.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
 from planner.machine import Machine
+from planner.optimal.corner_times import CornerBounds, corner_times
 from planner.optimal.effort import Grids
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, second_order
@@ -33,30 +35,31 @@ COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 # Corners that take so many times as long as splines on the coarse grid are not tried on the final one [-]: times on the coarse grid are
 # up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
 CLOSE = 1.01
+FASTER = (
+    1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap
+)
 
 
-class CornerBounds(NamedTuple):
-    """Of a motion on corners between full stops: time (G,) that it takes at least [s], points (G,) of its grid, about."""
-
-    time: FloatArray
-    points: FloatArray
-
-
-def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
-    """From the motion without jerk limits on a coarse grid; no time at all where that has no solution: then the corners are planned to
-    see."""
+def corner_bounds(
+    path: SmoothPath, machine: Machine, jerk_limited: bool = True, most: float = COMPARED_POINTS
+) -> CornerBounds:
+    """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk limits on a coarse grid, the
+    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see."""
+    bounds = corner_times(path, machine, jerk_limited=jerk_limited)
+    if bounds.points.sum() > most:
+        return bounds
     samples = sample_path(path, machine, COARSER * RESOLUTION, third_order=True)
     points = FEWER * np.diff(samples.piece)
     planned = second_order(path, samples, machine, Reachability())
     if not planned.solution.solved:
         return CornerBounds(np.zeros(len(points)), points)
-    return CornerBounds(COARSE_SHARE * planned.stop_to_stop(), points)
+    return CornerBounds(np.maximum(bounds.time, COARSE_SHARE * planned.stop_to_stop()), points)
 
 
 def with_corners(
     rounded: SmoothPath,
     best: OnPath,
-    coarse: OnPath,
+    coarse: FloatArray,
     corners: CornerBounds,
     job: Job,
     order: Order,
@@ -66,7 +69,7 @@ def with_corners(
     out.
 
     rounded : the path with the corners that the splines of `best` replace
-    coarse  : the motion on the same splines on the grid of the rounds, on which most corners are ruled out
+    coarse  : (G,) times between full stops on the same splines on the grid of the rounds, on which most corners are ruled out [s]
     corners : bounds on the motion on them
     grids   : of the rounds, and the final one, of `best`
     """
@@ -87,26 +90,21 @@ def with_corners(
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
-    # on the final grid the second time on those that turned out to be faster
-    tries = (grids.rounds, coarse, CLOSE), (grids.final, best, 1.0), (grids.final, best, 1.0)
-    for resolution, splines, fraction in tries:
-        fits = shape.laid.fits & ~chosen[piece]
-        if (fits == shape.laid.fits).all():
-            break
-        mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=fits))
-        planned = order.solve(with_spline(rounded, mixed), job, resolution, [splines])
+    for resolution, splines, fraction in (
+        (grids.rounds, coarse, CLOSE),
+        (grids.final, best.stop_to_stop(), 1.0),
+    ):
+        if not chosen.any():
+            return best, left
+        planned = order.solve(rounded.part(chosen), job, resolution)
         if not planned.solution.solved:
-            break
-        job.tell(
-            "corners",
-            found=planned.solution.cycle_time,
-            before=splines.solution.cycle_time,
-            kept=planned.faster_than(splines),
-            runs=int(chosen.sum()),
-        )
-        slower = chosen & (planned.stop_to_stop() >= fraction * splines.stop_to_stop())
-        if resolution == grids.final and not slower.any():
-            faster = planned.faster_than(best)
-            return dataclasses.replace(planned, shape=mixed) if faster else best, left
-        chosen &= ~slower
-    return best, left
+            return best, left
+        time, before = planned.stop_to_stop(), splines[chosen]
+        faster = time < fraction * before
+        job.tell("corners", found=time.sum(), before=before.sum(), runs=len(time), kept=int(faster.sum()))
+        chosen[chosen] = faster
+    if not chosen.any() or (before - time)[faster].sum() < FASTER * best.solution.cycle_time:
+        return best, left
+    mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=shape.laid.fits & ~chosen[piece]))
+    planned = order.solve(with_spline(rounded, mixed), job, grids.final, [best])
+    return dataclasses.replace(planned, shape=mixed) if planned.faster_than(best) else best, left

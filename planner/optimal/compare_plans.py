@@ -31,6 +31,7 @@ from planner.path.samples import RESOLUTION
 RIVAL_POINTS = (
     40_000  # of the plan, and of each corner shape: about as many as get the finest grid (effort.py)
 )
+RIVAL_ESTIMATE = 3 * RIVAL_POINTS  # by the closed form, which may say three times as many (tested)
 SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
 # On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes
 # on random jobs of benchmarks/never_slower.py): one that takes more than `CHANCE` times the best there is not the fastest [-].
@@ -49,7 +50,7 @@ def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
             shape = corner_shape(name, job.machine, job.toolpath)
             path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
         with job.stage("solve"):
-            bounds = corner_bounds(path, job.machine)
+            bounds = corner_bounds(path, job.machine, most=RIVAL_ESTIMATE)
         job.tell(
             "bound on corners", found=bounds.time.sum() + dwell, corner=name, points=int(bounds.points.sum())
         )

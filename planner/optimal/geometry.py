@@ -2,8 +2,8 @@
 
 A run of corners may have a place where no spline fits: the curve leaves the tolerance there, has no certificate, or has a cusp because
 the path turns back within the tolerance. Instead of giving up the spline for the whole run, the motion gets a full stop there, which
-divides the run in two. The stops change the runs around them, which may then have no spline elsewhere; this is repeated `STOP_ROUNDS`
-times at most. The last time such a place is fenced off by two full stops, and only the corners between them stay single.
+divides the run in two. The stops change the runs around them, which may then have no spline elsewhere. The second time such a place is
+fenced off by two full stops, and only the corners between them stay single.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
 from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape
 
-STOP_ROUNDS = 4  # rounds of placing full stops; in the last one a run without a spline is fenced by two
+# Rounds of placing full stops; in the last one a run without a spline is fenced by two. Of 1,746 paths (random ones, and real programs
+# on two machines) 29 needed a round, one of these a second, and none a third.
+STOP_ROUNDS = 2
 
 
 def corner_shape(
@@ -48,9 +50,9 @@ def splined_with_stops(
         at = lost_joints(rounded, shape, fence=again == STOP_ROUNDS - 1)
         if not len(at):
             break
-        stopping = rounded.toolpath.with_joints(at, Joint.STOP)
+        stopping, legs = rounded.toolpath.with_joints(at, Joint.STOP), rounded.legs
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
-        shape = spline_shape(rounded, machine)
+        shape = spline_shape(rounded, machine, shape if len(rounded.legs) == len(legs) else None)
         _tell_of(shape, tell, len(at))
     return rounded, shape
 

@@ -38,9 +38,16 @@ class Order(Protocol):
         """What finds the feed along a path."""
         ...
 
-    def solve(self, path: SmoothPath, job: Job, resolution: float, known: Sequence[OnPath] = ()) -> OnPath:
-        """The time-optimal motion on a path, on a grid of that resolution (path/samples.py); pieces between full stops that a
-        known motion has too are taken over from it."""
+    def solve(
+        self,
+        path: SmoothPath,
+        job: Job,
+        resolution: float,
+        known: Sequence[OnPath] = (),
+        samples: PathSamples | None = None,
+    ) -> OnPath:
+        """The time-optimal motion on a path, on a grid of that resolution (path/samples.py), which may be given; pieces between full
+        stops that a known motion has too are taken over from it."""
         ...
 
 
@@ -56,10 +63,18 @@ class ThirdOrder:
 
     jerk_limited: ClassVar[bool] = True
 
-    def solve(self, path: SmoothPath, job: Job, resolution: float, known: Sequence[OnPath] = ()) -> OnPath:
+    def solve(
+        self,
+        path: SmoothPath,
+        job: Job,
+        resolution: float,
+        known: Sequence[OnPath] = (),
+        samples: PathSamples | None = None,
+    ) -> OnPath:
         """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as of `Order`."""
-        with job.stage("geometry"):
-            samples = sample_path(path, job.machine, resolution, third_order=True)
+        if samples is None:
+            with job.stage("geometry"):
+                samples = sample_path(path, job.machine, resolution, third_order=True)
         with job.stage("solve") as progress:
             samples = refine_for_jerk(samples, job.machine)
             problem = feedrate_problem(samples, job.machine, measured=True)
@@ -82,10 +97,18 @@ class SecondOrder:
 
     jerk_limited: ClassVar[bool] = False
 
-    def solve(self, path: SmoothPath, job: Job, resolution: float, known: Sequence[OnPath] = ()) -> OnPath:
+    def solve(
+        self,
+        path: SmoothPath,
+        job: Job,
+        resolution: float,
+        known: Sequence[OnPath] = (),
+        samples: PathSamples | None = None,
+    ) -> OnPath:
         """The time-optimal motion without jerk limits, on a grid with points where the profile switches; arguments as of `Order`."""
-        with job.stage("geometry"):
-            samples = sample_path(path, job.machine, resolution)
+        if samples is None:
+            with job.stage("geometry"):
+                samples = sample_path(path, job.machine, resolution)
         with job.stage("solve"):
             if self.to_tighten:
                 samples = refine_for_jerk(samples, job.machine)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from planner.corners.smooth import CornerShape
 from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
@@ -14,7 +16,7 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.reshape import corridor_prices
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
-from planner.sensitivity.prices import MORE_TOLERANCE, SitePrices, price_list
+from planner.sensitivity.prices import MORE_TOLERANCE, WORTH, SitePrices, price_list
 
 
 def plan_of_solution(
@@ -57,6 +59,9 @@ def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
     by_site = None
     # what the corridor of the splines costs
     if best.shape is not None and len(best.path.spline) and not machine.own:
-        now, wider = (corridor_prices(best, more) for more in (0.0, MORE_TOLERANCE))
+        now = corridor_prices(best)
+        # where even this slope all along would save next to nothing, the least is nothing
+        worth = -now.sum() * MORE_TOLERANCE >= WORTH * best.solution.cycle_time
+        wider = corridor_prices(best, MORE_TOLERANCE) if worth else np.zeros(len(now))
         by_site = SitePrices(place=best.shape.laid.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

@@ -196,7 +196,8 @@ class _Settling:
         room = 1.0 - SPARE_ERROR - self.bow / self.job.toolpath.tolerance.min()
         missed = near > room
         t, ratio = np.append(t, near_time[missed]), np.append(ratio, near[missed])
-        slower = np.sqrt((ratio - OF_PATH) / max(room - OF_PATH, ROOM_LEAST))
+        # at long periods the bow leaves less room than the path may use: nothing is gained there by going slower
+        slower = np.sqrt(np.maximum(ratio - OF_PATH, 0.0) / max(room - OF_PATH, ROOM_LEAST))
         seen = self.shaper.length + sum(self.filters)  # what D is made of, back from t
         first, last = self._piece(motion, t - seen), self._piece(motion, t)
         for begin, end, by in zip(first, last, slower, strict=True):

@@ -30,18 +30,20 @@ from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than the first of these [-], and not for long: the first round gains 4e-3 of the
-# time, the second 1e-4, the third 6e-6 and three more 1e-6 (means over random jobs, benchmarks/ablation.py). For jobs of more grid
-# points, where the time it takes counts, it is done once, above the second: that leaves less than half of the excess.
-TIGHTENED_EXCESS = 1e-5, 1e-4
-TIGHTENING_ROUNDS, TIGHTENED_POINTS = 3, 50_000
-# Slowing down moves the samples, which may then find a little more; it is repeated until nothing is left, at most so often.
-SLOWING_ROUNDS = 6
-# What is slowed down is slowed down by this much more [-], so that the next round finds nothing; less is rounding.
+# Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 3e-3 of the
+# time, the second 7e-5, a third gained 1e-6 (means over 345 plans, benchmarks/retries.py). For jobs of more grid points, where the
+# time it takes counts, it is done while slowing down costs more than the last [share of the time].
+TIGHTENED_EXCESS = 1e-5
+TIGHTENING_ROUNDS, TIGHTENED_POINTS, TIGHTENED_LOSS = 2, 50_000, 2e-4
+# What is slowed down is slowed down by this much more [-]: of 928 motions none needed it twice (benchmarks/retries.py). Less is
+# rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
 SEEN_EXCESS_MAX = 5e-3
+# Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places
+# of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
+SEEN_BEFORE = 1.0 + 2e-5
 ORDER = {limit.name: limit.order for limit in LIMITS}
 
 
@@ -64,7 +66,8 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         motions = (seen.velocity, seen.acceleration, seen.jerk)
         _worst(seen.feed / programmed[seen.block], motions, limits, smooth[own], worst)
         for order, ratio in ratios(machine.own, seen):
-            worst = np.maximum(worst, ratio.reshape(times.shape).max(axis=1) ** (1.0 / order))
+            most = _with_peaks(ratio.reshape(times.shape), smooth[own])
+            worst = np.maximum(worst, most ** (1.0 / order))
         factor[own] = worst
     for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
@@ -114,6 +117,19 @@ def _worst(feed, motions, limits, smooth, out):
         out[n] = worst
 
 
+def _with_peaks(ratio: FloatArray, smooth: Array) -> FloatArray:
+    """(n,) the largest of the ratios of n pieces (n, 3) at `WATCHED`, and on smooth pieces (n,) the peak of the parabola through them,
+    counted as in `_worst`."""
+    y0, y1, y2 = ratio.T
+    slope = (y2 - y0) / (WATCHED[2] - WATCHED[0])
+    bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+    inside = smooth & (np.abs(slope) < np.abs(bend))
+    peak = np.where(inside, np.abs(y1 - slope**2 / (4.0 * np.where(inside, bend, 1.0))), y1)
+    seen = ratio.max(axis=1)
+    known = np.maximum(seen, 1.0)
+    return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
+
+
 def fastest_inside(law: TimeLaw) -> FloatArray:
     """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
     lasting = np.diff(np.append(law.t, law.end))
@@ -140,12 +156,13 @@ def within_limits(
     if not order.jerk_limited:
         return planned, motion
     factor = excess(motion, toolpath, machine)
-    best, least = (planned, motion, factor), _slowed_once(motion, factor).end
+    best, least = (planned, motion, factor), slowed(motion, toolpath, machine, factor).end
     tell("between points", found=least, excess=float(factor.max() - 1.0))
     room = np.ones(len(planned.problem))
     large = len(room) > TIGHTENED_POINTS
-    for _ in range(1 if large else TIGHTENING_ROUNDS):
-        if factor.max() <= 1.0 + TIGHTENED_EXCESS[large]:
+    unslowed = motion.end
+    for _ in range(TIGHTENING_ROUNDS):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS or (large and least < (1.0 + TIGHTENED_LOSS) * unslowed):
             break
         room *= np.maximum(factor, 1.0)
         problem = tightened(planned.problem, room)
@@ -154,32 +171,21 @@ def within_limits(
             break
         motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
-        end = _slowed_once(motion, factor).end
+        end = slowed(motion, toolpath, machine, factor).end
         tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0))
         if end < least:
             best, least = (tighter, motion, factor), end
     planned, motion, factor = best
-    return planned, slowed(motion, toolpath, machine, factor)
+    motion = slowed(motion, toolpath, machine, factor)
+    return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
-    """The same motion with every run slowed down until it has no `excess` (L,); `factor` is that of the motion, if it is known."""
-    if factor is None:
-        factor = excess(motion, toolpath, machine)
-    for _ in range(SLOWING_ROUNDS):
-        slow = _slowed_once(motion, factor)
-        if slow is motion:
-            break
-        motion = slow
-        if factor.max() <= 1.0 + SEEN_EXCESS_MAX:
-            break  # what the samples of the slower motion may find more, the verifier will see
-        factor = excess(motion, toolpath, machine)
-    return motion
+    """The same motion with every run slowed down by its `excess` (L,), and by a little more; the motion itself where none needs it.
 
-
-def _slowed_once(motion: Motion, factor: FloatArray) -> Motion:
-    """The motion with every run slowed down by its factor, and by a little more; the motion itself where none needs it."""
-    of_run = _of_runs(motion, factor)
+    factor : the excess, if it is known
+    """
+    of_run = _of_runs(motion, excess(motion, toolpath, machine) if factor is None else factor)
     slow = of_run > 1.0 + EXCESS_ROUNDING
     return slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0)) if slow.any() else motion
 

@@ -91,9 +91,10 @@ def _fastest(point, feed_max, limits):
     if normal < x * kappa_sq:  # kappa x at most sum_k a_k |n_k|, the support of the box along the normal
         x = normal / kappa_sq
     # the third derivative times v^3 is at most |j| + 3 kappa v |a|, and kappa v^2 at most |a|
-    jerk_max = np.sqrt(j_sq) + 3.0 * np.sqrt(np.sqrt(kappa_sq)) * a_sq**0.75
+    a = np.sqrt(a_sq)
+    jerk_max = np.sqrt(j_sq) + 3.0 * np.sqrt(np.sqrt(kappa_sq) * a) * a
     if jerk_max * jerk_max < x * x * x * slope_sq:
-        x = (jerk_max * jerk_max / slope_sq) ** (1.0 / 3.0)
+        x = np.cbrt(jerk_max * jerk_max / slope_sq)
     return x, u
 
 

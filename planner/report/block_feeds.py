@@ -111,11 +111,16 @@ class BlockWatch:
 
     The highest feed of a block is that at its samples, half-way between them, as far as feeds and accelerations at both tell, and at
     its joints. Its mean at least; twice that where both joints are passed at less than half of it, as between two full stops without a
-    sample: from rest to rest no jerk-limited motion is faster.
+    sample: from rest to rest no jerk-limited motion is faster. The segments of a spline share its time by their lengths, and have its
+    highest feed.
     """
 
     def __init__(self, toolpath: Toolpath):
-        self._toolpath = toolpath
+        self._count = np.diff(np.append(toolpath.block_first, len(toolpath)))  # segments of each block
+        self._share = toolpath.length / np.repeat(
+            np.add.reduceat(toolpath.length, toolpath.block_first), self._count
+        )
+        self._toolpath = toolpath = toolpath.block_ends()
         self._joint, self._passed = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath) + 1)  # when, how fast
         self._highest = np.zeros(len(toolpath))
         self._along = np.concatenate([[0.0], np.cumsum(toolpath.length)])
@@ -144,7 +149,8 @@ class BlockWatch:
         duration = np.maximum(np.diff(joint) - toolpath.dwell[1:], 0.0)
         highest = np.maximum(self._highest, np.maximum(passed[:-1], passed[1:]))
         mean = np.divide(toolpath.length, duration, out=np.zeros(len(toolpath)), where=duration > 0)
-        return PlannedBlocks(duration, np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean))
+        highest = np.maximum(highest, np.where(highest < 0.5 * mean, 2.0, 1.0) * mean)
+        return PlannedBlocks(self._share * np.repeat(duration, self._count), np.repeat(highest, self._count))
 
 
 def _look_between(part: Trajectory, segment: Array, highest: FloatArray, first: bool) -> None:

@@ -18,6 +18,7 @@ from planner.base.names import METHODS
 from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.report.export import summary, verdict_summary
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ def compare(
     *,
     limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
+    reading: Reading = AS_USUAL,
     progress: Progress | None = None,
 ) -> list[Row]:
     """Plan a program with several methods and put them side by side, judged by the same verifier.
@@ -92,7 +94,9 @@ def compare(
     if limits:
         machine = machine.with_own((*machine.own, *limits))
     if not isinstance(program, Program):
-        program = read_program(program, machine)
+        program = read_program(program, machine, reading)
+    elif reading != AS_USUAL:
+        raise InputError("reading: the program is read already; give the settings to read_program")
     chosen = METHODS if methods is None else methods
     return [row_of(method, program, machine, tolerance, progress) for method in chosen]
 

@@ -24,6 +24,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
+from planner.nc.info import PLACES_SHOWN
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program
@@ -46,12 +47,14 @@ def write_plan(
     *,
     file_format: Format = "parquet",
     plots: bool = False,
+    report: bool = False,
     force: bool = False,
 ) -> list[str]:
     """Write the files of a solved plan into a directory, all of them or none.
 
     file_format : of the trajectory
     plots       : write pictures too
+    report      : write a page that opens in a browser, too (report/html/page.py)
     force       : replace files of these names even if no run wrote them
 
     Returns the names of the files. The `notes` of the summary are those of the plan, followed by what was left out and why.
@@ -80,6 +83,11 @@ def write_plan(
             from planner.report.plots import write_figures
 
             write_figures(plan, new)
+        if report:
+            from planner.report.html.page import REPORT, report_page
+
+            page = report_page(plan, program_text(plan), {**summary(plan), "notes": [*plan.notes, *notes]})
+            (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])
         said = {
@@ -94,7 +102,13 @@ def write_plan(
 
 
 def check_places(
-    directory: Path, inputs: Sequence[Path], *, file_format: Format, plots: bool, force: bool
+    directory: Path,
+    inputs: Sequence[Path],
+    *,
+    file_format: Format,
+    plots: bool,
+    force: bool,
+    report: bool = False,
 ) -> None:
     """Raise InputError if `write_plan` could not write into a directory.
 
@@ -103,6 +117,7 @@ def check_places(
     """
     names = [f"trajectory.{file_format}", SUMMARY]
     names += [CSV_METADATA] * (file_format == "csv") + ["toolpath.png", "profiles.png"] * plots
+    names += ["report.html"] * report
     refuse_inputs([directory / name for name in names], inputs)
     with suppress(InputError):
         refuse_inputs([directory / PLANNED], inputs[:1])
@@ -113,7 +128,7 @@ def check_places(
 def summary(plan: Plan) -> dict[str, Any]:
     """The plan in numbers, ready for JSON: what `planner plan --json` prints."""
     verdict = plan.verdict
-    return _plain(
+    return plain(
         {
             "program": plan.program.source,
             "machine": plan.machine.name,
@@ -129,6 +144,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "verdict": verdict_summary(verdict) if verdict is not None else None,
             "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,
             **optimum_summary(plan.grid, plan.prices),
+            "reading": plan.program.reading.changed(),
             "blocks": len(plan.program),
             "grid_points": plan.grid_points,
             "notes": plan.notes,
@@ -140,12 +156,12 @@ def summary(plan: Plan) -> dict[str, Any]:
 
 def verdict_summary(verdict: Verdict) -> dict[str, Any]:
     """A verdict in numbers: the largest ratio to each limit, errors, faults."""
-    return _plain({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
+    return plain({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
 
 
 def corner_summary(corners: CornerCheck) -> dict[str, Any]:
     """Eq. 18-20 at the programmed corners in numbers."""
-    return _plain(corners.summary())
+    return plain(corners.summary())
 
 
 def _not_limited(verdict: Verdict) -> list[str]:
@@ -154,17 +170,22 @@ def _not_limited(verdict: Verdict) -> list[str]:
 
 
 def info_summary(info: ProgramInfo) -> dict[str, Any]:
-    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`."""
+    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`.
+
+    Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
+    """
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
-    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported]
-    return _plain(fields)
+    fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
+    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
+    fields["unsupported_places"] = len(info.unsupported)
+    return plain(fields)
 
 
 def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
     """The metadata of a trajectory file. `planner verify` reads machine, tolerance and `not_limited` from it."""
     trajectory = plan.trajectory
     assert trajectory is not None
-    return _plain(
+    return plain(
         {
             "format": 1,
             "run_id": run_id,
@@ -175,6 +196,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "corner": plan.corner,
             "dt_s": trajectory.dt,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
+            "reading": plan.program.reading.changed(),
             "not_limited": _not_limited(plan.verdict) if plan.verdict is not None else [],
             "units": units(trajectory.axes),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),
@@ -199,6 +221,14 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
         return None, [f"{PLANNED} is left out: {why}"]
 
 
+def program_text(plan: Plan) -> bytes | None:
+    """The text of the program, if it was read from a file that is still there."""
+    try:
+        return Path(plan.program.source).read_bytes()
+    except (OSError, ValueError):
+        return None
+
+
 def _is_source(plan: Plan, file: Path) -> bool:
     """Whether the plan's program was read from that file, which must then not be replaced."""
     return file.exists() and Path(plan.program.source).resolve() == file.resolve()
@@ -209,12 +239,12 @@ def _uniform(tolerance: FloatArray) -> float | None:
     return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Numbers, strings, lists and dictionaries only; NaN and infinity, which JSON lacks, become None."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):

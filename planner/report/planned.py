@@ -1,6 +1,7 @@
 """`planned.ngc`: the program of a plan with the planned feeds as F words, read back before it is written.
 
-An NC program changes only in its F words. A plotter file is written as a new NC program.
+An NC program changes only in its F words. A plotter file is written as a new NC program, and a program with parameters, loops or
+calls is expanded first: one line of it may be executed at many feeds.
 """
 
 from __future__ import annotations
@@ -59,11 +60,16 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     feeds = feeds_of(planned, plan.toolpath, plan.machine, len(plan.program))
     if is_plotter_file(data, plan.program.source):
         text = _written_anew(plan, feeds)
+    elif plan.program.expansion is not None:
+        text = _expanded(data, plan, feeds)
     else:
         text = retimed(data, plan.program, feeds)
         if not _reads_as(text, plan, feeds=False):
             raise LeftOut(f"{source} with F words does not read back as the same motion")
-    return text, _notes(plan, planned, text)
+    notes = _notes(plan, planned, text)
+    if plan.program.expansion is not None:
+        notes.insert(0, "planned.ngc is the expanded program: parameters, loops and calls are written out")
+    return text, notes
 
 
 def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
@@ -92,17 +98,37 @@ def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
     text = program_text(
         planned, np.minimum(_finite(feeds), planned.feed), float(plan.toolpath.tolerance.min())
     ).encode()
+    _read_back(text, plan, "as an NC program")
+    return text
+
+
+def _expanded(data: bytes, plan: Plan, feeds: FloatArray) -> bytes:
+    """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does not."""
+    from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
+
+    source = plan.program.source
+    found = flat_program(data, plan.machine, plan.program.reading, source=source)
+    assert found is not None
+    flat = found[0].encode()
+    text = retimed(flat, _read_back(flat, plan, "expanded"), feeds)
+    _read_back(text, plan, "expanded and with F words")
+    return text
+
+
+def _read_back(text: bytes, plan: Plan, how: str) -> Program:
+    """The program that a text reads as. Raises LeftOut if its path is not the one of the plan's program."""
+    planned = plan.program
     try:
         read = parse_program(text, plan.machine)
     except InputError as fault:
-        raise LeftOut(f"{planned.source} as an NC program does not read back: {fault.message}") from None
-    same = _same(read, planned, ("kind", "dwell", "path_control", "arc_block", "arc_normal"))
+        raise LeftOut(f"{planned.source} {how} does not read back: {fault.message}") from None
+    same = _same(read, planned, ("kind", "path_control", "arc_block", "arc_normal"))
     if not same or not all(
         np.allclose(getattr(read, name), getattr(planned, name), rtol=0.0, atol=SAME_PATH)
-        for name in ("end", "arc_center")
+        for name in ("end", "arc_center", "dwell")
     ):
-        raise LeftOut(f"{planned.source} as an NC program does not read back as the same path")
-    return text
+        raise LeftOut(f"{planned.source} {how} does not read back as the same path")
+    return read
 
 
 def _finite(feeds: FloatArray) -> FloatArray:
@@ -116,14 +142,22 @@ def _finite(feeds: FloatArray) -> FloatArray:
 def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
     """Whether a program's motion is the one of the plan's program, with or without its feeds."""
     try:
-        program = parse_program(text, plan.machine, source=plan.program.source)
+        program = parse_program(text, plan.machine, plan.program.reading, source=plan.program.source)
     except InputError:
         return False
     return _same(program, plan.program, (*_MOTION, "feed") if feeds else _MOTION)
 
 
 def _same(one: Program, other: Program, names: tuple[str, ...]) -> bool:
-    return len(one) == len(other) and all(
-        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name == "tolerance")
-        for name in names
+    splines = all(
+        np.array_equal(getattr(one.splines, n), getattr(other.splines, n))
+        for n in ("block", "points", "weights")
+    )
+    return (
+        splines
+        and len(one) == len(other)
+        and all(
+            np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name == "tolerance")
+            for name in names
+        )
     )

@@ -45,6 +45,7 @@ OUTPUTS = (
     "planned.ngc",
     "toolpath.png",
     "profiles.png",
+    "report.html",
     SUMMARY,
 )  # every name that a run may write, in the order in which they take their places
 HIDDEN = ".planner-" + 12 * "[0-9a-f]"  # pattern of the names of temporaries

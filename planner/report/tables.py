@@ -13,6 +13,7 @@ from rich.text import Text
 from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
+from planner.nc.info import PLACES_SHOWN
 from planner.report.optimum import held_by_text, price_rows
 
 if TYPE_CHECKING:
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
     from planner.job.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
+    from planner.nc.program import Expansion
     from planner.verify import CornerCheck, Ringing, Verdict
 
+CALLS_SHOWN = 10  # subprograms that `info` names
 CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.corners` has them all
 FAULTS_SHOWN = 8
 NOTES_SHOWN = 8
@@ -139,21 +142,35 @@ def info_table(info: ProgramInfo) -> Group:
         table.add_row("tools", ", ".join(f"T{tool}" for tool in info.tools))
     if info.events:
         table.add_row("other words", _counts(info.events))
+    if info.expansion is not None:
+        table.add_row("expanded", _expanded(info.expansion))
     notes = [Text(f"note: {note}") for note in info.notes]
     if not info.unsupported:
         return _titled(title, table, *notes, Text("every construct is supported", style="green"))
     return _titled(title, table, *notes, *_unsupported(info.unsupported))
 
 
+def _expanded(expansion: Expansion) -> str:
+    """What was expanded, most called subprograms first."""
+    calls = sorted(expansion.calls, key=lambda call: -call[1])
+    shown = ", ".join(f"{name} {times:,} times" for name, times in calls[:CALLS_SHOWN])
+    more = f" and {len(calls) - CALLS_SHOWN:,} more" if len(calls) > CALLS_SHOWN else ""
+    called = f"called {shown}{more}; " if calls else ""
+    turns = f"{expansion.turns:,} turns of loops, jumps and calls; " if expansion.turns else ""
+    return f"as {expansion.dialect}: {called}{turns}{expansion.rows:,} lines executed"
+
+
 def _unsupported(faults: Sequence[Fault]) -> list[Text]:
-    """Every place of every fault, gathered by message: 10,000 expressions give one message, not 10,000."""
+    """The places of the faults, gathered by message, `PLACES_SHOWN` in all; the others are counted."""
     places: dict[str, list[str]] = {}
-    for fault in faults:
+    for fault in faults[:PLACES_SHOWN]:
         places.setdefault(fault.message, []).append(f"{fault.line}:{fault.column} {fault.word}")
-    said = [Text(f"not supported, {len(faults):,} places (line:column word):", style="bold red")]
+    more = len(faults) - PLACES_SHOWN
+    shown = f", the first {PLACES_SHOWN}" if more > 0 else ""
+    said = [Text(f"not supported, {len(faults):,} places{shown} (line:column word):", style="bold red")]
     for message, where in places.items():
         said += [Text(f"{message} ({len(where):,})"), Text("    " + ", ".join(where), style="dim")]
-    return said
+    return [*said, *([Text(f"and {more:,} more")] if more > 0 else [])]
 
 
 def machines_table(machines: Iterable[Machine]) -> Table:

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from planner.base.arrays import Array, FloatArray
+from planner.geometry.chords import points_on
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind
 
@@ -114,24 +115,16 @@ def one_per_pixel(points: FloatArray) -> Array:
 
 
 def _programmed(plan: Plan, linear: list[int]) -> FloatArray:
-    """The programmed path as a polyline; arcs in steps of a few degrees."""
+    """The programmed path as a polyline; arcs and curves in steps of a few degrees."""
     path = plan.toolpath
-    pieces, arc = [], path.arc
-    straight = np.flatnonzero(arc < 0)
-    at = np.concatenate([straight, np.flatnonzero(arc >= 0)])
+    pieces = []
+    straight = np.flatnonzero(path.straight)
+    at = np.concatenate([straight, np.flatnonzero(~path.straight)])
     pieces.append((straight, path.start[straight]))
     for i in at[len(straight) :]:
         x = np.linspace(0.0, path.length[i], 49)[:-1]
-        k, arcs = arc[i], path.arcs
-        angle = (arcs.rate[k] * x)[:, None]
-        pieces.append(
-            (
-                np.full(len(x), i),
-                arcs.center[k]
-                + arcs.radius[k] * (np.cos(angle) * arcs.e1[k] + np.sin(angle) * arcs.e2[k])
-                + arcs.drift[k] * x[:, None],
-            )
-        )
+        on = np.full(len(x), i)
+        pieces.append((on, points_on(path, on, x)))
     order = np.argsort(np.concatenate([index for index, _ in pieces]), kind="stable")
     points = np.concatenate([piece for _, piece in pieces])[order]
     points = np.vstack([points, path.end[-1:]])[:, linear]

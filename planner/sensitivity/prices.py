@@ -16,9 +16,10 @@ are priced with the path as it is.
 **Finite changes.** Ten per cent of a limit and 10 um of tolerance are a long way. What they save is found by solving again
 (sensitivity/savings.py), on rounded corners to within a few per cent, on splines between a least and a most. For the tolerance of
 splines these are the multipliers of two rounds, one in the corridor as it is and one in the wider one, times the 10 um: a round's
-problem is convex, so its optimum falls ever less steeply. A plan made again finds another shape, too, and ends a little faster or
-slower for no other reason: by `UNREST`. Where least and most are so far apart that their middle may be off by more than `HINT` of
-itself and more than `HINT_LEAST` of the time, the saving is a hint only.
+problem is convex, so its optimum falls ever less steeply. Where the first round alone promises less than `WORTH`, there is no second
+one, and the least is nothing. A plan made again finds another shape, too, and ends a little faster or slower for no other reason: by
+`UNREST`. Where least and most are so far apart that their middle may be off by more than `HINT` of itself and more than `HINT_LEAST`
+of the time, the saving is a hint only.
 
 **Long periods.** Where chords between samples use more than `CHORDS` of the tolerance, a faster motion may need some of it back
 (delivery/periods.py), which no multiplier knows: 10 % more feed saved 16 % less than the problem says, 10 um half, on five points at

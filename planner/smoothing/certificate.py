@@ -1,9 +1,9 @@
-"""The proof that a curve is inside the tolerance: a bound for every piece, not samples.
+"""The proof that a curve is inside the tolerance: a bound for every part of every span, not samples.
 
-On a piece of a span between neighbouring sites and vertices the curve is a polynomial, which lies in the convex hull of its six
-Bezier points. If these are within r of the chord that the piece belongs to, so is the piece, since what is within r of a chord is
+On the part of a span between neighbouring sites and vertices the curve is a polynomial, which lies in the convex hull of its six
+Bezier points. If these are within r of the chord that the part belongs to, so is the part, since what is within r of a chord is
 convex. The largest such r, plus the chord's sagitta on arcs, bounds the deviation of the path from the curve and back; vertices lie
-on it because neighbouring pieces share their ends.
+on it because neighbouring parts share their ends.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.basis import DEGREE, ORDER
 
-PARTS = 8  # into which a piece is cut if its bound is too large: their Bezier points are 64 times as near to the curve
+CUT = 8  # into so many a part is cut if its bound is too large: their Bezier points are 64 times as near to the curve
 
 
 class Certificate(NamedTuple):
@@ -28,14 +28,14 @@ class Certificate(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _piece_error(basis, control, i, a, b, chord, bezier):
+def _part_error(basis, control, i, a, b, chord, bezier):
     """Largest distance of the Bezier points of span i between tau = a and b from a chord (start, direction, length) [mm]; `bezier`
     (6, A) is overwritten."""
     chord_start, along, length = chord
     axes = control.shape[1]
     step = b - a
     for k in range(axes):
-        # power coefficients, shifted to a and scaled to the piece, then to Bernstein form
+        # power coefficients, shifted to a and scaled to the part, then to Bernstein form
         for m in range(ORDER):
             value = 0.0
             for d in range(ORDER):
@@ -95,7 +95,7 @@ def certify(corridor, knots, site_place, control):
         following = min(breaks[i + 1], place[v + 1])
         if j < sites:
             following = min(following, site_place[j])
-        if not following > u:  # the last piece, by rounding
+        if not following > u:  # the last part, by rounding
             break
         h = breaks[i + 1] - breaks[i]
         length = 0.0
@@ -103,14 +103,14 @@ def certify(corridor, knots, site_place, control):
             length += (point[v + 1, k] - point[v, k]) * along[v, k]
         tau, step = (u - breaks[i]) / h, (following - u) / h
         chord = point[v], along[v], length
-        error = _piece_error(basis, control, i, tau, tau + step, chord, bezier)
+        error = _part_error(basis, control, i, tau, tau + step, chord, bezier)
         if (
             error > tol_chord[v]
-        ):  # the points of smaller pieces are nearer to the curve, by the square of their size
+        ):  # the points of smaller parts are nearer to the curve, by the square of their size
             error = 0.0
-            for part in range(PARTS):
-                a, b = tau + step * part / PARTS, tau + step * (part + 1) / PARTS
-                error = max(error, _piece_error(basis, control, i, a, b, chord, bezier))
+            for part in range(CUT):
+                a, b = tau + step * part / CUT, tau + step * (part + 1) / CUT
+                error = max(error, _part_error(basis, control, i, a, b, chord, bezier))
         ratio = error / tol_chord[v]
         if following == place[v + 1]:
             square = 0.0

@@ -80,7 +80,7 @@ def _places(corridor, breaks):
     place = corridor.place
     vertices, spans = len(place), len(breaks) - 1
     parts = int(np.ceil(1.0 / SITE_SPACING))
-    # at most every vertex, and on every piece of a chord within a span its places there
+    # at most every vertex, and on every part of a chord within a span its places there
     most = vertices + (spans + vertices) * parts
     where, owner, radius = np.empty(most), np.empty(most, np.int64), np.empty(most)
     n = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.smoothing.basis import ORDER, derivatives
+from planner.smoothing.basis import DEGREE, ORDER, derivatives
 from planner.smoothing.corridor import Corridor, find_corridor
 from planner.smoothing.forms import third_derivative_bands
 from planner.smoothing.initial import lay
@@ -45,9 +46,11 @@ class SplineShape:
     used: FloatArray
 
 
-def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
+def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None = None) -> SplineShape:
     """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed with a certificate
     (relax.py), and without a cusp. A run that gets none has `fits` False.
+
+    known : the splines of the same legs with other full stops: runs that are the same are taken over
 
     Raises InputError if the machine lacks an axis of the path.
     """
@@ -69,14 +72,48 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     weights = (jerk.min() / jerk) ** 2
     H, nothing = third_derivative_bands(laid, weights), np.zeros(len(of_run))
     goal = Goal(H, np.zeros_like(H), nothing, nothing, RELATIVE_GAP, weights)
-    untouched = np.full(laid.span_first[-1], np.inf)
-    relaxed = relax(corridor, laid, runs, USED * laid.sites.radius, untouched, goal)
-    laid = laid._replace(control=relaxed.control)
-    laid = laid._replace(fits=relaxed.certified & ~cusps(laid))
+    left = np.full(laid.span_first[-1], np.inf)
+    same = None if known is None else _same_runs(runs, known)
+    if same is not None:
+        laid.fits[same.new] = False  # not to be relaxed again
+    relaxed = relax(corridor, laid, runs, USED * laid.sites.radius, left, goal)
+    control, used, left = relaxed.control, relaxed.used, relaxed.left
+    laid = laid._replace(control=control)
+    fits = relaxed.certified & ~cusps(laid)
+    if same is not None and known is not None:
+        old = known.laid
+        same.put(control, laid.span_first, old.control, old.span_first, DEGREE)
+        same.put(used, laid.site_first, known.used, old.site_first)
+        same.put(left, laid.span_first, known.left, old.span_first)
+        fits[same.new] = True
+    laid = laid._replace(control=control, fits=fits)
     reserve = float((tolerance - tol).min())
-    return SplineShape(
-        runs=runs, corridor=corridor, laid=laid, left=relaxed.left, reserve=reserve, used=relaxed.used
-    )
+    return SplineShape(runs=runs, corridor=corridor, laid=laid, left=left, reserve=reserve, used=used)
+
+
+class _Same(NamedTuple):
+    """Runs new (n,) of one path that are the runs old (n,) of another."""
+
+    new: Array
+    old: Array
+
+    def put(
+        self, into: FloatArray, first: Array, values: FloatArray, old_first: Array, more: int = 0
+    ) -> None:
+        """Copy the rows of these runs from `values` to `into`; run q holds first[q] + more q : first[q+1] + more (q+1) of them."""
+        for q, k in zip(self.new, self.old, strict=True):
+            begin = old_first[k] + more * k
+            into[first[q] + more * q : first[q + 1] + more * (q + 1)] = values[
+                begin : old_first[k + 1] + more * (k + 1)
+            ]
+
+
+def _same_runs(runs: SplineRuns, known: SplineShape) -> _Same:
+    """The runs that replace the same parts of the same legs, with the same ends, as some that have a spline."""
+    found = {one: k for k, one in enumerate(zip(*known.runs, strict=True)) if known.laid.fits[k]}
+    pairs = [(q, found[one]) for q, one in enumerate(zip(*runs, strict=True)) if one in found]
+    new, old = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return _Same(new, old)
 
 
 def cusps(laid: Splines) -> Array:
@@ -151,7 +188,8 @@ def _moving(toolpath: Toolpath) -> Array:
     """(A,) True for axes that a toolpath moves somewhere: the others accelerate nowhere on its splines either."""
     points = np.vstack([toolpath.start, toolpath.end])
     arcs = np.vstack([toolpath.arcs.e1, toolpath.arcs.e2, toolpath.arcs.drift])
-    return np.asarray((np.ptp(points, axis=0) > 0.0) | (arcs != 0.0).any(axis=0))
+    curves = (np.ptp(toolpath.curves.points, axis=1) > 0.0).any(axis=0)
+    return np.asarray((np.ptp(points, axis=0) > 0.0) | (arcs != 0.0).any(axis=0) | curves)
 
 
 def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:

@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.errors import InputError
 from planner.constraints import normal_limit
 from planner.corners.allocation import allocate, error_rate
 from planner.geometry.legs import legs_of
@@ -113,7 +114,14 @@ class TubeRun:
 
 
 def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
-    """The runs between full stops, in order. Raises InputError if the machine lacks an axis of the toolpath."""
+    """The runs between full stops, in order. Raises InputError for splines, and if the machine lacks an axis of the toolpath."""
+    curves = np.flatnonzero(toolpath.curve >= 0)
+    if len(curves):
+        raise InputError(
+            "method tube takes lines and arcs, not splines; plan with method optimal",
+            source=toolpath.source,
+            line=int(toolpath.line[curves[0]]),
+        )
     limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
     reachable = normal_limit.anywhere(machine, toolpath.axes)
     rate = error_rate(machine)

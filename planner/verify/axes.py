@@ -69,4 +69,5 @@ def _standing(toolpath: Toolpath, axis: int) -> float | None:
     arcs = toolpath.arcs
     still = (toolpath.start[:, axis] == place).all() and (toolpath.end[:, axis] == place).all()
     flat = not any(getattr(arcs, name)[:, axis].any() for name in ("e1", "e2", "drift"))
+    flat &= not np.ptp(toolpath.curves.points[:, :, axis], axis=1).any()
     return place if still and flat else None

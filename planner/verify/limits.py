@@ -135,6 +135,10 @@ def scan(
         step = math.sqrt(step_sq)
         if k >= max(skip, 1):
             travelled += step
+        orders = min(3, k - first)
+        over1 = 1.0 / (t[k] - t[k - 1]) if orders >= 1 else 0.0
+        over2 = 2.0 / (t[k] - t[k - 2]) if orders >= 2 else 0.0
+        over3 = 3.0 / (t[k] - t[k - 3]) if orders >= 3 else 0.0
         for axis in range(axes):
             difference[0] = position[k, axis]
             error[0] = ulp * (abs(position[k, axis]) + travelled + limits[0, axis] * t[k]) + digits[axis]
@@ -143,8 +147,8 @@ def scan(
                 lasting = t[to] - t[to - 1]
                 speed = abs(position[to, axis] - position[to - 1, axis]) / lasting + limits[1, axis] * lasting
                 error[0] += digits[axes] * speed
-            for order in range(1, min(3, k - first) + 1):
-                over = order / (t[k] - t[k - order])
+            for order in range(1, orders + 1):
+                over = over1 if order == 1 else (over2 if order == 2 else over3)
                 difference[order] = over * (difference[order - 1] - before[axis, order - 1])
                 error[order] = over * (error[order - 1] + error_before[axis, order - 1])
                 if k >= skip:
@@ -172,15 +176,15 @@ def scan(
             if k == first or not judged[0]:
                 continue
             mean = 0.5 * (velocity[k, axis] + velocity[k - 1, axis])
-            gap = max(abs(difference[1] - mean) - error[1] - resolution * limits[0, axis], 0.0) / period
+            gap = max(abs(difference[1] - mean) - error[1] - resolution * limits[0, axis], 0.0) * over1
             _keep(worst, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
-            _keep(worst, GAP_BY_JERK * axes + axis, gap / period, limits[2, axis] / 12.0, k, COLUMN)
+            _keep(worst, GAP_BY_JERK * axes + axis, gap * over1, limits[2, axis] / 12.0, k, COLUMN)
             if not judged[1]:
                 continue
             mean = 0.5 * (acceleration[k, axis] + acceleration[k - 1, axis])
-            change = (velocity[k, axis] - velocity[k - 1, axis]) / period
-            noise = resolution * (limits[0, axis] / period + limits[1, axis])
-            gap = max(abs(change - mean) - noise, 0.0) / period
+            change = (velocity[k, axis] - velocity[k - 1, axis]) * over1
+            noise = resolution * (limits[0, axis] * over1 + limits[1, axis])
+            gap = max(abs(change - mean) - noise, 0.0) * over1
             _keep(worst, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
         if k < skip:
             continue

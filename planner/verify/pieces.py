@@ -4,6 +4,8 @@ A line is one piece. An arc or helix p(x) = center + radius (cos(rate x) e1 + si
 most `PIECE_ANGLE`, and the points between them are vertices like those of the program: the motion has to pass each of them
 in order, so that a full circle cannot be left out although its ends coincide.
 
+A curve is cut likewise (verify/curves.py).
+
 The nearest point of an arc piece solves g(x) = (p(x) - q) . p'(x) = 0. Without drift it lies at the polar angle of q; with
 drift Newton's method starts there. With E1 = e1.drift, E2 = e2.drift, DD = drift.drift, w = q - center, c = cos, s = sin:
 
@@ -17,14 +19,14 @@ nearest point an error of x enters it only squared.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.kernels import njit
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.verify.curves import curve_counts, curve_points, reach_curve
+from planner.verify.kernel import kernel
 
 PIECE_ANGLE = (
     np.pi / 8
@@ -46,30 +48,15 @@ PIECE = np.dtype(
 JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
 
-def kernel(inline: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The compiler's settings for all kernels of the verifier. They work on arrays that their caller owns and allocate nothing.
-
-    Counting references to those arrays at every call was four fifths of the running time, hence `_nrt=False`; so was passing
-    them on the stack, hence `inline` for the innermost functions, which the interpreter then cannot call. Division by zero
-    gives inf, as in numpy.
-    """
-    settings: dict[str, Any] = {
-        "forceinline": inline,
-        "no_cpython_wrapper": inline,
-        "no_cfunc_wrapper": True,
-        "_nrt": False,
-    }
-    return njit(cache=True, error_model="numpy", **settings)
-
-
 class ProgramPieces(NamedTuple):
-    """N pieces over A axes, the N+1 vertices around them, and the K arcs. Few arrays, since each costs at every call.
+    """N pieces over A axes, the N+1 vertices around them, and the K arcs and curves. Few arrays, since each costs at every call.
 
     vertex : (N+1, A) [mm]
     joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real, if it is a joint of the program
-    piece  : (N,) `PIECE`: budget [mm]; feed [mm/s]; x0, x1 range of the arc's parameter [mm]; arc row or -1; segment
-    frame  : (K, 4, A) center, e1, e2, drift of an arc
-    turn   : (K, 2) radius [mm], rate [rad/mm]
+    piece  : (N,) `PIECE`: budget [mm]; feed [mm/s]; x0, x1 range of the arc's parameter [mm], or of the curve's [-]; arc: row of
+             an arc, -1 for a line, -2 - row of a curve; segment
+    frame  : (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
+    turn   : (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
     """
 
     vertex: FloatArray
@@ -88,20 +75,27 @@ def program_pieces(toolpath: Toolpath) -> ProgramPieces:
 
     Raises ValueError if the toolpath contradicts itself: segments that do not meet, arcs that do not end where they say.
     """
-    arcs, is_arc = toolpath.arcs, toolpath.arc >= 0
+    arcs, is_arc, curves, is_curve = toolpath.arcs, toolpath.arc >= 0, toolpath.curves, toolpath.curve >= 0
     count = np.ones(len(toolpath), dtype=np.int64)
     angle = np.abs(arcs.rate[toolpath.arc[is_arc]]) * toolpath.length[is_arc]
     count[is_arc] = np.maximum(1, np.ceil(angle / PIECE_ANGLE - RATIO_ROUNDING)).astype(np.int64)
+    count[is_curve] = curve_counts(curves.points, curves.weight, PIECE_ANGLE)[toolpath.curve[is_curve]]
     segment = np.repeat(np.arange(len(toolpath)), count)
     first = np.cumsum(count) - count  # first piece of each segment
     part = np.arange(len(segment)) - first[segment]
-    step = toolpath.length / count
+    step = np.where(is_curve, 1.0, toolpath.length) / count
     x0, x1 = part * step[segment], (part + 1) * step[segment]
-    arc = toolpath.arc[segment]
+    row = np.where(is_curve, len(arcs) + toolpath.curve, toolpath.arc)  # in frame and turn
+    arc = np.where(is_curve, -2 - row, row)[segment]
+    frame = np.concatenate([np.stack([arcs.center, arcs.e1, arcs.e2, arcs.drift], axis=1), curves.points])
+    turn = np.concatenate([np.stack([arcs.radius, arcs.rate], axis=1), curves.weight])
 
     vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])
     on_arc = np.flatnonzero(arc >= 0)
     vertex[on_arc] = _arc_points(toolpath, arc[on_arc], x0[on_arc])
+    on_curve = np.flatnonzero(arc < -1)
+    at = -2 - arc[on_curve]
+    vertex[on_curve] = curve_points(frame[at], turn[at], x0[on_curve])[0]
     _check_consistent(toolpath, vertex[first])
     vertex[first] = toolpath.start
     at = np.append(first, len(segment))  # the vertices that are joints of the program
@@ -115,10 +109,7 @@ def program_pieces(toolpath: Toolpath) -> ProgramPieces:
     joint["budget"][at] = toolpath.tolerance
     joint["real"][at] = True
     joint["stop"][at] = toolpath.joint == Joint.STOP
-    frame = np.stack([arcs.center, arcs.e1, arcs.e2, arcs.drift], axis=1)
-    return ProgramPieces(
-        vertex=vertex, joint=joint, piece=piece, frame=frame, turn=np.stack([arcs.radius, arcs.rate], axis=1)
-    )
+    return ProgramPieces(vertex=vertex, joint=joint, piece=piece, frame=frame, turn=turn)
 
 
 def widened(pieces: ProgramPieces, factor: float = 1.0, more: float = 0.0) -> ProgramPieces:
@@ -160,10 +151,12 @@ def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> 
     """Which part of piece i lies within `radius` of the point q (A,).
 
     -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
-    Exact on lines; on arcs the distance is, and a and b are to second order about the nearest point.
+    Exact on lines; on arcs and curves the distance is, and a and b are to second order about the nearest point.
     """
     if pieces.piece[i]["arc"] >= 0:
         return _reach_arc(pieces, i, q, radius)
+    if pieces.piece[i]["arc"] < -1:
+        return reach_curve(pieces, i, q, radius)
     vertex = pieces.vertex
     along, length_sq = 0.0, 0.0
     for n in range(len(q)):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 
+from planner.base.threads import side_by_side, threads
 from planner.motion.trajectory import Trajectory
 from planner.verify.dense import Comparison
 from planner.verify.findings import Look
@@ -12,6 +14,8 @@ from planner.verify.pieces import PERIOD_ROUNDING, ProgramPieces
 from planner.verify.samples import Delivered
 from planner.verify.stream import Limits, Watch
 from planner.verify.times import AnyMotion, look
+
+SIDE_BY_SIDE = 65_536  # samples; fewer are read by one thread
 
 
 class Reader:
@@ -63,21 +67,40 @@ class Reader:
         samples: Iterator[Trajectory],
         progress: Callable[[float], None],
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes."""
+        """Read the motion, and the samples as far as it goes: a part of the motion and, side by side, the samples of the part before,
+        which are then compared. What is seen does not depend on the number of threads."""
         assert self.motion is not None
         assert self.comparison is not None
         between = Watch(pieces, self.limits, middles=False)
         self.comparison.begin()
-        for part in look(self.motion, *self._times):
-            while seen.seen.t_last < part.t[-1]:
-                chunk = next(samples, None)
-                if chunk is None:
-                    break
-                self._take(seen, chunk)
-            self.comparison.compare(part)
-            between.take(part)
-            progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
-        return between
+        parts = look(self.motion, *self._times)
+        part: Trajectory | None = None  # read, but not compared yet
+        while True:
+            new: list[Trajectory] = []
+
+            def go_on(new: list[Trajectory] = new) -> None:
+                for one in itertools.islice(parts, 1):
+                    between.take(one)
+                    new.append(one)
+
+            def catch_up(part: Trajectory | None = part) -> None:
+                while part is not None and seen.seen.t_last < part.t[-1]:
+                    chunk = next(samples, None)
+                    if chunk is None:
+                        break
+                    self._take(seen, chunk)
+
+            if len(self.trajectory) > SIDE_BY_SIDE and threads() > 1:
+                side_by_side([go_on, catch_up], lambda: None, lambda: None)
+            else:
+                go_on()
+                catch_up()
+            if part is not None:
+                self.comparison.compare(part)
+                progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+            if not new:
+                return between
+            part = new[0]
 
     def _take(self, seen: Watch, chunk: Trajectory) -> None:
         seen.take(chunk)

@@ -1,37 +1,173 @@
-"""The cache of compiled kernels: what another version of the package has left in it does no harm."""
+"""Kernels from the disk: they do what those do that were compiled, and are compiled again when what they compute has changed."""
 
 from __future__ import annotations
 
-import importlib
+import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
-import numba
+import numpy as np
 import pytest
 
-SOURCE = """
+from planner.base import kept
+from planner.base.kernels import Kernel, njit
+
+KERNELS = """
 from typing import NamedTuple
+
+import numpy as np
+from planner.base.kernels import njit
+from inner import FACTOR, share
+
+class Parts(NamedTuple):
+    whole: float
+    each: np.ndarray
+
+@njit()
+def parts(x, n=2):
+    if n < 1:
+        raise ValueError("no parts", 3)
+    each = np.empty(n)
+    for k in range(n):
+        each[k] = share(x, n)
+    return Parts(FACTOR * each.sum(), each)
+
+@njit()
+def twice(record):
+    return 2.0 * record.whole
+"""
+INNER = """
 from planner.base.kernels import njit
 
-class {name}(NamedTuple):
-    x: float
+FACTOR = 1.0
 
-@njit(cache=True)
-def doubled(record):
-    return 2.0 * record.x
+@njit()
+def share(x, n):
+    return x / n
+"""
+USE = """
+import sys
+import roots
+from roots import Parts, parts, twice
+import numpy as np
+
+made = parts(6.0, 3)
+assert type(made) is Parts and made.each.dtype == np.float64 and made.each.flags.writeable
+try:
+    parts(1.0, n=0)
+except ValueError as error:
+    assert error.args == ("no parts", 3)
+assert twice(made) == 2.0 * made.whole
+numbers = made.whole, *made.each, parts(6.0).whole
+print(*numbers, "|", parts.compiled, parts.loaded, twice.compiled, "numba" in sys.modules)
 """
 
 
-def test_an_index_that_names_a_class_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """numba reads all of a kernel's index, and fails, before it looks whether its source has changed."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")  # beside the source, whatever NUMBA_CACHE_DIR says
-    for name in ("Before", "AfterTheUpdate"):
-        (tmp_path / "kernel_of_record.py").write_text(SOURCE.format(name=name), encoding="utf-8")
-        sys.modules.pop("kernel_of_record", None)
-        importlib.invalidate_caches()
-        module = importlib.import_module("kernel_of_record")
-        assert module.doubled(getattr(module, name)(1.5)) == 3.0
-    sys.modules.pop("kernel_of_record", None)
-    assert len(list(tmp_path.rglob("*.nbi"))) == 1
+@pytest.fixture
+def use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
+    """Write two modules of kernels and use them in a process of its own: values | kernels compiled, loaded; whether numba was there."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+
+    def run(inner: str = INNER, roots: str = KERNELS) -> str:
+        (tmp_path / "inner.py").write_text(inner, encoding="utf-8")
+        (tmp_path / "roots.py").write_text(roots, encoding="utf-8")
+        (tmp_path / "use.py").write_text(USE, encoding="utf-8")
+        command = [sys.executable, str(tmp_path / "use.py")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    return run
+
+
+def files(tmp_path: Path) -> list[str]:
+    return sorted(file.name for file in (tmp_path / "cache").rglob("*") if file.is_file())
+
+
+def test_kernels_from_the_disk(use: Callable[..., str], tmp_path: Path) -> None:
+    assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
+    written = files(tmp_path)
+    assert [name.partition("-")[0] for name in written] == ["roots.parts", "roots.twice"]
+    assert use() == "6.0 2.0 2.0 2.0 6.0 | 0 1 0 False"  # the same, without numba
+    # a comment is nothing to compile for; a kernel inside it, in another file, or a constant is, and the old one goes
+    assert use(INNER + "# as before\n", "# the same\n" + KERNELS).endswith("| 0 1 0 False")
+    assert files(tmp_path) == written
+    assert use(INNER.replace("x / n", "x / n + 1.0")) == "9.0 3.0 3.0 3.0 8.0 | 1 0 0 True"
+    assert use(INNER.replace("FACTOR = 1.0", "FACTOR = 2.0")) == "12.0 2.0 2.0 2.0 12.0 | 1 0 0 True"
+    assert len(files(tmp_path)) == 2
+    # half a file is none
+    for file in (tmp_path / "cache").rglob("*.kernel"):
+        file.write_bytes(file.read_bytes()[:1000])
+    assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
+
+
+SIX = 6
+
+
+@njit(cache=False)
+def six(x):
+    return x + SIX
+
+
+@njit(cache=False)
+def type_of(x):
+    return x
+
+
+def test_the_kind_of_an_argument_is_its_numba_type() -> None:
+    """Kinds are told apart as numba does: every argument here has a kernel of its own."""
+    from numba import typeof
+
+    whole = np.arange(12.0).reshape(3, 4)
+    fixed = whole.copy()
+    fixed.flags.writeable = False
+    packed = np.zeros(3, np.dtype([("a", "?"), ("b", "f8")]))["b"]  # not aligned
+    given = [
+        1,
+        1.0,
+        True,
+        whole,
+        fixed,
+        packed,
+        whole.T,
+        whole[:, ::2],
+        whole[0],
+        whole.astype("i8"),
+        (1, 2.0),
+        (1, (2.0,)),
+    ]
+    for value in given:
+        type_of(value)
+    assert type_of.compiled == len(given) == len({typeof(value) for value in given})
+    for value in (np.float64(2.0), np.int64(3), np.bool_(True), (2, 3.0), whole + 1.0):
+        before = type_of.compiled
+        type_of(value)
+        assert type_of.compiled - before == isinstance(
+            value, np.generic
+        )  # of the same numba type, compiled for NumPy's numbers
+
+
+def test_what_a_kernel_computes_is_its_content() -> None:
+    contents = {six.content}
+    for function, settings in (
+        (lambda x: x + SIX, {}),
+        (lambda x: x + 7, {}),
+        (lambda x: x + 7.0, {}),
+        (lambda x: x - 7, {}),
+        (lambda x: x - 7, {"error_model": "numpy"}),
+        (lambda x: six(x), {}),
+    ):
+        contents.add(Kernel(function, settings, cache=False).content)
+    assert len(contents) == 6  # the first is the same as the one before
+    assert (
+        kept.place(six.py_func, six.content, (1,)).kernel != kept.place(six.py_func, six.content, (2,)).kernel
+    )
+
+
+def test_a_kernel_of_something_that_only_numba_knows() -> None:
+    from numba.typed import List
+
+    assert type_of(List([1.5]))[0] == 1.5
+    assert type_of.dispatcher.nopython_signatures

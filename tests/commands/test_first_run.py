@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from planner.base import kernels
@@ -12,6 +14,8 @@ from planner.base.names import METHODS
 from planner.commands import first_run
 from planner.commands.first_run import BESIDE, Helper, compile_beside
 from planner.commands.terminal import ProgressBar
+from planner.machine import load_machine
+from planner.nc.reader import parse_program
 
 
 @pytest.mark.slow
@@ -67,3 +71,16 @@ def test_a_second_process_that_fails_says_nothing(
         assert helper._process is not None
         assert helper._process.wait(60) == 1
     assert capfd.readouterr() == ("", "")
+
+
+def test_the_three_lines_are_as_a_program_that_was_read() -> None:
+    """Kernels are compiled for types of arrays: others would be compiled beside, in vain."""
+    made = first_run.three_lines()
+    text = "G21 G90 G64 F600\n" + "".join(f"G1 X{x} Y{y} Z{z}\n" for x, y, z in first_run.POINTS)
+    read = parse_program(text, load_machine("mill"))
+    for field in dataclasses.fields(made):
+        a, b = getattr(made, field.name), getattr(read, field.name)
+        if isinstance(a, np.ndarray):
+            assert (a.dtype, a.ndim, a.flags.writeable) == (b.dtype, b.ndim, b.flags.writeable), field.name
+            if field.name not in ("line", "tolerance"):
+                assert np.array_equal(a, b), field.name

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.random_paths import random_path
+from planner.feedrate.jerk import layout, passes
+from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import (
     BY_P,
     BY_U,
@@ -32,7 +34,7 @@ from planner.feedrate.jerk.layout import (
 )
 from planner.feedrate.jerk.riccati import forward, offsets, riccati
 from planner.feedrate.jerk.rows import PASSING, linearise
-from planner.feedrate.jerk.window import ScaledWindow, columns_of
+from planner.feedrate.jerk.window import ScaledWindow
 
 STEP_SIZE = 1e-6  # of the differences, share of each quantity's size
 N = LANES + 9  # one full block and a part of a second one
@@ -131,3 +133,31 @@ def dense(blocks: Blocks) -> tuple[np.ndarray, ...]:
         asked[2 * i] = -d[3][i]
     kept[2 * N, 0] = kept[2 * N + 1, 1] = 1.0
     return hessian, gradient, kept, asked
+
+
+@pytest.mark.parametrize("count", [8, 11, 14])
+def test_every_row_is_weighed_once(count: int) -> None:
+    """lam/s of both sides times the row's square is added to the Hessian, and the row's residuals to the gradient."""
+    lanes = layout.LANES
+    rng = np.random.default_rng(count)
+    work, rows = (
+        rng.uniform(0.1, 1.0, layout.WORK),
+        rng.uniform(0.1, 1.0, (count, layout.ROW // lanes, lanes)),
+    )
+    flat, after, worst = rows.ravel().copy(), work.copy(), np.zeros(lanes)
+    passes._weigh(after, flat, count, worst, lanes)
+    added = (after - work).reshape(-1, lanes)
+    value, gradient = rows[:, 0], rows[:, 1:4]
+    up, lam, low, lam_low = (
+        rows[:, k // lanes] for k in (layout.SLACK_UP, layout.LAM_UP, layout.SLACK_LOW, layout.LAM_LOW)
+    )
+    residual, residual_low = value + up - 1.0, low - value - 1.0
+    first = layout.CONVEX // lanes
+    for k, (a, b) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
+        expected = ((lam / up + lam_low / low) * gradient[:, a] * gradient[:, b]).sum(axis=0)
+        assert added[first + k] == pytest.approx(expected, rel=1e-12)
+    first = layout.GRADIENT // lanes
+    for a in range(3):
+        expected = ((lam / up * residual - lam_low / low * residual_low) * gradient[:, a]).sum(axis=0)
+        assert added[first + a] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+    assert worst == pytest.approx(np.maximum(abs(residual), abs(residual_low)).max(axis=0))

@@ -12,9 +12,10 @@ from benchmarks.random_paths import long_path, random_path
 from planner.base.threads import use_threads
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import piece, solver
+from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.solver import JerkLimited
-from planner.feedrate.jerk.window import ScaledWindow, columns_of
+from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers
 

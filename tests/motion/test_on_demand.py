@@ -9,6 +9,7 @@ import pytest
 
 import planner
 from benchmarks import problems
+from planner.base import threads
 from planner.motion import on_demand, timing
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.trajectory import COLUMNS, Trajectory
@@ -16,6 +17,7 @@ from planner.report import trajectory_file
 from planner.report.block_feeds import planned_blocks
 from planner.report.export import write_plan
 from planner.report.trajectory_file import write_trajectory
+from planner.verify import reading, times
 
 METHODS = ("stop", "bezier", "fir", "kinematic")
 
@@ -111,3 +113,30 @@ def test_a_directory_holds_the_same_program(tmp_path, monkeypatch):
         write_plan(made, tmp_path / str(kept))
         written[kept] = (tmp_path / str(kept) / "planned.ngc").read_bytes()
     assert written[50] == written[2**20] != program.read_bytes()
+
+
+def test_the_verdict_is_the_same_on_any_number_of_threads(monkeypatch):
+    """Samples and what lies between them, side by side and one after the other, in chunks that end at different times."""
+    monkeypatch.setattr(timing, "SAMPLES_KEPT", 50)
+    monkeypatch.setattr(on_demand, "CHUNK", 77)
+    monkeypatch.setattr(reading, "SIDE_BY_SIDE", 0)
+    monkeypatch.setattr(times, "CELLS", 350)
+    verdicts, used = [], []
+    together = reading.side_by_side
+    monkeypatch.setattr(reading, "side_by_side", lambda *work: (used.append(len(work[0])), together(*work)))
+    for count in (1, 2, 3):
+        threads.use_threads(count)
+        try:
+            verdicts.append(planner.plan(problems.pentagon(), problems.machine(), method="bezier").verdict)
+        finally:
+            threads.use_threads(None)
+    assert set(used) == {2}
+    assert verdicts[0].passed
+    for verdict in verdicts[1:]:
+        assert verdict.summary() == verdicts[0].summary()
+        for name, check in verdict.limits.items():
+            assert (check.ratio, check.time, check.line) == (
+                verdicts[0].limits[name].ratio,
+                verdicts[0].limits[name].time,
+                verdicts[0].limits[name].line,
+            )

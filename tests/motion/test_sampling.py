@@ -7,8 +7,10 @@ import pytest
 from whole_plans import smooth_path
 
 from benchmarks import problems
-from planner.corners.elements import element_length, element_point
-from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, Law, inverses, sample
+from planner.corners.elements import ElementTable, element_length, element_point
+from planner.geometry.spline import span_dtype
+from planner.motion.lots import LANES, sample
+from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses
 from planner.nc.reader import parse_program
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
@@ -32,54 +34,83 @@ def paths() -> dict[str, PathSamples]:
 PATHS = paths()
 
 
-@pytest.mark.parametrize("name", list(PATHS))
+def grid_of(samples: PathSamples) -> Grid:
+    columns = (getattr(samples, name) for name in ("piece", "s", "element", "w0", "w1", "segment"))
+    return Grid(*columns, samples.path.passed)
+
+
+def nearly_a_cusp() -> tuple[ElementTable, Grid]:
+    """One span (w - 1/2)^3 + 0.1 w, on which no polynomial of the arc length is any good."""
+    table = PATHS["corners"].table
+    spans = np.zeros(1, span_dtype(3))
+    spans["coef"][0, :4, 0], spans["width"] = (-0.125, 0.85, -1.5, 1.0), 1.0
+    table, element = table._replace(spans=spans), len(table.legs)
+    length = element_length(*table, element, 0.0, 1.0, 0.5, np.empty((4, 3)))
+    ends = np.array([0.0, 1.0]), np.array([1.0, 1.0])
+    piece, s = np.array([0, 2]), np.array([0.0, length])
+    return table, Grid(
+        piece, s, np.full(2, element), *ends, np.zeros(2, dtype=np.int64), np.array([0.0, 1.0])
+    )
+
+
+CASES = {name: (samples.table, grid_of(samples)) for name, samples in PATHS.items()} | {
+    "cusp": nearly_a_cusp()
+}
+
+
+@pytest.mark.parametrize("name", list(CASES))
 def test_samples_lie_where_their_arc_length_says(name):
     """At a constant feed of 1 mm/s from each grid point on: four samples in every interval, s known, the position by hand."""
-    grid_of = PATHS[name]
-    grid = Grid(
-        grid_of.piece,
-        grid_of.s,
-        grid_of.element,
-        grid_of.w0,
-        grid_of.w1,
-        grid_of.segment,
-        grid_of.path.passed,
-    )
-    table, axes = grid_of.table, grid_of.d1.shape[1]
+    table, grid = CASES[name]
+    axes = 3 if name == "cusp" else PATHS[name].d1.shape[1]
     inverse = inverses(table, grid, axes)
-    interval = grid_of.intervals[:: max(1, len(grid_of.intervals) // LOOKED_AT)]
-    h = grid_of.s[interval + 1] - grid_of.s[interval]
-    run = np.repeat(np.arange(len(grid_of.piece) - 1), np.diff(grid_of.piece))
-    one = np.ones(len(grid_of.s))
-    law = Law(grid_of.s, grid_of.s, one, 0.0 * one, 0.0 * one, run, float(grid_of.s[-1]) + 1.0)
-    times = (grid_of.s[interval, None] + h[:, None] * SHARES).ravel()
-    position, velocity, *_, s, _, _ = sample(table, law, grid, inverse, times, axes)
+    interval = np.setdiff1d(np.arange(len(grid.s)), grid.piece[1:] - 1)
+    interval = interval[:: max(1, len(interval) // LOOKED_AT)]
+    h = grid.s[interval + 1] - grid.s[interval]
+    times = (grid.s[interval, None] + h[:, None] * SHARES).ravel()
+    position, velocity, *_, s, _, _ = sample(table, even_law(grid), grid, inverse, times, axes)
     np.testing.assert_allclose(s, times, rtol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(velocity, axis=1), 1.0, rtol=1e-12)
     work, out = np.empty((2, 4, axes)), np.empty((4, axes))
     for row, i in enumerate(interval):
-        w0, w1, ref = grid_of.w0[i], grid_of.w1[i], 0.5 * (grid_of.w0[i] + grid_of.w1[i])
+        w0, w1, ref = grid.w0[i], grid.w1[i], 0.5 * (grid.w0[i] + grid.w1[i])
         for column, share in enumerate(SHARES):
             low, high = w0, w1
             for _ in range(60):  # halves, without what is tested
                 w = 0.5 * (low + high)
-                long = element_length(*table, grid_of.element[i], w0, w, ref, out) > share * h[row]
+                long = element_length(*table, grid.element[i], w0, w, ref, out) > share * h[row]
                 low, high = (low, w) if long else (w, high)
-            element_point(*table, grid_of.element[i], w, ref, work, out)
+            element_point(*table, grid.element[i], w, ref, work, out)
             off = np.abs(position[row * len(SHARES) + column] - out[0]).max()
             assert off <= 4.0 * LENGTH_ROUNDING * h[row] + 2e-13 * max(1.0, np.abs(out[0]).max())
 
 
+def even_law(grid: Grid) -> tuple[object, ...]:
+    """1 mm/s all along."""
+    run = np.repeat(np.arange(len(grid.piece) - 1), np.diff(grid.piece))
+    one = np.ones(len(grid.s))
+    return grid.s, grid.s, one, 0.0 * one, 0.0 * one, run, float(grid.s[-1]) + 1.0
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_a_sample_does_not_depend_on_the_others_of_its_lot(name):
+    """Each time alone, to the last digit: chunks of any size give the same bytes."""
+    table, grid = CASES[name]
+    axes = 3 if name == "cusp" else PATHS[name].d1.shape[1]
+    inverse, law = inverses(table, grid, axes), even_law(grid)
+    times = np.linspace(0.0, grid.s[-1], 3 * LANES + 5)
+    together = sample(table, law, grid, inverse, times, axes)
+    for n, time in enumerate(times):
+        for whole, single in zip(
+            together, sample(table, law, grid, inverse, np.array([time]), axes), strict=True
+        ):
+            assert np.array_equal(whole[n], single[0])
+
+
 def test_each_way_of_inverting_is_taken():
-    """Straight lines exactly, most curves with a step by the slope, and some by the curve."""
-    off = np.concatenate(
-        [
-            inverses(
-                p.table, Grid(p.piece, p.s, p.element, p.w0, p.w1, p.segment, p.path.passed), p.d1.shape[1]
-            )[:, 0]
-            for p in PATHS.values()
-        ]
-    )
-    assert (off <= LENGTH_ROUNDING).any()
+    """By the polynomial alone, with a step by the slope, and by the curve."""
+    off = [inverses(*CASES[name], 3 if name == "cusp" else PATHS[name].d1.shape[1])[:, 0] for name in CASES]
+    off = np.concatenate(off)
+    assert ((off > 0.0) & (off <= LENGTH_ROUNDING)).any()
     assert ((off > LENGTH_ROUNDING) & (off <= ONE_STEP)).any()
     assert (off > ONE_STEP).any()

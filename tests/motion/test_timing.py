@@ -18,7 +18,7 @@ from planner.job.job import Job
 from planner.job.stages import Stages
 from planner.lookahead.rest_to_rest import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.methods.optimal import OptimalMethod
-from planner.motion.time_law import law_of_phases
+from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion, dense_motion, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
@@ -236,7 +236,7 @@ def test_the_stop_law_is_ruckigs_own_motion(length):
     program = problems.polyline([[0, 0], [length, 0]])
     samples = sample_path(smooth_path(program, MACHINE), MACHINE)
     limits = [np.array([x]) for x in (length, 100.0, 2000.0, 2e5)]
-    law = law_of_phases(samples, *rest_to_rest_phases(*limits))
+    law = law_of_moves(samples, np.zeros(1), np.zeros(1), np.zeros(1), *rest_to_rest_phases(*limits))
     got = sample_motion(Motion(samples=samples, law=law), 1e-3)
     move, answer = ruckig.InputParameter(1), ruckig.Trajectory(1)
     move.target_position = [length]

@@ -19,7 +19,7 @@ import tempfile
 
 import numpy as np
 
-KINDS = {"rapid": 0, "feed": 1, "arc": 2, "dwell": 3}
+KINDS = {"rapid": 0, "feed": 1, "arc": 2, "dwell": 3, "tap": 1}
 INIT = "G21 G90 G17 G94 G40 G49 G54"
 
 
@@ -40,7 +40,7 @@ def main(folder, jobs_file, out_file):
             self.tool = offset
 
         def _machine(self, p):
-            return lcnc_canon.Canon._machine(self, [a + b for a, b in zip(p, self.tool, strict=False)])
+            return [a + b for a, b in zip(lcnc_canon.Canon._machine(self, p), self.tool, strict=False)]
 
     def row(move):
         nothing = (0.0, 0.0, 0.0)
@@ -69,7 +69,13 @@ def main(folder, jobs_file, out_file):
             canon.lengths = job.get("tools", {})
             status, line = gcode.parse(job["path"], canon, "G21", INIT)
         error = f"{line}: {gcode.strerror(status)}" if status > gcode.MIN_ERROR else ""
-        moves = [row(m) for m in canon.out if m["kind"] in KINDS]
+        moves = []
+        for move in canon.out:
+            if move["kind"] in KINDS:
+                moves.append(row(move))
+            if move["kind"] == "tap":  # goes on from where it began
+                began = moves[-2] if len(moves) > 1 else row({**move, "end": (0.0, 0.0, 0.0)})
+                moves.append((1, move["line"], *began[2:5], *moves[-1][5:]))
         results[f"{k}.move"] = np.array(moves, dtype=float).reshape(-1, 11)
         results[f"{k}.error"] = np.array(error)
     np.savez(out_file, **results)

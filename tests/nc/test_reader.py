@@ -13,6 +13,7 @@ from planner.machine import Machine
 from planner.nc.lexer import split_words
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.reader import parse_program
+from planner.nc.reading import Reading
 
 FIELDS = (
     "kind", "end", "feed", "dwell", "line", "path_control", "tolerance",
@@ -111,7 +112,7 @@ def test_order_of_words_does_not_matter() -> None:
 def test_byte_order_mark_and_block_delete() -> None:
     text = "\ufeffG0 X1\n/G0 X2\n / G0 X3\nG0 X4"
     assert ends(text) == [[1, 0, 0], [4, 0, 0]]
-    assert len(parse_program(text, block_delete=False)) == 4
+    assert len(parse_program(text, reading=Reading(block_delete=False))) == 4
 
 
 def test_percent_starts_and_ends() -> None:
@@ -234,7 +235,7 @@ def test_a_motion_code_alone_moves_nothing() -> None:
 def test_notes_say_what_is_missing() -> None:
     program = parse_program("T3 M6\nG43 H3\nG56\nG28\nG28\nG64 Q1 P1\nG64 Q1 P1\nG43 H3", machine())
     assert program.notes == (
-        "line 1: a tool change is a full stop that takes no time",
+        "line 1: a tool change is a full stop that takes no time and moves nothing",
         "line 2: tool 3 has no length in the machine file: 0 (2 times)",
         "line 3: G56 has no offset in the machine file: 0",
         "line 4: G28 has no position in the machine file: machine zero (2 times)",

@@ -24,6 +24,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
+from planner.nc.reading import Reading
 from planner.nc.writer import FEED_MIN, SAME_FEED, SIGNIFICANT, retimed, round_down
 
 # What one F word may take away at most by rounding down [-], and the rounding of units (25.4, 60) beside it.
@@ -164,6 +165,25 @@ def test_rounding_down(value: float) -> None:
     assert len(text.replace(".", "").strip("0")) <= SIGNIFICANT
 
 
+def test_the_blocks_of_a_line_share_its_feed() -> None:
+    """The fastest of them decides: a cycle, and a corner that compensation adds."""
+    source = b"G21 G99 F600\nG0 X0 Y0 Z9\nG83 X1 Z-4 R2 Q2\nG41.1 D2\nG1 X20\nY-9\nG40\n"
+    program = parse_program(source)
+    feeds = np.where(program.line == 3, np.linspace(2.0, 5.0, len(program)), np.nan)
+    feeds[program.line == 6] = 4.0, 7.0
+    largest = feeds[(program.line == 3) & (program.kind == Kind.LINE)].max() * 60
+    after = retimed(source, program, feeds)
+    assert after.split(b"\n")[2] == b"G83 X1 Z-4 R2 Q2 F" + round_down(largest).encode()
+    assert b"G1 X20 F600\nY-9 F420\n" in after
+
+
+def test_other_feed_modes_and_threads_stay() -> None:
+    source = b"G21 F600 S60 M3\nG33 Z-5 K1\nG1 X5\nG93 X7 F2\nX9 F3\nG95 F.5 X1\nG94 F300 X0\n"
+    program = parse_program(source)
+    after = retimed(source, program, np.full(len(program), 0.1))
+    assert after == source.replace(b"G1 X5", b"G1 X5 F6").replace(b"F300", b"F6")
+
+
 def test_what_does_not_belong_together_is_refused() -> None:
     program = parse_program("G1 X1 F60\nX2\n")
     with pytest.raises(ValueError, match="on lines where the source has no word"):
@@ -176,8 +196,8 @@ def test_what_does_not_belong_together_is_refused() -> None:
 
 def test_deleted_blocks_that_are_read_are_written() -> None:
     source = b"F6000 G1 X1\n/X9\n"
-    program = parse_program(source, block_delete=False)
-    assert retimed(source, program, np.full(2, 10.0), block_delete=False) == b"F600 G1 X1\n/X9\n"
+    program = parse_program(source, reading=Reading(block_delete=False))
+    assert retimed(source, program, np.full(2, 10.0)) == b"F600 G1 X1\n/X9\n"
 
 
 # --- any program, in any spelling ----------------------------------------------------------------------------------------
@@ -234,7 +254,7 @@ def test_the_control_reads_real_programs_as_we_do(tmp_path: Path) -> None:
     jobs, results = [], []
     for path in [*PROGRAMS, *sorted((SHARED / "peers" / "programs").glob("*.ngc"))]:
         try:
-            program = read_program(path)
+            program = read_program(path, reading=Reading(strict=True))
         except InputError:
             continue
         if path.stat().st_size > REAL_MAX:

@@ -10,6 +10,7 @@ import pytest
 from quick import slow_but
 
 from benchmarks import problems
+from benchmarks.growth import relief
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -17,9 +18,12 @@ from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Joint
 from planner.job.trace import tell_nobody
 from planner.methods.optimal import OptimalMethod
-from planner.optimal.compare_corners import COMPARED_POINTS, CornerBounds, corner_bounds, with_corners
+from planner.nc.reader import parse_program
+from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
+from planner.optimal.corner_times import CornerBounds, corner_times
 from planner.optimal.effort import COARSE, Grids
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import second_order
@@ -110,22 +114,38 @@ def test_auto_is_never_slower_than_single_corners(name):
         assert auto.trajectory.cycle_time <= single.trajectory.cycle_time * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("limited", [True, False], ids=["third order", "second order"])
 @pytest.mark.parametrize(
     "program",
     [problems.zigzag(), problems.star_spiral(60), problems.chord_circle(60)],
     ids=lambda own: own.source,
 )
-def test_the_coarse_time_is_less_than_what_corners_take(program):
-    """What `auto` does not even try could not have been faster."""
+def test_bounds_are_less_than_what_corners_take(program, limited):
+    """What `auto` does not even try could not have been faster: neither the closed form nor the coarse time is above the exact one."""
     rounded = round_corners(toolpath_from_program(program, MACHINE, None), MACHINE, BezierCorner())
-    exact = second_order(rounded, sample_path(rounded, MACHINE), MACHINE, Reachability())
-    bounds = corner_bounds(rounded, MACHINE)
-    assert (bounds.time < exact.stop_to_stop()).all()
-    grid = sample_path(rounded, MACHINE, third_order=True)
-    assert 0.5 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
+    if limited:
+        rounded = round_corners(rounded.toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+        exact = planned_on(rounded)
+    else:
+        exact = second_order(rounded, sample_path(rounded, MACHINE), MACHINE, Reachability())
+    for bounds in (
+        corner_times(rounded, MACHINE, jerk_limited=limited),
+        corner_bounds(rounded, MACHINE, limited),
+    ):
+        assert (bounds.time < exact.stop_to_stop()).all()
+        grid = sample_path(rounded, MACHINE, third_order=True)
+        assert 0.3 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
 
 
-def test_corners_that_win_are_planned_once_on_each_grid_however_many_straight_pieces_there_are():
+def test_the_closed_form_rules_out_corners_on_dense_chords():
+    """On a relief of 60 chords single corners take longer than splines by what the closed form says alone."""
+    program = parse_program(relief(60), MACHINE)
+    rounded, shape = shaped(program)
+    splines = planned_on(with_spline(rounded, shape), shape=shape)
+    assert corner_times(rounded, MACHINE).time.sum() > splines.solution.cycle_time
+
+
+def test_corners_that_win_are_planned_by_themselves_on_both_grids_and_then_with_the_whole_path():
     points = np.array([[k, 0.6 * (k % 2)] for k in range(8)] + [[7.0, 20.0], [7.0, 5.0]])
     rounded, shape = shaped(problems.polyline(points))
     splines = planned_on(with_spline(rounded, shape), shape=shape)
@@ -136,11 +156,24 @@ def test_corners_that_win_are_planned_once_on_each_grid_however_many_straight_pi
     pieces = len(splines.samples.piece) - 1
     assert pieces == 2
     corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
-    best, left = with_corners(rounded, slow, slow, corners, QUIET, order, GRIDS)
+    best, left = with_corners(rounded, slow, slow.stop_to_stop(), corners, QUIET, order, GRIDS)
     assert not len(left)
-    assert len(order.paths) == 2
+    assert [len(path.legs) for path in order.paths] == [8, 8, 9]
     assert not best.shape.laid.fits.any()
     assert best.solution.cycle_time < slow.solution.cycle_time
+
+
+def test_a_part_of_a_path_is_the_same_path_there():
+    """Pieces between full stops alone: the same corners, and the same time on each."""
+    points = np.array([[k, 0.6 * (k % 2)] for k in range(8)])
+    toolpath = toolpath_from_program(problems.polyline(points), MACHINE).with_joints([2, 5], Joint.STOP)
+    rounded = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    times = planned_on(rounded).stop_to_stop()
+    for kept in ([True, False, True], [False, True, False], [False, False, True]):
+        part = rounded.part(np.array(kept))
+        np.testing.assert_allclose(planned_on(part).stop_to_stop(), times[kept], rtol=1e-6)
+    with pytest.raises(ValueError, match="without splines"):
+        with_spline(rounded, spline_shape(rounded, MACHINE)).part(np.array([True, False, False]))
 
 
 def test_corners_that_need_too_large_a_grid_are_left_and_named():
@@ -149,7 +182,7 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     splines = planned_on(with_spline(rounded, shape), shape=shape)
     corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
     order = Recorded()
-    best, left = with_corners(rounded, splines, splines, corners, QUIET, order, GRIDS)
+    best, left = with_corners(rounded, splines, splines.stop_to_stop(), corners, QUIET, order, GRIDS)
     assert not order.paths
     assert list(left) == [0]
     assert best is splines

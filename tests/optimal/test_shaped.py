@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks import never_slower, problems
 from planner.base.errors import InputError
 from planner.machine import Fir, Mode
 from planner.methods.registry import plan
@@ -73,6 +73,15 @@ def test_an_exact_stop_stands_still():
     corner = np.linalg.norm(made.trajectory.position - [4.0, 12.0, 0.0], axis=1)
     assert ((corner < 1e-6).sum() - 1) * machine.dt >= 0.05 - 2 * machine.dt
     assert made.verdict.passed
+
+
+def test_a_bow_between_samples_of_half_the_tolerance():
+    """Seed 12: two lines at 2 ms and 5 um, where a chord bows by more than half of the tolerance."""
+    program, machine = never_slower.job(12)
+    machine = machine.model_copy(update={"modes": (Mode(frequency=25.0, damping=0.03),)})
+    made = plan(program, machine, method="second-order", corner="bezier", shaped=True)
+    assert made.verdict.passed
+    assert left(made) < LEFT
 
 
 def test_refusals(pentagon):

@@ -10,6 +10,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.random_paths import random_path
 from planner.constraints.assemble import feedrate_problem
+from planner.constraints.own import JointLimit
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.jerk.solver import JerkLimited
@@ -17,10 +18,13 @@ from planner.feedrate.solution import ratios_by_limit
 from planner.geometry.build import toolpath_from_program
 from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion, sample_motion
+from planner.optimal import tighten
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import ThirdOrder
 from planner.optimal.tighten import (
+    SEEN_BEFORE,
     SLOWING_MORE,
+    TIGHTENED_LOSS,
     excess,
     slowed,
     slower,
@@ -127,3 +131,40 @@ def test_peaks_between_the_places_looked_at_are_seen():
     near = jerk.max(axis=1) > 1.0 - 1e-4
     assert unseen[near].max() > 1e-4  # else this test shows nothing
     assert missed[near].max() < 0.1 * unseen[near].max()
+
+
+class AlongX(JointLimit):
+    """The axis x, as a joint."""
+
+    name, unit = "x again", "mm"
+    velocity, acceleration, jerk = (
+        getattr(MACHINE.axes["x"], q) for q in ("velocity", "acceleration", "jerk")
+    )
+
+    def joint(self, at):
+        return at.x
+
+
+def test_a_joint_that_is_an_axis_has_its_excess(coarse):
+    _, motion, toolpath, _ = coarse
+    axes = {
+        letter: axis.model_copy(
+            update={q: 100.0 * getattr(axis, q) for q in ("velocity", "acceleration", "jerk")}
+        )
+        for letter, axis in MACHINE.axes.items()
+    }
+    without = MACHINE.model_copy(update={"axes": axes})
+    of_axis = excess(motion, toolpath, without.model_copy(update={"axes": axes | {"x": MACHINE.axes["x"]}}))
+    of_joint = excess(motion, toolpath, without.with_own((AlongX(),)))
+    assert of_axis.max() > 1.0 + 1e-3  # else this test shows nothing
+    np.testing.assert_allclose(of_joint, of_axis, rtol=1e-9)
+
+
+def test_long_jobs_are_tightened_while_it_pays_and_slowed_for_what_the_verifier_may_find(coarse, monkeypatch):
+    planned, _, toolpath, before = coarse
+    assert before > 1.0 + TIGHTENED_LOSS
+    _, short = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
+    monkeypatch.setattr(tighten, "TIGHTENED_POINTS", 10)
+    _, long = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
+    assert short.end <= long.end <= short.end * (1.0 + TIGHTENED_LOSS) * SEEN_BEFORE
+    assert excess(long, toolpath, MACHINE).max() <= 1.0 - 0.9 * (SEEN_BEFORE - 1.0)

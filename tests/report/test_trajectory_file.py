@@ -13,11 +13,11 @@ from planner.base.errors import InputError
 from planner.motion.trajectory import Trajectory
 from planner.report.trajectory_file import (
     FORMATS,
-    divided_difference,
     read_trajectory,
     units,
     write_trajectory,
 )
+from planner.report.trajectory_reader import divided_difference
 
 TRAJECTORY = make_plan().trajectory
 FIELDS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from motions import JERK_FREE, Asked, Moves, chain, changed, machine, polyline, rounded, sample, stay
 
 from planner.machine import machine_from_dict
-from planner.report.trajectory_file import divided_difference
+from planner.report.trajectory_reader import divided_difference
 from planner.verify import Given, error_allocation, verify
 
 AXES = {

@@ -6,12 +6,17 @@ See solver.py.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.feedrate.jerk.layout import ProblemColumns, Room
+from planner.base.arrays import FloatArray
+from planner.feedrate.jerk.columns import ProblemColumns
+from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile
+from planner.feedrate.jerk.start import envelope
 from planner.feedrate.jerk.window import ScaledWindow, Window
 
 if TYPE_CHECKING:
@@ -20,19 +25,23 @@ if TYPE_CHECKING:
 # Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4 of some profiles' time, 5
 # gains nothing.
 BRAKING_WAYS = 3.0
+# Share of a^3/j^2 that counts as a way to brake [-] (4 mm on `mill`): of motions in windows of 150 and 300 intervals that are joined at
+# slow points some take 5e-4 longer with 1/6, 3e-4 with 0.7, 1e-4 with 1; then 6 % more has to be solved (relief of 10,000 blocks).
+BUILDING = 0.7
 # At most this fraction of a window is kept [-]: the rest is the way ahead that the next window starts with.
 KEPT_SHARE_MAX = 0.95
 # ... and at least this fraction of what can be [-]. In between, the point where more speed would help most: to keep all, whatever
 # the state there, costs up to 0.8 % of a profile's time.
-JOIN_SHARE = 0.85
-# Where less than this fraction of a window can be kept [-], windows become twice as large (never: a sixth more windows), ...
-KEPT_SHARE_MIN = 0.5
-# ... up to so many times the usual one, for the memory's sake, ...
-LARGEST = 32
-# ... and where more is kept, half as large again, down to the usual one: for the memory's sake too, the time is the same.
-KEPT_SHARE_HIGH = 0.8
-# A window ends where the grid is finest in this last part of it [-]: a stop needs points.
-END_SHARE = 0.25
+JOIN_SHARE = 0.92
+# A window is meant to be kept up to a point between these numbers of usual windows from its beginning [-]: there where the least has
+# to be solved for each interval that is kept.
+NEAREST, FARTHEST = 0.4, 1.25
+# An interval in a window twice as large costs so much more [-]: iterations grow, and memory leaves the cache.
+LARGER_COSTS = 0.2
+# The start keeps shares of the limits (start.py), the motion keeps them in full: its feed^2 is so many times that of the start [-].
+FASTER = 1.6
+# A window ends where the grid is finest on this part of a usual window behind what is needed [-]: a stop needs points.
+END_SHARE = 0.1
 # Intervals: a smaller window that does not converge is not divided any further: from rest the plain start does for so few.
 SMALLEST_WINDOW = 100
 # Into so many smaller windows one that does not converge is divided.
@@ -40,33 +49,39 @@ DIVISION = 5
 INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 
 
-class Chain:
-    """The profile of the points first..last of a problem as it grows, window by window, from rest at the first.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Task:
+    """The points first..last of a problem, to be solved from rest to rest.
 
-    profile : of all points of the problem; this chain's points are written
+    profile : of all points of the problem; these points are written
     tell    : called with the number of points that are new; may end the work by an exception
+    """
+
+    solver: JerkLimited
+    columns: ProblemColumns
+    profile: Profile
+    first: int
+    last: int
+    tell: Callable[[int], None]
+
+
+class Chain:
+    """The profile of a task as it grows, window by window, from rest at its first point.
+
     at      : up to which point there is a profile
     rest    : what the last window knows of the way ahead, down to its stop
     stops   : points where the profile rests because nothing better was found
     """
 
-    def __init__(
-        self,
-        solver: JerkLimited,
-        columns: ProblemColumns,
-        profile: Profile,
-        first: int,
-        last: int,
-        tell: Callable[[int], None],
-    ):
-        self.solver, self.columns, self.profile = solver, columns, profile
-        self.at, self.last = first, last
+    def __init__(self, task: Task):
+        self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
+        self.at, self.first, self.last = task.first, task.first, task.last
         self.rest: Window | None = None
         self.stops: list[int] = []
         self.iterations = 0
-        # windows solved; how often not from the first start, not with the first end, and divided into smaller ones
-        self.windows = self.other_starts = self.other_ends = self.divided = 0
-        self._tell = tell
+        # windows solved; how often not from the first start, and divided into smaller ones
+        self.windows = self.other_starts = self.divided = 0
+        self._tell = task.tell
         self._room = Room()
 
     def run(self, room: Room, until: int) -> None:
@@ -75,7 +90,7 @@ class Chain:
         size, divided = self.solver.window, False
         while self.at < min(until, self.last):
             begin = self.at
-            end = self._window_end(begin, size, self.last)
+            end = self._smaller_end(begin, size) if divided else self._window_end(begin, size)
             found = self._solve_window(begin, end)
             if found is None:
                 if end - begin > SMALLEST_WINDOW and self.profile.x[begin] == 0.0:
@@ -86,10 +101,7 @@ class Chain:
                     size, divided = self.solver.window, False
                 continue
             keep = end if end == self.last else self._unfelt(begin, end, found)
-            share = (keep - begin) / (end - begin)
-            if not divided and (
-                share == 0.0 or (share < KEPT_SHARE_MIN and size < LARGEST * self.solver.window)
-            ):
+            if keep == begin and not divided:
                 size *= 2  # beside this window the way to brake is long
                 continue
             if keep == begin:
@@ -97,22 +109,45 @@ class Chain:
                 self.stops.append(end)
             self._keep(begin, keep, found)
             self.at = keep
-            if divided:
-                size, divided = self.solver.window, False
-            elif share > KEPT_SHARE_HIGH and size > self.solver.window:
-                size //= 2
+            size, divided = self.solver.window, False
 
-    def _window_end(self, begin: int, size: int, last: int) -> int:
-        """The last point of a window: where the grid is finest near its end; no sooner than the stop that the way ahead knows."""
-        if last - begin <= size + INTERVALS_MIN:
-            return last
-        earliest = begin + size - int(END_SHARE * size)
+    def _window_end(self, begin: int, size: int) -> int:
+        """The last point of a window: behind the way to brake from the point up to which it is likely to be kept, where the grid is
+        finest; no sooner than the stop that the way ahead knows."""
+        if self.last - begin <= size + INTERVALS_MIN:
+            return self.last
         s = self.columns.s
-        spread = s[earliest + 1 : begin + size + 2] - s[earliest - 1 : begin + size]
-        end = earliest + int(np.argmin(spread))
+        keep = np.arange(begin + int(NEAREST * size), min(begin + int(FARTHEST * size), self.last))
+        needed = np.minimum(
+            np.searchsorted(s, s[keep] + BRAKING_WAYS * self._braking[keep - self.first]), self.last
+        )
+        count = needed - begin
+        of_each = count / (keep - begin) * (1.0 + LARGER_COSTS * count / size)
+        earliest = int(needed[np.argmin(of_each)])
         if self.rest is not None and self.profile.x[begin] > 0.0:
-            end = max(end, begin + len(self.rest.x) - 1)
-        return end
+            earliest = max(earliest, begin + len(self.rest.x) - 1)
+        return self._finest(earliest, earliest + int(END_SHARE * size))
+
+    def _smaller_end(self, begin: int, size: int) -> int:
+        """The last point of a window of no more than so many intervals."""
+        if self.last - begin <= size + INTERVALS_MIN:
+            return self.last
+        return self._finest(begin + size - int(END_SHARE * size), begin + size)
+
+    def _finest(self, first: int, last: int) -> int:
+        """The point among these where the grid is finest, or the last one of all."""
+        if last + 1 >= self.last:
+            return self.last
+        s = self.columns.s
+        return first + int(np.argmin(s[first + 1 : last + 2] - s[first - 1 : last]))
+
+    @cached_property
+    def _braking(self) -> FloatArray:
+        """The way to brake from each point of the chain, about: at the speed from which windows start."""
+        slow = envelope(self.columns, self.first, self.last)
+        own = slice(self.first, self.last + 1)
+        a, j = self.columns.acceleration[own].min(), self.columns.jerk[own].min()
+        return way_felt(FASTER * slow, a, j)
 
     def _stop(self, begin: int, end: int) -> int:
         """Where no window converges: down to the last window's stop, or from rest with the plain start; returns where it ends."""
@@ -145,7 +180,7 @@ class Chain:
         """
         own = slice(begin, end + 1)
         a, j = self.columns.acceleration[own].min(), self.columns.jerk[own].min()
-        brake = found.x / (2.0 * a) + np.sqrt(found.x) * a / (2.0 * j)
+        brake = way_felt(found.x, a, j)
         free = np.flatnonzero(self.columns.s[end] - self.columns.s[begin : end + 1] >= BRAKING_WAYS * brake)
         free = free[free <= KEPT_SHARE_MAX * (end - begin)]
         if not len(free):
@@ -158,3 +193,13 @@ class Chain:
         self.profile.put(begin, found, end - begin)
         self._tell(end - begin)
         self.rest = found.after(end - begin)
+
+
+def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
+    """Distances to come to rest from feeds^2 x at no acceleration, about."""
+    return x / (2.0 * acceleration) + np.sqrt(x) * acceleration / (2.0 * jerk)
+
+
+def way_felt(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
+    """The same, and much of the way a^3/j^2 on which a motion from rest builds up its acceleration and takes it back."""
+    return way_to_brake(x, acceleration, jerk) + BUILDING * acceleration**3 / jerk**2

@@ -19,6 +19,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
+from planner.feedrate.jerk.columns import ProblemColumns
 
 LANES = 32
 # What the compiler may do to the arithmetic of a block: multiply and add in one instruction, multiply by the inverse of a constant,
@@ -78,21 +79,6 @@ class Blocks(NamedTuple):
 def rows_of(axes, jumps):
     """Number of rows R of an interval."""
     return (3 + jumps) * axes + 2
-
-
-class ProblemColumns(NamedTuple):
-    """A problem of P points and A axes, in its own units."""
-
-    unit: float  # of accelerations
-    s: FloatArray  # (P,)
-    x_max: FloatArray  # (P,)
-    d1: FloatArray  # (P, A), like the rest
-    d2_left: FloatArray
-    d2_right: FloatArray
-    d3_left: FloatArray
-    d3_right: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
 
 
 @njit(cache=True, error_model="numpy")

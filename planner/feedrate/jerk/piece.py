@@ -9,18 +9,15 @@ the same solution on any number of cores.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
-from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain
-from planner.feedrate.jerk.layout import ProblemColumns, Room
+from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain, Task, way_to_brake
+from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.window import ScaledWindow, Way
-
-if TYPE_CHECKING:
-    from planner.feedrate.jerk.solver import JerkLimited
 
 # Pieces of fewer windows than this are solved forward only: the joining window costs 3 % there (a relief of 15,000 intervals: 3.6 %).
 LONG = 10
@@ -29,29 +26,22 @@ NEAR, FAR = 0.25, 0.5
 
 
 class Piece:
-    """The points first..last of a problem, from rest to rest; what is found is written to `profile`."""
+    """A task that is solved from one end or from both."""
 
-    def __init__(
-        self,
-        solver: JerkLimited,
-        columns: ProblemColumns,
-        profile: Profile,
-        first: int,
-        last: int,
-        tell: Callable[[int], None],
-    ):
-        self.solver, self.columns, self.profile = solver, columns, profile
-        self.first, self.last = first, last
-        self.forward = Chain(solver, columns, profile, first, last, tell)
+    def __init__(self, task: Task):
+        self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
+        self.first, self.last = task.first, task.last
+        self.forward = Chain(task)
         self.backward: Chain | None = None
         self.joined: list[int] = []  # iterations of the joining window, if there is one
         self.met = False  # whether the two ways were joined
-        n, middle = last - first, (first + last) // 2
-        self._until = last
-        if n > LONG * solver.window:
-            turned, found = backward(columns, first, last), Profile.at_rest(n + 1, columns.d1.shape[1])
-            self.backward = Chain(solver, turned, found, 0, n, tell)
-            self._until = middle - int(NEAR * solver.window)
+        n, middle = self.last - self.first, (self.first + self.last) // 2
+        self._until = self.last
+        if n > LONG * self.solver.window:
+            turned = backward(self.columns, self.first, self.last)
+            found = Profile.at_rest(n + 1, turned.d1.shape[1])
+            self.backward = Chain(replace(task, columns=turned, profile=found, first=0, last=n))
+            self._until = middle - int(NEAR * self.solver.window)
         self._middle = middle
 
     @property
@@ -135,4 +125,4 @@ def _braking(chain: Chain, point: int) -> float:
     x = chain.profile.x[point]
     own = slice(point, chain.at + 1)
     a, j = chain.columns.acceleration[own].min(), chain.columns.jerk[own].min()
-    return float(x / (2.0 * a) + np.sqrt(x) * a / (2.0 * j))
+    return float(way_to_brake(x, a, j))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.feedrate.jerk.layout import ProblemColumns
+from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.window import Window
 
 

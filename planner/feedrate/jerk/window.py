@@ -14,8 +14,8 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import interior_point as kernel
+from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.layout import (
     DS,
     LAM_LOW,
@@ -26,7 +26,6 @@ from planner.feedrate.jerk.layout import (
     X_END,
     Blocks,
     P,
-    ProblemColumns,
     Room,
     X,
     profile,
@@ -38,7 +37,6 @@ from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 from planner.feedrate.jerk.track import track
-from planner.feedrate.lagrangian import acceleration_limits
 
 # A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
 START_ROOM = 0.9
@@ -49,28 +47,9 @@ TRACKING_ROUNDS = (
 )
 POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 in feed would be a jerk of its own between samples
 POLISHED = 1e-14  # defect, share of the largest feed [-]
-GAP_ACCEPTED = 3e-3  # a window that ends with no larger gap than this is still a good profile [-]
-RESIDUAL_ACCEPTED = 1e-3  # ... and with no larger residual: slowing down by as much makes it feasible [-]
-DEFECT_ACCEPTED = 1e-8  # ... and no larger defect, for which nothing makes up [-]
 
 
 Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
-
-
-def columns_of(problem: FeedrateProblem) -> ProblemColumns:
-    """What the kernel needs to know of a problem."""
-    return ProblemColumns(
-        unit=float(problem.acceleration[: problem.machine_axes].max()),
-        s=problem.s,
-        x_max=problem.feed_sq_limit,
-        d1=problem.d1,
-        d2_left=problem.d2_left,
-        d2_right=problem.d2_right,
-        d3_left=problem.d3_left,
-        d3_right=problem.d3_right,
-        acceleration=acceleration_limits(problem),
-        jerk=problem.jerk_limit,
-    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -165,7 +144,7 @@ class ScaledWindow:
             put(self.blocks, x, u)
             found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
-            if _accepted(found):
+            if found.status == kernel.SOLVED:
                 self._track(0.0, POLISHING_ROUNDS, POLISHED)
                 return self._window(), most, starts
         return None, most, starts
@@ -263,16 +242,6 @@ class ScaledWindow:
 def _mirrored(x: FloatArray, u: FloatArray) -> Way:
     """A profile passed backward."""
     return x[::-1].copy(), -u[::-1].copy()
-
-
-def _accepted(found: kernel.Minimum) -> bool:
-    """Whether a window's profile is good enough; one that used up its iterations may be."""
-    return (
-        found.status in (kernel.SOLVED, kernel.OUT_OF_ITERATIONS)
-        and found.gap <= GAP_ACCEPTED
-        and found.residual <= RESIDUAL_ACCEPTED
-        and found.defect <= DEFECT_ACCEPTED
-    )
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -21,8 +21,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
-from planner.feedrate.jerk.window import ScaledWindow, columns_of
+from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.reference.piecewise import with_prices
 from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.solution import FeedrateSolution, Status, ratios_by_limit

@@ -1,7 +1,7 @@
 """The instructions of HP-GL and HP-GL/2: which are read, which change nothing in the path, and which are refused with what to do.
 
-A plotter leaves out instructions that it does not know. Here nothing that could change the path is left out silently: an instruction
-is read, or ignored with a note, or a fault.
+A plotter leaves out instructions that it does not know. Here they are left out too, and counted in a note; of those that HP's plotters
+know, none that could change the path is left out: it is read, or ignored with a note, or a fault.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ FORMS = {
         Form("PR", "dx,dy,...", None),
         Form("AA", "x,y,sweep", (3, 4)),
         Form("AR", "dx,dy,sweep", (3, 4)),
+        Form("AT", "x,y,xend,yend", (4, 5)),
+        Form("RT", "dx,dy,dxend,dyend", (4, 5)),
         Form("CI", "radius", (1, 2)),
         Form("EA", "x,y", (2,)),
         Form("ER", "dx,dy", (2,)),
@@ -82,7 +84,7 @@ REFUSED = {
     **_each("LB PB UC DL", _TEXT),
     **_each("RA RR WG FP", _FILL),
     **_each("PM EP", _POLYGON),
-    **_each("AT RT BR BZ EW", _CURVE),
+    **_each("BR BZ EW", _CURVE),
     "PE": f"encoded lines are not read; {_PLAIN} ('without compression')",
     **_each("XT YT", f"ticks are not read; {_OUTLINES}"),
     "SM": f"symbols at the points are not read; {_OUTLINES}",

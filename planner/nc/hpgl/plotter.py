@@ -13,6 +13,7 @@ A fault is recorded and reading goes on with the next instruction, so that `info
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 
@@ -20,11 +21,13 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault
+from planner.nc.hpgl.arcs import circle_through
 from planner.nc.hpgl.drawing import PEN_DOWN, PEN_UP, Drawing, Point
 from planner.nc.hpgl.instructions import ALLOWED, FORMS, IGNORED, PAGE_ENDS, REFUSED
 from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError
 from planner.nc.program import Kind, Program
+from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import Setup
 
 MM_PER_CM = 10.0
@@ -38,12 +41,14 @@ class _NotDrawn(Exception):
     """The instruction cannot be executed; the text says why."""
 
 
-def read_drawing(data: bytes, machine: Machine | None, source: str) -> tuple[Program, Sequence[Fault]]:
+def read_drawing(
+    data: bytes, machine: Machine | None, source: str, reading: Reading = AS_USUAL
+) -> tuple[Program, Sequence[Fault]]:
     """Read a plotter file past everything that is not supported; the faults in the order of the file.
 
     Raises InputError for a file without any instruction.
     """
-    run = _Run(data, machine)
+    run = _Run(data, machine, reading)
     found = 0
     for instruction in instructions(data, run.report, run.note):
         run.execute(instruction)
@@ -53,14 +58,17 @@ def read_drawing(data: bytes, machine: Machine | None, source: str) -> tuple[Pro
             "the plotter file is empty: there is no instruction in it", source=source, line=1, column=1
         )
     control = Setup.of(machine).path_control
-    return run.drawing.finish(data, source, control, run.all_notes()), run.faults()
+    program = run.drawing.finish(data, source, control, run.all_notes())
+    return dataclasses.replace(program, reading=reading), run.faults()
 
 
 class _Run:
     """The state of the plotter; one method per instruction."""
 
-    def __init__(self, data: bytes, machine: Machine | None):
+    def __init__(self, data: bytes, machine: Machine | None, reading: Reading):
         self.data = data
+        self.strict = reading.strict
+        self.unknown: list[int] = []
         self.plotter = (machine.plotter if machine is not None else None) or Plotter()
         self.drawing = Drawing()
         self.reports: list[tuple[int, int, str]] = []
@@ -107,6 +115,15 @@ class _Run:
         for name, places in self.ignored.items():
             line, times = self._place(places[0])[0], f"{len(places)} times, first " if len(places) > 1 else ""
             notes.append(f"{name} ignored, {times}on line {line}: {IGNORED.get(name, 'the end of a page')}")
+        if self.unknown:
+            count, first = len(self.unknown), self.unknown[0]
+            what = (
+                "instruction that this reader does not know"
+                if count == 1
+                else "instructions that this reader does not know"
+            )
+            word, line = self._word(first, first + 2), self._place(first)[0]
+            notes.append(f"{count:,} {what}: left out, as plotters do; first {word} line {line}")
         return [*notes, *self.notes]
 
     def _is_unlimited(self, block: int) -> bool:
@@ -127,6 +144,9 @@ class _Run:
     def _execute(self, it: Instruction) -> None:
         name, numbers = it.name, it.numbers
         form = FORMS.get(name)
+        if (form is None or (name == "RT" and not form.fits(len(numbers)))) and self._is_unknown(name):
+            self.unknown.append(it.at)  # RT is an arc of HP's plotters, and something else of other makers
+            return
         if form is None:
             if name in IGNORED or (name == "SM" and not it.text.strip(b"; \r\n")):
                 self.ignored.setdefault(name, []).append(it.at)
@@ -138,6 +158,8 @@ class _Run:
             self._plot(it)
         elif name in ("AA", "AR"):
             self._arc(it)
+        elif name in ("AT", "RT"):
+            self._arc_through(it)
         elif name == "CI":
             self._circle(numbers[0], it.at)
         elif name in ("EA", "ER"):
@@ -158,6 +180,9 @@ class _Run:
         elif name == "IN":
             self._move_pen(False, it.at)
             self._initialise()
+
+    def _is_unknown(self, name: str) -> bool:
+        return not self.strict and name not in IGNORED and name not in REFUSED and name != "SM"
 
     def _plot(self, it: Instruction) -> None:
         if it.name in ("PA", "PR"):
@@ -181,6 +206,17 @@ class _Run:
             cos, sin = math.cos(sweep), math.sin(sweep)
             end = centre[0] + cos * dx - sin * dy, centre[1] + sin * dx + cos * dy
         self._turn(centre, sweep, end, it.at)
+
+    def _arc_through(self, it: Instruction) -> None:
+        """An arc through a point to an end; a straight line where the three points lie on one, a circle where it ends at its start."""
+        self.scaling.handedness()
+        through = self._point(*it.numbers[:2], absolute=it.name == "AT")
+        end = self._point(*it.numbers[2:4], absolute=it.name == "AT")
+        found = circle_through(self.position, through, end)
+        if found is None:
+            self._go(end, it.at)
+        else:
+            self._turn(*found, end, it.at)
 
     def _circle(self, radius: float, at: int) -> None:
         if radius == 0:

@@ -110,3 +110,37 @@ def test_real_files(shared_dir: Path, name: str):
 
 def told_pens(program: Program) -> int:
     return sum(event.text.startswith("T") for event in program.events)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_arcs_through_three_points_are_those_about_their_centre(seed):
+    """AT and RT draw what AA draws: the arc through a point of it, whichever way it turns."""
+    rng = np.random.default_rng(seed)
+    centre, start = rng.uniform(-4000, 4000, (2, 2))
+    degrees = rng.uniform(5, 355) * rng.choice([-1, 1])
+    through, end = (_turned(start, centre, angle) for angle in (rng.uniform(0.1, 0.9) * degrees, degrees))
+    x, y = start
+    about = f"IN;PU{x:.9f},{y:.9f};PD;AA{centre[0]:.9f},{centre[1]:.9f},{degrees:.9f};"
+    absolute = f"IN;PU{x:.9f},{y:.9f};PD;AT{through[0]:.9f},{through[1]:.9f},{end[0]:.9f},{end[1]:.9f};"
+    relative = "IN;PU{:.9f},{:.9f};PD;RT{:.9f},{:.9f},{:.9f},{:.9f};".format(
+        x, y, *(through - start), *(end - start)
+    )
+    wanted = path_of(parse_program(about, source="x.plt"))
+    for text in (absolute, relative):
+        found = path_of(parse_program(text, source="x.plt"))
+        radius = np.hypot(*(start - centre)) * 0.025
+        assert_same_path(found, wanted, 1e-6 * max(radius, 1.0))
+
+
+def _turned(point, centre, degrees):
+    angle = np.deg2rad(degrees)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return centre + turn @ (point - centre)
+
+
+def test_three_points_on_a_line_and_a_circle():
+    line = path_of(parse_program("IN;PD;AT400,0,800,0;", source="x.plt"))
+    assert [(tuple(move.end), move.sweep) for move in line if move.down] == [((20.0, 0.0), 0.0)]
+    (circle,) = [m for m in path_of(parse_program("IN;PD;AT800,0,0,0;", source="x.plt")) if m.down]
+    assert circle.sweep == pytest.approx(2 * np.pi)
+    assert tuple(circle.centre) == (10.0, 0.0)

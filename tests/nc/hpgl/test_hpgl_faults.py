@@ -14,9 +14,9 @@ from planner.nc.hpgl.instructions import FORMS, IGNORED, REFUSED
 from planner.nc.info import inspect_program
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
+from planner.nc.reading import Reading
 
 FAULTS = [
-    ("IN;\nPU0,0;ZZ1;", 2, 7, ["ZZ1", "no such instruction", *FORMS]),
     ("IN;LBHello\x03;PD1,1", 1, 4, ["LB", "text", "outlines"]),
     ("PU1,2,3;", 1, 1, ["PU1,2,3", "3 numbers found", "PU x,y,..."]),
     ("PU1,2;AA1,2;", 1, 7, ["2 numbers found", "AA x,y,sweep"]),
@@ -65,11 +65,26 @@ def test_faults(text, line, column, parts):
 def test_all_faults_are_found_in_their_order(tmp_path):
     path = tmp_path / "job.plt"
     path.write_text("IN;PD1,1;\nXX;PD2,2;RO90;\n!PG;PD3,3;VS0;")
-    found = inspect_program(path)
+    found = inspect_program(path, reading=Reading(strict=True))
     assert [(fault.line, fault.column, fault.word) for fault in found.unsupported] == [
         (2, 1, "XX"), (2, 10, "RO90"), (3, 1, "!"), (3, 2, "PG"), (3, 11, "VS0"),
     ]  # fmt: skip
     assert found.blocks["line"] == 3
+
+
+def test_instructions_that_nobody_knows_are_left_out_and_counted():
+    text = "IN;PD40,0;ZZ1;\nRT90;XX1,2;PD80,0;"
+    program = parse_program(text, source="x.plt")
+    plain = parse_program("IN;PD40,0;\nPD80,0;", source="x.plt")
+    assert_same_path(path_of(program), path_of(plain), FINE)
+    (said,) = [note for note in program.notes if "does not know" in note]
+    assert said == (
+        "3 instructions that this reader does not know: left out, as plotters do; first ZZ line 1"
+    )
+    with pytest.raises(
+        InputError, match="x.plt:1:11: ZZ1: there is no such instruction; allowed are " + " ".join(FORMS)
+    ):
+        parse_program(text, reading=Reading(strict=True), source="x.plt")
 
 
 @pytest.mark.parametrize("name", sorted(IGNORED))

@@ -1,0 +1,160 @@
+"""Mutated programs through the reader: does each end in a program or in a message, in time and in memory?
+
+    python -m benchmarks.nc_mutants [COUNT] [--seed N] [--folder FOLDER]
+
+The programs are pieces of those in FOLDER and of a list of constructs of all dialects, with lines, words and bytes changed, doubled,
+swapped and cut, read with settings by chance. Each has `SECONDS` and the process `MEMORY`. Prints what it found;
+exit code 1 for a crash or a hang, with the program's seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import signal
+import sys
+import traceback
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SECONDS = 20  # for one program; the slowest of ordinary ones takes some hundredths
+NOTES_MAX = 200
+MEMORY = 6 << 30  # bytes of address space
+PIECE = 60  # lines of a program that are mutated together
+
+CONSTRUCTS = """\
+%\nO1000 (NAME)\nG21 G90 G17 G94\nG0 X1 Y2 Z3\nG1 X5 F600\nG2 X7 I1 J0\nG3 X7 Y1 R2\nG3 I5 P2 Z1
+G28 X Y\nG28 G91 Z0\nG92 X0\nG92.1\nG10 L2 P1 X5 R30\nG10 L20 P1 X0\nG52 X1\nG43 H1\nG49\nG53 G0 X1\nG4 P0.1\nG4 S1\nG64 P0.01
+G81 X1 Z-1 R1\nG83 X2 Z-5 R1 Q1 L3\nG80\nG76 P1 Z-5 I-.1 J.1 K.5 Q29 E.1 L1\nG33 Z-1 K1\nG41 D1\nG40\nG5 I1 J1 P1 Q1 X5 Y5\nG5.1 Q1
+G5.2 P1 X1 Y1 L3\nG5.3\nG93\nG95\nG96 D1500 S200\nG7\nG8\nG18\nG19\nG20\nG90.1\nG91.1\nM3 S100 $1\nM98 P1000 L2\nM99\nG65 P1000 A1 B2
+M104 S200\nM109 S210\nM82\nM83\nG1 X1 E0.5\nG92 E0\nM117 hello world\nM201 X500 Y500\nM84 X Y E\n$H\n$X\n$100=5\n$J=G91X1\nM428
+M6 T1\nT2 M6 G43 H2\nM0\nM1\nM30\nM2\nM60\nM62 P1\nM66 P0 L3\nA0. B0\nG1 X5 A90.\n#1=5\n#<a>=[1+2*3]\nX#1 Y[#<a>]\no100 sub\no100 endsub
+o100 call [1] [2]\no101 if [#1 GT 2]\no101 else\no101 endif\no102 while [#1 LT 5]\n#1=[#1+1]\no102 endwhile\no103 repeat [3]
+o103 endrepeat\nIF [#1 EQ 5] GOTO 10\nN10\nWHILE [#1 LT 5] DO 1\nEND 1\nX1e-05 Y-8.775e-05\n(comment)\n; comment\n/G0 X5
+BEGIN PGM 1 MM\nL X+5 Y+2 FMAX\nDEF REAL A\nCYCLE800()\nIN;PU0,0;PD400,0;PD400,400;\nAA0,0,90;\nRT1,2,3,4;\nSP1;ZZ5;\nSC0,1,0,1;
+0\nSECTION\nsolid a\nfacet normal 0 0 1\nG0 X1 (open\nG0 X--1\nG1 X1..2\nG999 X1\nM-3\nS-5\nF0\nX99999999999\nG187 P1\nM73 P1 R70
+""".splitlines()
+_BYTES = b'GMXYZIJKRPQFSTNHDEABCUVWLO0123456789.+-#[]()<>=%/$:;,* \t\n\r"\x00\x80\xff\x1b'
+
+
+def mutant(seed: int, programs: list[list[bytes]]) -> bytes:
+    """A mutated program; the same for the same seed."""
+    rng = np.random.default_rng(seed)
+    lines = _piece(rng, programs)
+    for _ in range(int(rng.integers(1, 8))):
+        k, other = (int(v) for v in rng.integers(0, len(lines), 2))
+        change = int(rng.integers(0, 9))
+        if change == 0:
+            lines.insert(k, CONSTRUCTS[int(rng.integers(0, len(CONSTRUCTS)))].encode())
+        elif change == 1:
+            lines[k], lines[other] = lines[other], lines[k]
+        elif change == 2:
+            lines[k] += b" " + lines[other]
+        elif change == 3:
+            lines[k] = lines[k] * int(rng.integers(2, 5))
+        elif change == 4 and len(lines) > 2:
+            del lines[k]
+        elif change == 5:
+            lines[k] = lines[k][: int(rng.integers(0, len(lines[k]) + 1))]
+        else:
+            lines[k] = _changed(rng, lines[k])
+    return rng.choice([b"\n", b"\r\n"]).join(lines) if rng.random() < 0.95 else b" ".join(lines)
+
+
+def _piece(rng: np.random.Generator, programs: list[list[bytes]]) -> list[bytes]:
+    count = int(rng.integers(1, PIECE))
+    if programs and rng.random() < 0.6:
+        lines = programs[int(rng.integers(0, len(programs)))]
+        first = int(rng.integers(0, max(len(lines) - count, 0) + 1)) * int(rng.integers(0, 2))
+        return list(lines[first : first + count]) or [b"G0"]
+    few = 1 + count // 8  # most of them are refused somewhere
+    return [CONSTRUCTS[k].encode() for k in rng.integers(0, len(CONSTRUCTS), few)]
+
+
+def _changed(rng: np.random.Generator, line: bytes) -> bytes:
+    at = int(rng.integers(0, len(line) + 1))
+    new = bytes(rng.choice(list(_BYTES), size=int(rng.integers(0, 4))).tolist())
+    return line[:at] + new + line[at + int(rng.integers(0, 3)) :]
+
+
+def a_reading(seed: int) -> Any:
+    """Settings of the reader by chance."""
+    from planner.nc.reading import ARC_CENTRES, EXTRUDERS, Reading
+
+    rng = np.random.default_rng(seed)
+    ignore = ("M6", "A", "$J", "G29", "M428")[: int(rng.integers(0, 6))]
+    return Reading(
+        strict=bool(rng.random() < 0.15),
+        ignore=ignore if rng.random() < 0.3 else (),
+        arc_centres=str(rng.choice(ARC_CENTRES)) if rng.random() < 0.3 else "auto",
+        extruder=str(rng.choice(EXTRUDERS)),
+        block_delete=bool(rng.random() < 0.7),
+    )
+
+
+def outcome(data: bytes, reading: Any, machine: Any = None) -> str:
+    """What comes of a program: "read", "refused" or "not a program". Raises what is not a proper end."""
+    from planner.base.errors import InputError
+    from planner.nc.reader import interpret
+
+    try:
+        program, faults = interpret(data, machine, reading, source="mutant.nc")
+    except InputError:
+        return "not a program"
+    if not np.isfinite(program.end).all() or len(program.notes) > NOTES_MAX:
+        raise ValueError(f"positions {program.end}, {len(program.notes)} notes")
+    for fault in faults[:5]:
+        if fault.line < 1 or fault.column < 1 or not fault.message:
+            raise ValueError(f"a fault without a place: {fault}")
+    return "refused" if faults else "read"
+
+
+def load_programs(folder: Path) -> list[list[bytes]]:
+    """The lines of the programs of a folder; of long ones the first 3,000."""
+    files = sorted(f for f in folder.glob("*") if f.suffix not in (".csv", ".md", ".txt"))
+    return [f.read_bytes().splitlines()[:3000] for f in files]
+
+
+class _Hung(BaseException):
+    """A program took longer than `SECONDS`."""
+
+
+def _hung(*_: object) -> None:
+    raise _Hung
+
+
+def main() -> None:
+    """Read all mutants and print what came of them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("count", type=int, nargs="?", default=15_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--folder", type=Path, default=Path("../shared/nc"))
+    options = parser.parse_args()
+    programs = load_programs(options.folder)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    signal.signal(signal.SIGALRM, _hung)
+    found: Counter[str] = Counter()
+    bad = []
+    for seed in range(options.seed, options.seed + options.count):
+        signal.alarm(SECONDS)
+        try:
+            found[outcome(mutant(seed, programs), a_reading(seed))] += 1
+        except (Exception, _Hung) as fault:
+            found["hung" if isinstance(fault, _Hung) else "crashed"] += 1
+            bad.append(seed)
+            traceback.print_exc()
+        signal.alarm(0)
+        if seed % 1000 == 0:
+            print(f"{seed}: {dict(found)}", flush=True)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(
+        f"{options.count:,} programs: {dict(found)}; peak memory {peak:.2f} GB; crashed or hung: {bad[:20]}"
+    )
+    sys.exit(1 if bad else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Thousands of random NC programs, read here and by LinuxCNC's own interpreter: how many disagree?
+
+    python -m benchmarks.random_programs [--count N] [--seed S] [--kinds cycles offsets ...]
+
+The programs and the comparison are those of tests/nc/test_random_agreement.py, which reads some hundreds. It needs rs274 and the
+module gcode (Debian package linuxcnc-uspace) and ../shared/peers. Writes results/random-programs.json and .md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.record import markdown, write_results
+
+TESTS = Path(__file__).resolve().parent.parent / "tests" / "nc"
+AT_ONCE = 500  # programs that one run of the oracle reads
+
+
+def main() -> None:
+    """Read the programs and write what became of them."""
+    sys.path.insert(0, str(TESTS))
+    agreement = importlib.import_module("test_random_agreement")
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=1000, help="programs of each kind")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", nargs="+", default=list(agreement.KINDS))
+    options = parser.parse_args()
+    rows: list[dict[str, str | int]] = []
+    for kind in options.kinds:
+        total = agreement.Tally()
+        for part in range(-(-options.count // AT_ONCE)):
+            count = min(AT_ONCE, options.count - part * AT_ONCE)
+            with tempfile.TemporaryDirectory() as folder:
+                tally = agreement.compare(kind, count, options.seed + 1000 * part, Path(folder))
+            for name in ("read", "refused", "gouges", "blocks", "wrong"):
+                setattr(total, name, getattr(total, name) + getattr(tally, name))
+        print(*total.wrong, sep="\n", file=sys.stderr)
+        rows.append(
+            {
+                "kind": kind,
+                "programs": options.count,
+                "blocks compared": total.blocks,
+                "refused by both": total.refused,
+                "refused here alone, as gouging": total.gouges,
+                "disagree": len(total.wrong),
+            }
+        )
+    table = markdown(list(rows[0]), [[str(value) for value in row.values()] for row in rows])
+    print(table)
+    write_results("random-programs", {"seed": options.seed, "rows": rows}, table)
+
+
+if __name__ == "__main__":
+    main()

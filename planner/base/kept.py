@@ -1,0 +1,222 @@
+"""Where compiled kernels lie on the disk, and by what name: what a kernel computes.
+
+A kernel's name there is made of its own bytecode and settings, of the values of all constants that it uses, and of the same of every
+kernel that it calls; further of the types of its arguments, of the processor, and of the versions of Python and numba. So a kernel is
+compiled again when it, or one that it calls in another file, computes something else, and not when a comment changes, a file is
+copied or gets a new date. What an older version of a kernel has left is removed when the new one is written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import re
+import sys
+from collections.abc import Callable, Iterable
+from functools import cache
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+FORMAT = 1  # of the files
+_NOT_OF_CODE = {
+    "NUMBA_CACHE_DIR",
+    "NUMBA_NUM_THREADS",
+}  # numba's variables that machine code does not depend on
+# What reading a file raises that something else has written, or only half of it.
+_UNREADABLE = (pickle.UnpicklingError, EOFError, ValueError, TypeError, AttributeError, ImportError)
+
+
+class Kept(NamedTuple):
+    """A kernel as it lies on the disk.
+
+    entry        : name of its entry for Python in the object code
+    environments : names, modules and constants of what the code knows of Python
+    code         : object code
+    """
+
+    entry: str
+    environments: list[tuple[str, str, list[Any]]]
+    code: bytes
+
+
+class Place(NamedTuple):
+    """A file name without its folder: what stays the same when a kernel changes, and what does not.
+
+    single : whether no other kernel has the same first part, as those have that are made by one function
+    """
+
+    kernel: str
+    version: str
+    single: bool
+
+    @property
+    def name(self) -> str:
+        return f"{self.kernel}.{self.version}.kernel"
+
+
+def place(function: FunctionType, content: bytes, arguments: object) -> Place:
+    """The file name of the kernel of a function with this `content_of`, for arguments of these types."""
+    where = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+    of = hashlib.sha256(repr((function.__module__, arguments, sys.implementation.cache_tag)).encode())
+    version = hashlib.sha256(content + _surroundings())
+    named = re.sub(r"[^\w.]", "", where)[:80]
+    single = "<" not in function.__qualname__
+    return Place(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
+
+
+def read(where: Place) -> Kept | None:
+    """The kernel of this name, or None. Raises OSError if it is there and cannot be read."""
+    for folder in folders():
+        try:
+            with open(os.path.join(folder, where.name), "rb") as file:
+                return Kept(*pickle.load(file))
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except _UNREADABLE:
+            continue
+    return None
+
+
+def write(where: Place, kernel: Kept) -> None:
+    """Keep a kernel, in place of its older versions. Raises OSError if it can be written nowhere."""
+    faults: list[OSError] = []
+    for folder in folders():
+        part = os.path.join(folder, f"{where.name}.{os.getpid()}")
+        try:
+            os.makedirs(folder, exist_ok=True)
+            try:
+                with open(part, "wb") as file:
+                    pickle.dump(tuple(kernel), file, protocol=pickle.HIGHEST_PROTOCOL)
+                os.replace(part, os.path.join(folder, where.name))
+            except BaseException:
+                _remove([part])
+                raise
+        except OSError as fault:
+            faults.append(fault)
+            continue
+        if not where.single:
+            return
+        older = [name for name in os.listdir(folder) if name.startswith(f"{where.kernel}.")]
+        _remove(
+            os.path.join(folder, name) for name in older if name.endswith(".kernel") and name != where.name
+        )
+        return
+    raise faults[0]
+
+
+def folders() -> list[str]:
+    """Where kernels may lie, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the package, or the user's
+    cache directory."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if named:
+        return [os.path.join(named, "planner")]
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    if sys.platform == "win32":
+        of_user = os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")
+    elif sys.platform == "darwin":
+        of_user = os.path.expanduser("~/Library/Caches")
+    else:
+        of_user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return [os.path.join(package, "__pycache__", "kernels"), os.path.join(of_user, "planner", "kernels")]
+
+
+def _remove(files: Iterable[str]) -> None:
+    for file in files:
+        try:
+            os.remove(file)
+        except OSError:  # another process has removed it
+            continue
+
+
+@cache
+def _surroundings() -> bytes:
+    """What machine code depends on besides the kernel."""
+    from llvmlite import binding
+
+    features = sorted(name for name, has in binding.get_host_cpu_features().items() if has)
+    settings = sorted(
+        item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] not in _NOT_OF_CODE
+    )
+    known = (
+        FORMAT,
+        sys.version,
+        sys.platform,
+        numba_version(),
+        binding.get_host_cpu_name(),
+        features,
+        settings,
+    )
+    return repr(known).encode()
+
+
+@cache
+def numba_version() -> str:
+    """The version of numba that is installed; it need not be imported for that."""
+    from importlib.metadata import version
+
+    return version("numba")
+
+
+def content_of(
+    function: FunctionType, settings: dict[str, Any], called: Callable[[Any], bytes | None]
+) -> bytes:
+    """A digest of what the kernel of a function computes.
+
+    called : the digest of a value, if that is a kernel; else None
+    """
+    found, seen = hashlib.sha256(), {id(function)}
+
+    def of(value: Any) -> str:
+        kernel = called(value)
+        if kernel is not None:
+            return kernel.hex()
+        if isinstance(value, FunctionType):
+            if id(value) in seen:  # it calls itself
+                return value.__qualname__
+            seen.add(id(value))
+            return code_of(value)
+        if isinstance(value, ModuleType):
+            return value.__name__
+        if isinstance(value, type):
+            return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
+        if isinstance(value, tuple | list):
+            return repr([of(part) for part in value])
+        if isinstance(value, frozenset | set):
+            return repr(sorted(of(part) for part in value))
+        if isinstance(value, CodeType):
+            return repr((value.co_code, [of(part) for part in value.co_consts], value.co_names))
+        if type(value).__module__ == "numpy" and hasattr(value, "tobytes"):
+            return repr((value.dtype, value.shape, value.tobytes()))
+        return repr(value) if _told_by_repr(value) else f"{type(value)}"
+
+    def code_of(function: FunctionType) -> str:
+        code, known = function.__code__, function.__globals__
+        names = sorted(_names_in(code))
+        used = [(name, of(known[name])) for name in names if name in known]
+        for module in [known[name] for name in names if isinstance(known.get(name), ModuleType)]:
+            inside = [(name, vars(module)[name]) for name in names if name in vars(module)]
+            used += [(name, of(value)) for name, value in inside if called(value) or _told_by_repr(value)]
+        cells = [of(cell.cell_contents) for cell in function.__closure__ or ()]
+        return repr((of(code), code.co_varnames, code.co_argcount, used, cells, of(function.__defaults__)))
+
+    found.update(code_of(function).encode())
+    found.update(repr(sorted((name, of(value)) for name, value in settings.items())).encode())
+    return found.digest()
+
+
+def _told_by_repr(value: Any) -> bool:
+    return (
+        value is None
+        or value is Ellipsis
+        or isinstance(value, bool | int | float | complex | str | bytes | range)
+    )
+
+
+def _names_in(code: CodeType) -> set[str]:
+    """The names of globals and attributes in a function and those inside it."""
+    names = set(code.co_names)
+    for part in code.co_consts:
+        if isinstance(part, CodeType):
+            names |= _names_in(part)
+    return names

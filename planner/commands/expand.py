@@ -1,0 +1,50 @@
+"""`planner expand`: a program with parameters, loops and subprograms as one that has none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planner.commands.options import DEFAULT_MACHINE, ForceOption, Job, MachineOption, takes_reading
+from planner.commands.terminal import guarded, say
+from planner.nc.reading import Reading
+
+
+@guarded
+@takes_reading
+def expand_command(
+    job: Job,
+    machine: MachineOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="the file to write (default: print the program)"),
+    ] = None,
+    force: ForceOption = False,
+    *,
+    reading: Reading,
+) -> None:
+    """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
+    from planner.base.errors import InputError
+    from planner.machine import load_machine
+    from planner.nc.language.flat import flat_program
+    from planner.nc.reader import load
+
+    if output is not None and output.exists() and not force:
+        raise InputError("the file exists; give another name or --force", source=str(output))
+    data = load(job)
+    found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=str(job))
+    text = data if found is None else found[0].encode()
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    try:
+        output.write_bytes(text)
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
+    if found is None:
+        say(f"{output}: nothing to expand, the program is copied")
+    else:
+        assert found[1].expansion is not None
+        say(f"{output}: {found[1].expansion.rows:,} lines executed, {len(found[1]):,} blocks")

@@ -1,0 +1,34 @@
+"""`planner report`: a page to look at, of a plan that was written before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planner.commands.options import ForceOption
+from planner.commands.terminal import guarded, say
+
+
+@guarded
+def report_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="directory that 'plan -o' wrote")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="page to write (default: DIR/report.html)"),
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Write a page of a plan that opens in a browser: path, profiles, NC lines, corners, verdict."""
+    from planner.report.html.page import REPORT, check_report_place, report_page
+    from planner.report.html.saved import saved_plan
+    from planner.report.replace import replacing_file
+
+    file = output or directory / REPORT
+    check_report_place(file, force=force)
+    plan, summary, text = saved_plan(directory)
+    page = report_page(plan, text, summary)
+    with replacing_file(file) as new:
+        new.write_text(page, encoding="utf-8")
+    say(str(file))

@@ -1,0 +1,1 @@
+"""A plan in files that a control plays: setpoints for LinuxCNC's HAL, and positions, velocities and times (PVT)."""

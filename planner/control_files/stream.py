@@ -1,0 +1,101 @@
+"""Setpoints for LinuxCNC's HAL: one row per servo period, put out by its component `streamer`.
+
+LinuxCNC's own planner has no jerk limit and another idea of a corner, so a program cannot make it move as planned. Its HAL plays
+setpoints as they are: `halstreamer` feeds the rows of a file into a FIFO, and `streamer` puts one of them on its pins in every servo
+period. Three files:
+
+    setpoints.txt  rows of axis positions, in mm or inch, rotary axes in degrees
+    stream.hal     loads the streamer and names its signals; to be sourced in a machine's HAL configuration
+    try.hal        plays and records the rows without a machine: `halrun -f try.hal` writes played.txt
+
+The last period of a plan may be shorter than the others; its row comes a whole period after the one before it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.base.units import MM_PER_INCH, RAD_PER_DEG
+from planner.machine import ROTARY_AXES
+from planner.motion.trajectory import Trajectory
+
+DEPTH = 4000  # rows that wait in the FIFO: four seconds at 1 ms, while the disk may be busy
+AXES_MAX = 20  # pins of one streamer
+_NANOSECONDS = 1e9
+_ROWS_AT_ONCE = 100_000
+UNITS = {"mm": 1.0, "inch": MM_PER_INCH}
+FILES = ("setpoints.txt", "stream.hal", "try.hal")
+
+
+def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> None:
+    """Write the three files into an existing directory.
+
+    Raises InputError for another unit than mm or inch.
+    """
+    if unit not in UNITS:
+        raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
+    with (directory / "setpoints.txt").open("w", encoding="ascii") as file:
+        file.write(f"# {' '.join(trajectory.axes)} [{unit}, deg], one row every {trajectory.dt:g} s\n")
+        position = np.asarray(trajectory.position) * _scale(trajectory.axes, unit)
+        for first in range(0, len(position), _ROWS_AT_ONCE):
+            np.savetxt(file, position[first : first + _ROWS_AT_ONCE], fmt="%.9f")
+    (directory / "stream.hal").write_text(_stream_hal(trajectory), encoding="ascii")
+    (directory / "try.hal").write_text(_try_hal(trajectory), encoding="ascii")
+
+
+def _scale(axes: tuple[str, ...], unit: str) -> FloatArray:
+    """(A,) file units per mm or rad."""
+    return np.array([1.0 / RAD_PER_DEG if axis in ROTARY_AXES else 1.0 / UNITS[unit] for axis in axes])
+
+
+def _signals(axes: tuple[str, ...]) -> list[str]:
+    return [f"net {axis}-setpoint <= streamer.0.pin.{k}" for k, axis in enumerate(axes)]
+
+
+def _stream_hal(trajectory: Trajectory) -> str:
+    axes = trajectory.axes
+    return "\n".join(
+        [
+            f"# Plays the setpoints of a plan: {len(trajectory):,} rows, one in each servo period of {trajectory.dt * 1e3:g} ms.",
+            "# Source this file where the thread of the machine exists (here: servo-thread), and connect the signals to the drives:",
+            f"#     net {axes[0]}-setpoint => hm2_7i96s.0.stepgen.00.position-cmd",
+            "# Move the machine to the first row before. Then:",
+            "#     halcmd setp streamer.0.enable 0;  halstreamer setpoints.txt &   (fills the FIFO)",
+            "#     halcmd setp streamer.0.enable 1                                 (starts the motion)",
+            f"loadrt streamer depth={DEPTH} cfg={'f' * len(axes)}",
+            "setp streamer.0.enable 0",
+            *_signals(axes),
+            "addf streamer.0 servo-thread",
+            "",
+        ]
+    )
+
+
+def _try_hal(trajectory: Trajectory) -> str:
+    axes, rows = trajectory.axes, len(trajectory)
+    fill = min(1.0, rows / DEPTH)  # [s], while halstreamer fills the FIFO
+    return "\n".join(
+        [
+            "# Plays the setpoints without a machine and records them, as an ordinary user: halrun -f try.hal",
+            f"# played.txt then has one row per servo period: {' '.join(axes)}, and 1 where the FIFO was empty.",
+            f"loadrt threads name1=servo-thread period1={round(trajectory.dt * _NANOSECONDS)}",
+            f"loadrt streamer depth={DEPTH} cfg={'f' * len(axes)}",
+            f"loadrt sampler depth={2 * DEPTH} cfg={'f' * len(axes)}b",
+            "setp streamer.0.enable 0",
+            *(f"{signal} => sampler.0.pin.{k}" for k, signal in enumerate(_signals(axes))),
+            f"net empty streamer.0.empty => sampler.0.pin.{len(axes)}",
+            "addf streamer.0 servo-thread",
+            "addf sampler.0 servo-thread",
+            "loadusr halstreamer setpoints.txt",
+            f"loadusr -w sleep {fill + 0.5:.1f}",
+            f"loadusr halsampler -n {rows + round(1.0 / trajectory.dt)} played.txt",
+            "setp streamer.0.enable 1",
+            "start",
+            f"loadusr -w sleep {trajectory.cycle_time + 2.0:.1f}",
+            "",
+        ]
+    )

@@ -1,0 +1,49 @@
+"""The rows of a third-order problem as compiled functions take them: the solver (layout.py), and the Lagrangian of its solution."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.constraints.problem import FeedrateProblem
+
+
+class ProblemColumns(NamedTuple):
+    """A problem of P points and A axes, in its own units."""
+
+    unit: float  # of accelerations
+    s: FloatArray  # (P,)
+    x_max: FloatArray  # (P,)
+    d1: FloatArray  # (P, A), like the rest
+    d2_left: FloatArray
+    d2_right: FloatArray
+    d3_left: FloatArray
+    d3_right: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+
+def columns_of(problem: FeedrateProblem) -> ProblemColumns:
+    """What the kernel needs to know of a problem."""
+    return ProblemColumns(
+        unit=float(problem.acceleration[: problem.machine_axes].max()),
+        s=problem.s,
+        x_max=problem.feed_sq_limit,
+        d1=problem.d1,
+        d2_left=problem.d2_left,
+        d2_right=problem.d2_right,
+        d3_left=problem.d3_left,
+        d3_right=problem.d3_right,
+        acceleration=acceleration_limits(problem),
+        jerk=problem.jerk_limit,
+    )
+
+
+def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
+    """(P, A) axis accelerations at each point less the larger margin of the intervals at both sides of each point [mm/s2]."""
+    margin = problem.margin.copy()
+    margin[problem.piece[1:] - 1] = 0.0
+    before = np.concatenate([[0.0], margin[:-1]])
+    return problem.acceleration_limit * (1.0 - np.maximum(margin, before))[:, None]

@@ -1,0 +1,1 @@
+"""Machine files from the settings of a control: LinuxCNC, grbl, Klipper, Marlin."""

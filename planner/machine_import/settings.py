@@ -1,0 +1,56 @@
+"""What the settings of a control say about a machine, each number with its place; and what they leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Found(NamedTuple):
+    """A number and where it stands in the settings, such as "$120" or "[AXIS_X] MAX_ACCELERATION"."""
+
+    value: float
+    place: str
+
+
+class FoundMode(NamedTuple):
+    """A vibration mode: frequency [Hz], damping ratio [-], and where it stands."""
+
+    frequency: float
+    damping: float
+    place: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlSettings:
+    """The settings of one control, in mm (degrees for rotary axes) and s.
+
+    control      : its name
+    velocity     : largest velocity by axis letter [mm/s]
+    acceleration : largest acceleration by axis letter [mm/s2]
+    jerk         : largest jerk by axis letter [mm/s3], where the control knows one
+    feed_max     : largest feed along the path [mm/s], where the control has one
+    dt           : interpolation period [s], where it is said
+    tolerance    : of G64 P [mm], where a start-up code has one
+    path_control : "blend", "exact_path" or "exact_stop", where a start-up code has one
+    modes        : vibration modes that the control suppresses
+    notes        : what of the settings has no counterpart in a machine file, one sentence each
+    """
+
+    control: str
+    velocity: Mapping[str, Found]
+    acceleration: Mapping[str, Found]
+    jerk: Mapping[str, Found] = field(default_factory=dict)
+    feed_max: Found | None = None
+    dt: Found | None = None
+    tolerance: Found | None = None
+    path_control: str | None = None
+    modes: tuple[FoundMode, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def least(*found: Found | None) -> Found | None:
+    """The smallest of some numbers; None where there is none."""
+    known = [one for one in found if one is not None]
+    return min(known, key=lambda one: one.value) if known else None

@@ -1,0 +1,62 @@
+"""Lines that are no words: commands to grbl ($X, $H, $100=250), and G28 with bare axis letters, as 3-D printers have it.
+
+Settings and questions move nothing and are counted. Homing is a rapid to the position of G28 in the machine file, else to machine zero,
+and said so. Everything else that starts with $ may move ($J jogs) and is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from planner.nc.codes import Assumption
+from planner.nc.lexer import Words
+
+if TYPE_CHECKING:
+    from planner.nc.assumed import Assumed
+    from planner.nc.block import Block, Report
+
+MESSAGE = "message"  # the rest of the line is text
+
+COMMAND = Assumption(
+    "command to the control ($)", "commands to the control ($)", "assumed not to move anything"
+)
+_IGNORED = Assumption("command to the control", "commands to the control", "left out, as --ignore says")
+# Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files on a card.
+_HARMLESS = re.compile(
+    r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*)?", re.IGNORECASE
+)
+_HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
+_LONGEST = 80  # characters of bare axis letters that are looked at
+_BARE = re.compile(rb"[ \t]*((?:[XYZWO][ \t]*0?[ \t]*)+)[\r\n;(]", re.IGNORECASE)
+
+
+def command(words: Words, word: int, block: Block, report: Report, assumed: Assumed) -> bool:
+    """Execute a `$` command at the start of a line into `block`; False for what is none, or is refused."""
+    if words.text(word) != "$" or block.g or block.m or block.value or assumed.strict:
+        return False
+    text = "$" + words.rest(word).split(";")[0].split("(")[0].strip()
+    if assumed.ignores("$") or assumed.ignores(text.upper()[:2]):
+        assumed.count(_IGNORED, text, block.line)
+        return True
+    if homing := _HOMING.fullmatch(text):
+        block.homing = homing.group(1).upper() or "XYZ"
+        return True
+    if _HARMLESS.fullmatch(text):
+        assumed.count(COMMAND, text, block.line)
+        return True
+    return False
+
+
+def homed(words: Words, word: int, block: Block, assumed: Assumed) -> bool:
+    """Execute a G28 with bare letters from `word` on into `block`: `G28 X Y`, or all axes for `G28 W`; False for anything else."""
+    if block.g.get("one-shot") != 280 or block.value or assumed.strict:
+        return False
+    data, at = words.data, int(words.at[word])
+    found = _BARE.match(data[at : at + _LONGEST].partition(b"\n")[0] + b"\n")
+    if found is None:
+        return False
+    named = found.group(1).upper()
+    block.homing = "".join(letter for letter in "XYZ" if letter.encode() in named) or "XYZ"
+    del block.g["one-shot"]
+    return True

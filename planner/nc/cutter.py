@@ -1,0 +1,341 @@
+"""Cutter radius compensation, G41 (left of the path) and G42 (right of it): from programmed moves to the tool's.
+
+In the plane of the moves, with the tool's radius r and the side s = +1 (left) or -1 (right), a programmed move is followed at the
+distance r: where its tangent is t, the tool's centre is at p + s r n(t), n(t) = t turned left by a quarter. So a line is offset to a
+parallel, and an arc about its centre, its radius less r where it turns towards the tool's side and more r elsewhere. Where two moves
+meet, the second turns by an angle away from the tool's side (outer corner), towards it (inner corner), or by less than `STRAIGHT_ON`:
+
+    outer corner    an arc of radius r about the programmed corner joins the two offset ends; before a rapid a straight move does
+    inner corner    both offset moves end at their intersection: the one that crosses in the sense in which the programmed moves turn
+    straight on     the second begins where the first ends
+
+An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to `STRAIGHT_ON`, is an outer corner
+between lines, and an inner one beside an arc.
+
+The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one that ends there with the
+programmed tangent). The move after G40 leads straight from there to the programmed end. Moves along the normal alone keep the place in
+the plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does.
+
+Lengths are machine coordinates in mm. Points and vectors in the plane are complex numbers: n(t) = i t.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from planner.base.arrays import FloatArray
+from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.program import Kind
+from planner.nc.state import State
+from planner.nc.store import Store
+
+STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
+_ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
+NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of coordinates around 1e3 mm
+
+_GOUGE = (
+    "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a "
+    "smaller tool"
+)
+
+
+class CutterFault(ValueError):
+    """The tool cannot follow the programmed moves; the text says why."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """An offset move: where it would end, its tangent there and at its start, and its line or circle.
+
+    turning : +1 counter-clockwise, -1 clockwise, 0 for a line
+    """
+
+    end: complex
+    first: complex  # unit tangent
+    last: complex  # unit tangent
+    turning: int = 0
+    centre: complex = 0j
+    radius: float = 0.0
+
+    def tangent(self, point: complex) -> complex:
+        """Unit tangent at a point of the line or circle."""
+        if not self.turning:
+            return self.first
+        spoke = point - self.centre
+        return 1j * self.turning * spoke / abs(spoke)
+
+
+@dataclass
+class _Open:
+    """The last move, whose end the next corner may move.
+
+    row   : its block, or, once it is fixed, that of the first move along the normal after it, or -1
+    arc   : its row among the arcs, or -1
+    begin : where the tool begins it
+    sweep : of an arc, as it is now
+    fixed : its end is not moved any more
+    """
+
+    side: Side
+    row: int
+    arc: int
+    begin: complex
+    sweep: float = 0.0
+    fixed: bool = False
+
+
+def meeting(before: Side, after: Side, sense: float) -> complex | None:
+    """Where two offset moves cross in a sense (the sign of the turn from the one to the other), or None."""
+    crossing = [
+        p for p in _crossings(before, after) if _cross(before.tangent(p), after.tangent(p)) * sense > 0
+    ]
+    return min(crossing, key=lambda p: abs(p - before.end)) if crossing else None
+
+
+def _crossings(one: Side, other: Side) -> Sequence[complex]:
+    if not one.turning and not other.turning:
+        slope = _cross(one.first, other.first)
+        along = _cross(other.end - one.end, other.first) / slope
+        return [one.end + along * one.first]
+    if one.turning and other.turning:
+        apart = other.centre - one.centre
+        distance = abs(apart)
+        if distance < NOWHERE:
+            return []
+        along = (distance**2 + one.radius**2 - other.radius**2) / (2.0 * distance)
+        direction, foot, size = 1j * apart / distance, one.centre + along * apart / distance, one.radius
+        rest = size**2 - along**2
+    else:
+        line, circle = (other, one) if one.turning else (one, other)
+        direction = line.first
+        foot = line.end + _dot(circle.centre - line.end, direction) * direction
+        rest = circle.radius**2 - abs(foot - circle.centre) ** 2
+    if rest < 0.0:
+        return []
+    reach = math.sqrt(rest)
+    return [foot - reach * direction, foot + reach * direction]
+
+
+class Cutter:
+    """The compensation in force, from G41 or G42 to G40; it writes its moves into the store.
+
+    radius : of the tool [mm], > 0
+    left   : on which side of the path it is
+    normal : axis normal to the plane
+    """
+
+    def __init__(self, state: State, store: Store, *, radius: float, left: bool, normal: int):
+        self._state, self._store = state, store
+        self._radius, self._sign = radius, 1 if left else -1
+        self.normal = normal
+        self._open: _Open | None = None
+        state.actual = state.position.copy()
+
+    @property
+    def started(self) -> bool:
+        """Whether the first move has been made."""
+        return self._open is not None
+
+    def line(self, target: FloatArray, kind: Kind, line: int) -> None:
+        """A straight move to a programmed end (3,). Raises CutterFault if the tool cannot follow."""
+        state = self._state
+        start, end = self._plane(state.position), self._plane(target)
+        length = abs(end - start)
+        if length < NOWHERE:
+            self._stay(target, kind, line)
+            return
+        tangent = (end - start) / length
+        side = Side(self._beside(end, tangent), tangent, tangent)
+        if not self.started:
+            if length <= self._radius:
+                raise CutterFault(
+                    f"the first move of cutter radius compensation is {length:.6g} mm long; it must be longer than the tool's "
+                    f"radius, {self._radius:.6g} mm"
+                )
+        else:
+            self._corner(start, side, kind, line)
+        self._add(side, target, kind, line)
+
+    def arc(self, target: FloatArray, arc: Arc, line: int) -> None:
+        """An arc to a programmed end (3,). Raises CutterFault if the tool cannot follow."""
+        state = self._state
+        start, end, centre = self._plane(state.position), self._plane(target), self._plane(arc.centre)
+        turning = 1 if arc.sweep > 0 else -1
+        nearer = turning * self._sign * self._radius
+        size = abs(end - centre)
+        first, last = (1j * turning * (p - centre) / abs(p - centre) for p in (start, end))
+        if nearer >= size:
+            raise CutterFault(
+                f"the arc's radius, {size:.6g} mm, must be larger than the tool's, {self._radius:.6g} mm, where the tool is inside"
+            )
+        side = Side(self._beside(end, last), first, last, turning, centre, size - nearer)
+        sweep = arc.sweep
+        if not self.started:
+            side, sweep = self._entry_arc(side, start, sweep)
+        else:
+            inner = self._corner(start, side, Kind.ARC, line)
+            sweep -= self._left_out(side, allowed_back=STRAIGHT_ON if not inner else _ROUNDING)
+        if sweep * turning <= 0:
+            raise CutterFault(_GOUGE)
+        self._add(side, target, Kind.ARC, line, sweep)
+
+    def fix(self) -> None:
+        """The place is fixed: a stop, G40 or the end of the program. Raises CutterFault if the last move would gouge."""
+        if self._open is not None:
+            self._settle(self._open)
+            self._open.fixed, self._open.row = True, -1
+
+    # --- corners ------------------------------------------------------------------------------------------------------------
+
+    def _corner(self, corner: complex, side: Side, kind: Kind, line: int) -> bool:
+        """Join the open move to the next at a programmed corner; True for an inner one."""
+        assert self._open is not None
+        before = self._open.side
+        turn = cmath.phase(side.first / before.last) * self._sign  # towards the tool's side
+        back = math.pi - abs(turn) < STRAIGHT_ON
+        outer = not (side.turning or before.turning) if back else turn < -STRAIGHT_ON
+        inner = not outer and (back or turn > STRAIGHT_ON)
+        if inner:
+            self._inner_corner(side)
+        self._settle(self._open)
+        if outer:
+            self._outer_corner(corner, self._beside(corner, side.first), kind, line)
+        return inner
+
+    def _inner_corner(self, side: Side) -> None:
+        open_ = self._open
+        assert open_ is not None
+        point = meeting(open_.side, side, self._sign)
+        if point is None:
+            raise CutterFault(_GOUGE)
+        if open_.fixed:
+            if open_.row >= 0:
+                self._move_end(open_.row, point)
+            return
+        if open_.arc >= 0:
+            left_out = _turn(point, open_.side.end, open_.side)
+            open_.sweep -= left_out
+            if open_.sweep * open_.side.turning <= 0:
+                raise CutterFault(_GOUGE)
+        open_.side = replace(open_.side, end=point)
+        self._move_end(open_.row, point)
+
+    def _outer_corner(self, corner: complex, end: complex, kind: Kind, line: int) -> None:
+        """To the offset start of the next move: about the corner, or straight before a rapid."""
+        state = self._state
+        assert state.actual is not None
+        place = self._at(end, state.actual)
+        self._store.make_room(2)
+        if kind == Kind.RAPID:
+            state.actual = place
+            self._store.add(Kind.RAPID, line, state)
+            return
+        spokes = (end - corner) / (self._plane(state.actual) - corner)
+        sweep = -self._sign * (-self._sign * cmath.phase(spokes) % (2.0 * math.pi))
+        state.actual = place
+        self._store.add_arc(Arc(self._at(corner, place), sweep), self.normal, line, state)
+
+    def _settle(self, open_: _Open) -> None:
+        """See that the open move still leads forward, now that its end is known; write an arc's sweep."""
+        if open_.arc >= 0 and not open_.fixed:
+            block, centre, normal, _ = self._store.arcs[open_.arc]
+            self._store.arcs[open_.arc] = (block, centre, normal, open_.sweep)
+        elif not open_.fixed and _dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
+            raise CutterFault(_GOUGE)
+
+    # --- blocks -------------------------------------------------------------------------------------------------------------
+
+    def _add(self, side: Side, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
+        state, store = self._state, self._store
+        assert state.actual is not None
+        begin, before = self._plane(state.actual), state.actual
+        state.position[:] = target
+        state.actual = self._at(side.end, target)
+        store.make_room(2)
+        row, arc = store.blocks, -1
+        if kind == Kind.ARC:
+            arc = len(store.arcs)
+            store.add_arc(Arc(self._at(side.centre, before), sweep), self.normal, line, state)
+        else:
+            store.add(kind, line, state)
+        self._open = _Open(side, row, arc, begin, sweep)
+
+    def _left_out(self, side: Side, allowed_back: float) -> float:
+        """What the corner at the start of an arc takes off its sweep [rad]."""
+        assert self._state.actual is not None
+        start = side.centre + side.radius * side.first / (1j * side.turning)
+        left_out = _turn(start, self._plane(self._state.actual), side)
+        if left_out * side.turning < -allowed_back:
+            raise CutterFault(_GOUGE)
+        return left_out
+
+    def _entry_arc(self, side: Side, start: complex, sweep: float) -> tuple[Side, float]:
+        """The arc from where the tool is that ends at the offset end with the programmed tangent."""
+        inwards = 1j * side.turning * side.last  # from the end towards the centre
+        chord = start - side.end
+        reach = _dot(chord, inwards)
+        if abs(self._plane(self._state.position) - side.centre) <= self._radius or reach <= 0.0:
+            raise CutterFault(
+                "the first arc of cutter radius compensation must have a radius larger than the tool's, "
+                f"{self._radius:.6g} mm, and leave room for it; begin with a straight move"
+            )
+        radius = abs(chord) ** 2 / (2.0 * reach)
+        centre = side.end + radius * inwards
+        turn = side.turning * cmath.phase((side.end - centre) / (start - centre))
+        full = turn if turn > FULL_TURN else turn + 2.0 * math.pi
+        full += 2.0 * math.pi * max(0, math.ceil(abs(sweep) / (2.0 * math.pi) - FULL_TURN) - 1)
+        return replace(side, centre=centre, radius=radius), side.turning * full
+
+    def _stay(self, target: FloatArray, kind: Kind, line: int) -> None:
+        """A move along the normal: the place in the plane stays the tool's."""
+        if not self.started:
+            raise CutterFault(
+                "the first move of cutter radius compensation does not move in its plane; write G41 or G42 after it"
+            )
+        state = self._state
+        assert state.actual is not None
+        place = self._plane(state.actual)
+        state.position[:] = target
+        state.actual = self._at(place, target)
+        self._store.make_room(1)
+        if self._open is not None and self._open.row < 0:
+            self._open.row = self._store.blocks
+        self._store.add(kind, line, state)
+
+    def _move_end(self, row: int, point: complex) -> None:
+        """All blocks from the open move on end at another place in the plane."""
+        state, ends = self._state, self._store.block.end
+        assert state.actual is not None
+        for axis, value in zip(IN_PLANE[self.normal], (point.real, point.imag), strict=True):
+            ends[row : self._store.blocks, axis] = value
+            state.actual[axis] = value
+
+    def _plane(self, point: FloatArray) -> complex:
+        a, b = IN_PLANE[self.normal]
+        return complex(point[a], point[b])
+
+    def _at(self, point: complex, others: FloatArray) -> FloatArray:
+        """(3,) a point of the plane, with the coordinate along the normal of `others`."""
+        place = others.copy()
+        a, b = IN_PLANE[self.normal]
+        place[a], place[b] = point.real, point.imag
+        return place
+
+    def _beside(self, point: complex, tangent: complex) -> complex:
+        return point + self._sign * self._radius * 1j * tangent
+
+
+def _turn(start: complex, end: complex, side: Side) -> float:
+    """The angle from one point to another about the centre, at most half a turn either way [rad]."""
+    return cmath.phase((end - side.centre) / (start - side.centre))
+
+
+def _cross(one: complex, other: complex) -> float:
+    return (one.conjugate() * other).imag
+
+
+def _dot(one: complex, other: complex) -> float:
+    return (one.conjugate() * other).real

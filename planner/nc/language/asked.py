@@ -1,0 +1,292 @@
+"""Parameters that hold the state of the control: positions, offsets, modes, tool, spindle. LinuxCNC's and Fanuc's numbers and names.
+
+Lengths are in the program's unit where LinuxCNC has them so (5420 and the named ones), else in mm, the unit of a machine here: offsets,
+G28 and G30 positions and tool lengths are kept by a LinuxCNC control in the machine's unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc.interpreter import Interpreter
+from planner.nc.program import PathControl
+from planner.nc.state import System
+
+# Words that restore modes, line by line.
+Modes = tuple[tuple[tuple[str, float], ...], ...]
+
+_SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
+_PATH = {PathControl.EXACT_PATH: 61.0, PathControl.EXACT_STOP: 61.1, PathControl.BLEND: 64.0}
+_PLANE = {2: 17.0, 1: 18.0, 0: 19.0}
+_ROTATION = 9  # behind the axes of a work coordinate system
+_FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
+_AXES = 9  # x y z a b c u v w; the last six are zero here
+
+
+class Asked:
+    """Answers for one interpreter. Subclasses name the parameters."""
+
+    numbers: frozenset[int] = frozenset()
+    names: frozenset[str] = frozenset()
+
+    def __init__(self, interpreter: Interpreter):
+        self.interpreter = interpreter
+
+    def get(self, parameter: int | str, depth: int) -> float:
+        """The value of a parameter, by number or name; `depth` calls are open."""
+        raise NotImplementedError
+
+    def put(self, number: int, value: float | None) -> None:
+        """Assign to a parameter of the control. Raises ValueError: a program changes its state by codes."""
+        raise ValueError(
+            f"parameter #{number} belongs to the control and is only read here; write G10, G92, G28.1 or a tool change instead"
+        )
+
+    # --- the state, as numbers ----------------------------------------------------------------------------------------------
+
+    def here(self, axis: int) -> float:
+        """The position in the program's coordinates and unit."""
+        state = self.interpreter.state
+        return float(state.programmed()[axis] / state.unit) if axis < 3 else 0.0
+
+    def machine(self, axis: int) -> float:
+        """The position in the machine's coordinates and the program's unit."""
+        state = self.interpreter.state
+        return float(state.position[axis] / state.unit) if axis < 3 else 0.0
+
+    def offset(self, system: int, axis: int) -> float:
+        """The offset of a work coordinate system, G54 is 0 [mm], or its rotation [degrees]."""
+        given = self.interpreter.state.work_system(_SYSTEMS[system])
+        if axis == _ROTATION:
+            return given.rotation
+        return float(given.origin[axis]) if axis < 3 else 0.0
+
+    def event(self, letter: str, values: tuple[float, ...] = ()) -> float | None:
+        """The last event with that letter, and one of the values if any are given."""
+        store = self.interpreter.store
+        seen = slice(0, store.events)
+        found = store.event.letter[seen] == ord(letter)
+        if values:
+            found &= np.isin(store.event.value[seen], values)
+        at = np.flatnonzero(found)
+        return float(store.event.value[at[-1]]) if len(at) else None
+
+    def feed(self) -> float:
+        """The feed in the program's unit per minute."""
+        state = self.interpreter.state
+        return state.feed / state.unit * SECONDS_PER_MINUTE
+
+    def system(self) -> int:
+        """The work coordinate system in force, G54 is 0."""
+        return _SYSTEMS.index(self.interpreter.state.system)
+
+    def modes(self) -> Modes:
+        """The words that bring back the present modes, all but the motion code: M70 and M72."""
+        state = self.interpreter.state
+        path: list[tuple[str, float]] = [("G", _PATH[state.path_control])]
+        if state.path_control == PathControl.BLEND and not np.isnan(state.tolerance):
+            path.append(("P", state.tolerance / state.unit))
+        system = _SYSTEMS[self.system()] / 10
+        codes = (
+            _PLANE[state.normal],
+            90.0 if state.absolute else 91.0,
+            90.1 if state.absolute_centre else 91.1,
+        )
+        rows = [
+            [("G", 21.0 if state.unit == 1.0 else 20.0), ("G", 7.0 if state.diameters else 8.0)],
+            [*(("G", code) for code in (*codes, system, 98.0 if state.to_level else 99.0)), *path],
+            [("G", _FEED_MODES[state.feed_mode])],
+        ]
+        if state.tool_offset.any():
+            lengths = (
+                (letter, float(state.tool_offset[axis]) / state.unit) for axis, letter in enumerate("XYZ")
+            )
+            rows.append([("G", 43.1), *(pair for pair in lengths if pair[1])])
+        else:
+            rows.append([("G", 49.0)])
+        if state.feed > 0 and state.feed_mode == "per minute":
+            rows.append([("F", self.feed())])
+        speed = self.event("S")
+        if speed is not None:
+            rows.append([("S", speed)])
+        for group in ((3.0, 4.0, 5.0), (7.0, 8.0, 9.0), (48.0, 49.0)):
+            code = self.event("M", group)
+            if code is not None:
+                rows.append([("M", code)])
+        return tuple(tuple(row) for row in rows)
+
+
+# --- LinuxCNC -------------------------------------------------------------------------------------------------------------------
+
+
+def _motion_mode(motion: int) -> float:
+    """The motion code in force in tenths, as `State.motion` keeps it; G80 where there is none."""
+    return 800.0 if motion < 0 else 10.0 * motion if motion <= 3 else float(motion)
+
+
+def _on(condition: bool) -> float:
+    return 1.0 if condition else 0.0
+
+
+_LINUXCNC_NAMES: dict[str, Callable[[Asked], float]] = {
+    "_vmajor": lambda a: 2.9,
+    "_vminor": lambda a: 0.0,
+    "_task": lambda a: 0.0,
+    "_remap_level": lambda a: 0.0,
+    "_motion_mode": lambda a: _motion_mode(a.interpreter.state.motion),
+    "_plane": lambda a: 10.0 * _PLANE[a.interpreter.state.normal],
+    "_ccomp": lambda a: 400.0,
+    "_metric": lambda a: _on(a.interpreter.state.unit == 1.0),
+    "_imperial": lambda a: _on(a.interpreter.state.unit != 1.0),
+    "_absolute": lambda a: _on(a.interpreter.state.absolute),
+    "_incremental": lambda a: _on(not a.interpreter.state.absolute),
+    "_inverse_time": lambda a: _on(a.interpreter.state.feed_mode == "inverse time"),
+    "_units_per_minute": lambda a: _on(a.interpreter.state.feed_mode == "per minute"),
+    "_units_per_rev": lambda a: _on(a.interpreter.state.feed_mode == "per turn"),
+    "_coord_system": lambda a: float(a.interpreter.state.system),
+    "_tool_offset": lambda a: _on(bool(a.interpreter.state.tool_offset.any())),
+    "_retract_r_plane": lambda a: _on(not a.interpreter.state.to_level),
+    "_retract_old_z": lambda a: _on(a.interpreter.state.to_level),
+    "_spindle_rpm_mode": lambda a: _on(not a.interpreter.state.spindle.surface_speed),
+    "_spindle_css_mode": lambda a: _on(a.interpreter.state.spindle.surface_speed),
+    "_ijk_absolute_mode": lambda a: _on(a.interpreter.state.absolute_centre),
+    "_lathe_diameter_mode": lambda a: _on(a.interpreter.state.diameters),
+    "_lathe_radius_mode": lambda a: _on(not a.interpreter.state.diameters),
+    "_spindle_on": lambda a: _on(a.interpreter.state.spindle.turning != 0),
+    "_spindle_cw": lambda a: _on(a.interpreter.state.spindle.turning > 0),
+    "_mist": lambda a: _on(a.event("M", (7.0, 9.0)) == 7.0),
+    "_flood": lambda a: _on(a.event("M", (8.0, 9.0)) == 8.0),
+    "_speed_override": lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0),
+    "_feed_override": lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0),
+    "_adaptive_feed": lambda a: 0.0,
+    "_feed_hold": lambda a: 0.0,
+    "_feed": lambda a: a.feed(),
+    "_rpm": lambda a: a.interpreter.state.spindle.speed,
+    "_current_tool": lambda a: float(a.interpreter.state.tool_loaded),
+    "_current_pocket": lambda a: float(a.interpreter.state.tool_loaded),
+    "_selected_tool": lambda a: float(a.interpreter.state.tool_selected),
+    "_selected_pocket": lambda a: float(a.interpreter.state.tool_selected),
+    **{f"_{letter}": lambda a, axis=axis: a.here(axis) for axis, letter in enumerate("xyzabcuvw")},  # type: ignore[misc]
+    **{f"_abs_{letter}": lambda a, axis=axis: a.machine(axis) for axis, letter in enumerate("xyzabc")},  # type: ignore[misc]
+}
+
+
+def _linuxcnc_number(asked: Asked, number: int) -> float:
+    interpreter = asked.interpreter
+    for code, first in ((280, 5161), (300, 5181)):
+        if first <= number < first + _AXES:
+            given = interpreter.state.homes.get(code)
+            return 0.0 if given is None or number - first >= 3 else float(given[number - first])
+    if number == 5210:
+        return _on(bool(interpreter.state.g92.any()))
+    if 5211 <= number < 5211 + _AXES:
+        return float(interpreter.state.g92[number - 5211]) if number - 5211 < 3 else 0.0
+    if number == 5220:
+        return asked.system() + 1.0
+    if 5221 <= number < 5221 + 20 * len(_SYSTEMS):
+        system, axis = divmod(number - 5221, 20)
+        return asked.offset(system, axis)
+    if number == 5400:
+        return float(interpreter.state.tool_loaded)
+    if 5401 <= number <= 5403:
+        return float(interpreter.state.tool_offset[number - 5401])
+    if number == 5410:
+        tool = interpreter.state.tools.get(interpreter.state.tool_loaded)
+        return 0.0 if tool is None else tool.diameter
+    if 5420 <= number < 5420 + _AXES:
+        return asked.here(number - 5420)
+    return 0.0
+
+
+class LinuxcncAsked(Asked):
+    """Numbers 5161 to 5428 and the predefined names of LinuxCNC 2.9."""
+
+    numbers = frozenset(
+        (
+            *range(5161, 5170),
+            *range(5181, 5190),
+            *range(5210, 5220),
+            *range(5220, 5221 + 180),
+            *range(5400, 5414),
+        )
+    ) | frozenset(range(5420, 5429))
+    names = frozenset((*_LINUXCNC_NAMES, "_call_level"))
+
+    def get(self, parameter: int | str, depth: int) -> float:
+        """The value of a parameter, by number or name; `depth` calls are open."""
+        if parameter == "_call_level":
+            return float(depth)
+        if isinstance(parameter, str):
+            return _LINUXCNC_NAMES[parameter](self)
+        return _linuxcnc_number(self, parameter)
+
+
+# --- Fanuc ----------------------------------------------------------------------------------------------------------------------
+
+
+class FanucAsked(Asked):
+    """Modal information 4001 to 4120 and 4201 to 4320, positions 5001 to 5043, work offsets 5201 to 5326."""
+
+    numbers = frozenset(
+        (*range(4001, 4131), *range(4201, 4331), *range(5001, 5009), *range(5021, 5029), *range(5041, 5049))
+    ) | frozenset(
+        (*range(5201, 5209), *range(5221, 5327), *range(3000, 3020), *range(1000, 1200), *range(2000, 3000))
+    )
+
+    def get(self, parameter: int | str, depth: int) -> float:
+        """The value of a parameter by its number; `depth` calls are open. Raises ValueError for what only the control knows."""
+        assert isinstance(parameter, int)
+        state, number = self.interpreter.state, parameter
+        if 4201 <= number <= 4330:
+            number -= 200
+        modal: dict[int, Callable[[], float]] = {
+            4001: lambda: _motion_mode(state.motion) / 10.0,
+            4002: lambda: _PLANE[state.normal],
+            4003: lambda: 90.0 if state.absolute else 91.0,
+            4005: lambda: _FEED_MODES[state.feed_mode],
+            4006: lambda: 21.0 if state.unit == 1.0 else 20.0,
+            4007: lambda: 40.0,
+            4008: lambda: 43.0 if state.tool_offset.any() else 49.0,
+            4014: lambda: min(54.0 + self.system(), 59.0),
+            4109: self.feed,
+            4113: lambda: self.event("M") or 0.0,
+            4119: lambda: self.event("S") or 0.0,
+            4120: lambda: float(state.tool_selected),
+        }
+        if number in modal:
+            return modal[number]()
+        if 5001 <= number <= 5008 or 5041 <= number <= 5048:
+            return self.here((number - 1) % 20)
+        if 5021 <= number <= 5028:
+            return self.machine(number - 5021)
+        if 5221 <= number <= 5326:
+            system, axis = divmod(number - 5221, 20)
+            return self.offset(system, axis) if axis < 8 else 0.0
+        if 5201 <= number <= 5208:
+            return 0.0
+        raise ValueError(
+            f"parameter #{parameter} is known by the control only; assign the value it has there to a parameter of your own"
+        )
+
+    def put(self, number: int, value: float | None) -> None:
+        """Assign to a parameter of the control: a work offset. Raises ValueError: an alarm, or a state that is changed by codes."""
+        if number == 3000:
+            raise ValueError(f"the program raises its alarm {value or 0:g} here")
+        if 3001 <= number <= 3007:
+            return  # timers and what the operator may do: nothing moves
+        if 5221 <= number <= 5326 and (number - 5221) % 20 < 3:
+            self._set_offset(number - 5221, value or 0.0)
+            return
+        super().put(number, value)
+
+    def _set_offset(self, place: int, value: float) -> None:
+        state = self.interpreter.state
+        code = _SYSTEMS[place // 20]
+        old = state.work_system(code)
+        origin = old.origin.copy()
+        origin[place % 20] = value * state.unit
+        state.systems[code] = System(origin, old.rotation)
+        state.apply_offsets()

@@ -1,0 +1,156 @@
+"""A program with parameters, expressions, loops or subprograms through the interpreter, and what was expanded on the way."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from planner.nc.faults import Fault
+from planner.nc.integers import Integers
+from planner.nc.interpreter import Interpreter
+from planner.nc.language import fanuc, linuxcnc
+from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked
+from planner.nc.language.compiled import ProgramFault, compile_procedures
+from planner.nc.language.heidenhain import text as heidenhain_text
+from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
+from planner.nc.language.rows import Rows
+from planner.nc.language.run import Run
+from planner.nc.language.siemens import text as siemens_text
+from planner.nc.language.siemens.parser import Parser as SiemensParser
+from planner.nc.language.source import Source
+from planner.nc.language.tree import Language, Parser
+from planner.nc.lexer import Words, split_words
+from planner.nc.program import Expansion, Program
+from planner.nc.reading import FANUC, HEIDENHAIN, LINUXCNC, SIEMENS
+
+ENTRIES_MAX = 10_000  # files and folders that are looked at for a called file
+FILE_MAX = 100_000_000  # bytes of a called file
+_CALLED = re.compile(r"[\w.+-]+")
+
+
+# Gets every chunk of expanded rows before it is executed.
+Tee = Callable[[Words], None]
+
+
+def expand(
+    interpreter: Interpreter, words: Words, dialect: str, integers: Integers, tee: Tee | None = None
+) -> tuple[Program, Sequence[Fault]]:
+    """Run a program of that dialect through the interpreter; returns it and its faults, those of its statements first.
+
+    words    : of the whole program; rows that compute are read again as text
+    integers : what numbers without a point mean, applied to the words already
+
+    Nothing is run if a line cannot be read; otherwise the program is run to its end, or to what stops it.
+    """
+    rows = Rows()
+    front = _FRONTS[dialect]
+    run = Run(interpreter, rows, front.language, front.asked(interpreter))
+    run.tee = tee or run.tee
+    files = _Files(run, rows, front, integers)
+    found = files.read(words, interpreter.source)
+    if not found:
+        stopped = run.start()
+        found = [stopped] if stopped else []
+    faults = [
+        files.sources[f.place.file].fault(f, run.files[f.place.file] if f.place.file else "") for f in found
+    ]
+    program = dataclasses.replace(
+        interpreter.program(run.frames),
+        expansion=Expansion(
+            dialect=dialect, calls=tuple(run.calls.items()), turns=run.turns, rows=run.executed
+        ),
+    )
+    return program, [*faults, *interpreter.faults()]
+
+
+@dataclass(frozen=True)
+class _Front:
+    """What reads a dialect. files : names, in small letters, of the file that holds a subprogram."""
+
+    language: Language
+    asked: type[Asked]
+    parser: Callable[[Source], Parser]
+    files: Callable[[str], frozenset[str]]
+
+
+_FRONTS = {
+    LINUXCNC: _Front(
+        linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
+    ),
+    FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
+    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, Asked, HeidenhainParser, lambda name: frozenset()),
+    SIEMENS: _Front(
+        siemens_text.LANGUAGE, siemens_text.SiemensAsked, SiemensParser, lambda name: frozenset()
+    ),
+}
+
+
+class _Files:
+    """The files of a program: its own, and those in its folder that it calls."""
+
+    def __init__(self, run: Run, rows: Rows, front: _Front, integers: Integers):
+        self.run, self.rows, self.front, self.integers = run, rows, front, integers
+        self.sources: list[Source] = []
+        run.load = self.load
+
+    def read(self, words: Words, name: str) -> list[ProgramFault]:
+        """Compile a file; returns what cannot be read in it."""
+        first, begin = self.rows.add_file(words, name)
+        source = Source(words, len(self.sources), first, begin, self.integers)
+        self.sources.append(source)
+        if source.file:
+            self.run.files.append(name)
+        parser = self.front.parser(source)
+        procedures = parser.parse()
+        if parser.faults:
+            return sorted(parser.faults, key=lambda fault: fault.place.line)
+        marker = _marker(source.file)
+        try:
+            self.run.add(compile_procedures(procedures, self.front.language, self.rows, marker), marker)
+        except ProgramFault as fault:
+            return [fault]
+        return []
+
+    def load(self, name: str) -> bool:
+        """Read the file name.ngc in the program's folder, or in a folder below it; False if there is none. Raises ProgramFault."""
+        path = self._find(name)
+        if path is None:
+            return False
+        words = split_words(path.read_bytes(), block_delete=self.run.interpreter.reading.block_delete)
+        faults = self.read(self.integers.applied(words), str(path))
+        if faults:
+            raise faults[0]
+        return True
+
+    def _find(self, name: str) -> Path | None:
+        folder = Path(self.run.interpreter.source).parent
+        if not Path(self.run.interpreter.source).is_file() or not _CALLED.fullmatch(name):
+            return None
+        wanted = self.front.files(name)
+        for path in _below(folder):
+            if path.name.lower() in wanted and path.is_file() and path.stat().st_size <= FILE_MAX:
+                return path
+        return None
+
+
+def _marker(file: int) -> str:
+    """What stands for a file in Python's tracebacks."""
+    return f"<nc {file}>"
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Files in a folder, then in the folders below it; links to folders are not followed."""
+    seen = 0
+    for place, folders, files in os.walk(folder):
+        folders.sort()
+        for name in sorted(files):
+            seen += 1
+            if seen > ENTRIES_MAX:
+                return
+            path = Path(place) / name
+            if not path.is_symlink():
+                yield path

@@ -1,0 +1,73 @@
+"""The expanded program as text: the words of every executed line, in their order, as any control reads them.
+
+Resolved are parameters, expressions, loops, branches, subprograms and saved modes. Everything else stays as the program has it: moves,
+arcs, feeds, dwells, canned cycles, work offsets, tools, spindle, coolant. Line numbers and comments are left out. Numbers are rounded
+to `DECIMALS`.
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from planner.machine import Machine
+from planner.nc.events import plain
+from planner.nc.faults import require_none
+from planner.nc.lexer import Words
+from planner.nc.program import Program
+from planner.nc.reader import execute, interpret
+from planner.nc.reading import Reading
+
+DECIMALS = 7  # of a number
+_LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
+_ENDS = ("M2", "M02", "M30")
+_NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
+
+
+class Flat:
+    """Collects the lines of a program while it is expanded: `add` is the `tee` of `expand`."""
+
+    def __init__(self, source: str):
+        name = PurePath(source).name.translate(_NO_COMMENT)
+        self.lines = [f"({name}, expanded by feedrate-planner: parameters, loops and calls written out)"]
+
+    def add(self, words: Words) -> None:
+        """The rows of a chunk."""
+        letters, values, first = words.letter.tolist(), words.value.tolist(), words.first.tolist()
+        known: dict[float, str] = {}
+        for row in range(len(first) - 1):
+            text = " ".join(
+                chr(letters[w]) + (known.get(values[w]) or known.setdefault(values[w], number(values[w])))
+                for w in range(first[row], first[row + 1])
+                if letters[w] not in _LEFT_OUT
+            )
+            if text:
+                self.lines.append(text)
+
+    def text(self) -> str:
+        """The program, with M2 at its end if it has no end of its own."""
+        ended = bool(set(self.lines[-1].split()) & set(_ENDS))
+        return "\n".join([*self.lines, *([] if ended else ["M2"]), ""])
+
+
+def number(value: float) -> str:
+    """A number without exponent, rounded to `DECIMALS`."""
+    text = repr(round(value, DECIMALS) + 0.0)
+    return plain(float(text)) if "e" in text else text.removesuffix(".0")
+
+
+def flat_program(
+    data: bytes, machine: Machine | None, reading: Reading, *, source: str
+) -> tuple[str, Program] | None:
+    """The text of an expanded program and the program itself; None if it has nothing to expand.
+
+    Raises InputError for the first construct that is not supported or not valid.
+    """
+    program, faults = interpret(data, machine, reading, source=source)
+    require_none(faults, source)
+    if program.expansion is None:
+        return None
+    flat = Flat(source)
+    execute(
+        data, machine, program.reading, source, flat.add
+    )  # once more, now that it is known how arc centres are read
+    return flat.text(), program

@@ -1,0 +1,140 @@
+"""Labels, calls, repeats, Q parameters and FN functions of a conversational program."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from planner.nc.language.heidenhain.moves import ONE, ZERO
+from planner.nc.language.heidenhain.text import PARAMETERS, Block, Formula, of, own, parameter, plus, value
+from planner.nc.language.tree import (
+    Call,
+    Expression,
+    Goto,
+    If,
+    Label,
+    Line,
+    Number,
+    Parameter,
+    Statement,
+)
+
+_LABEL = re.compile(r'\s*(?:(\d+)|"([^"]*)")')
+_REPEAT = re.compile(r"\s*REP\s*(\d+)", re.IGNORECASE)
+_IF = re.compile(r"\s*IF\s", re.IGNORECASE)
+_THEN = re.compile(r"\s*GOTO\s+LBL\s*", re.IGNORECASE)
+_COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
+_FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
+_FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
+_FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}
+_NAMED = 100_000  # number of the first label with a name
+
+
+class Flow:
+    """What the blocks of a program say about their order.
+
+    blocks  : of the program
+    names   : numbers of labels that have names
+    known   : label to its block
+    called  : labels that are called as subprograms
+    repeats : how many sections are repeated
+    """
+
+    def __init__(self) -> None:
+        self.blocks: Sequence[Block] = ()
+        self.names: dict[str, int] = {}
+        self.known: dict[int, int] = {}
+        self.called: set[int] = set()
+        self.repeats = 0
+
+    def _label(self, block: Block, column: int) -> tuple[int, int]:
+        found = _LABEL.match(block.text, column)
+        if found is None:
+            raise block.fault('a label is a number or a name: LBL 5, LBL "holes"', column)
+        if found.group(1):
+            return int(found.group(1)), found.end()
+        return self.names.setdefault(found.group(2), _NAMED + len(self.names)), found.end()
+
+    def _label_here(self, block: Block, column: int) -> list[Statement]:
+        label, _ = self._label(block, column)
+        if label == 0:
+            return []
+        if self.blocks[self.known[label]] is not block:
+            raise block.fault(f"label {block.text[column:].strip()} is set twice")
+        return [Label(block.place, label)]
+
+    def _call(self, block: Block, column: int) -> list[Statement]:
+        label, column = self._label(block, column)
+        if label not in self.known:
+            raise block.fault(f"there is no LBL {block.text[8:].split('REP')[0].strip()} to call")
+        repeat = _REPEAT.match(block.text, column)
+        if repeat is None:
+            self.called.add(label)
+            return [Call(block.place, procedure_name(label), None, block.text)]
+        counter = own(f"rep{self.repeats}")
+        self.repeats += 1
+        again: list[Statement] = [
+            Line(block.place, (), ((counter, plus(counter, ONE)),)),
+            Goto(block.place, Number(float(label))),
+        ]
+        end: list[Statement] = [Line(block.place, (), ((counter, ZERO),))]
+        return [If(block.place, ((of("LT", counter, Number(float(repeat.group(1)))), again),), end)]
+
+    def _parameter(self, block: Block, column: int) -> list[Statement]:
+        found = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
+        if found is None:
+            raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
+        return [
+            Line(
+                block.place, (), ((self._q(block, int(found.group(1))), Formula(block, found.end()).read()),)
+            )
+        ]
+
+    def _q(self, block: Block, number: int) -> Parameter:
+        if number >= PARAMETERS:
+            raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}")
+        return parameter(number)
+
+    def _fn(self, block: Block, column: int) -> list[Statement]:
+        found = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
+        number = int(found.group(1)) if found else -1
+        column += found.end() if found else 0
+        if number in _FN_IF:
+            return self._jump(block, column, number)
+        target_of = re.match(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE)
+        if target_of is None or number not in {**_FN_ONE, **_FN_TWO}:
+            raise block.fault(f"FN {number if found else ''} is not read; read are FN 0 to 13", column)
+        q, column = self._q(block, int(target_of.group(1))), column + target_of.end()
+        if number in _FN_ONE:
+            word_of = re.match(r"(?:SQRT|SIN|COS)\s*", block.text[column:], re.IGNORECASE)
+            given, column = value(block, column + (word_of.end() if word_of else 0))
+            operation: Expression = of(_FN_ONE[number], given) if _FN_ONE[number] else given
+        else:
+            left, column = value(block, column)
+            sign = re.match(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
+            if sign is None:
+                raise block.fault("+, -, *, DIV, LEN or ANG and a second value are expected", column)
+            right, column = value(block, column + sign.end())
+            operation = of(_FN_TWO[number], left, right)
+        if block.text[column:].strip():
+            raise block.fault("nothing may follow here", column)
+        return [Line(block.place, (), ((q, operation),))]
+
+    def _jump(self, block: Block, column: int, number: int) -> list[Statement]:
+        start = _IF.match(block.text, column)
+        left, column = value(block, start.end() if start else column)
+        compare = re.match(r"\s*(EQU|NE|GT|LT)\b", block.text[column:], re.IGNORECASE)
+        if compare is None or compare.group(1).upper() != _FN_IF[number]:
+            raise block.fault(f"FN {number} compares with {_FN_IF[number]}", column)
+        right, column = value(block, column + compare.end())
+        then = _THEN.match(block.text, column)
+        if then is None:
+            raise block.fault("GOTO LBL is expected here", column)
+        label, _ = self._label(block, then.end())
+        then_go: list[Statement] = [Goto(block.place, Number(float(label)))]
+        return [If(block.place, ((of(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
+
+
+def procedure_name(label: int) -> str:
+    """The name of a label's subprogram."""
+    return f"LBL {label}"

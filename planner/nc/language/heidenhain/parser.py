@@ -1,0 +1,408 @@
+"""A conversational program as statements.
+
+    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP RND CHF    LBL, CALL LBL [REP]    Q1 = formula, FN 0-14
+    CYCL DEF 200 201 203 240 7 (datum shift) 9 (dwell) 32 (tolerance)    CYCL CALL [POS], M99    STOP, M codes
+
+LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
+LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.
+
+Refused with their block: radius compensation, PLANE and M128 (tilted axes), tapping, milling and measuring cycles, M89, polar
+coordinates without a pole, texts and QS parameters.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from planner.base.units import MM_PER_INCH
+from planner.nc.language.heidenhain import drilling
+from planner.nc.language.heidenhain.flow import Flow, procedure_name
+from planner.nc.language.heidenhain.moves import (
+    CORNER,
+    POLAR,
+    POLE,
+    ZERO,
+    Items,
+    Moves,
+    X,
+    Y,
+    Z,
+    items,
+    refuse_arc_axes,
+    target,
+    word,
+)
+from planner.nc.language.heidenhain.text import Block, blocks, of, own, plus, value
+from planner.nc.language.source import Source
+from planner.nc.language.tree import (
+    Expression,
+    If,
+    Line,
+    Message,
+    Number,
+    Parameter,
+    Place,
+    Procedure,
+    ProgramFault,
+    Return,
+    Statement,
+)
+
+_FUNCTION = re.compile(
+    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCL DEF|CYCL CALL|LBL|FN|STOP|PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
+    r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
+    re.IGNORECASE,
+)
+_TILTED = (128, 129, 144)
+_AT_END = (2, 30)
+
+
+class Parser(Flow):
+    """Statements of a conversational program. Faults of all its blocks are kept in `faults`."""
+
+    def __init__(self, source: Source):
+        super().__init__()
+        self.source = source
+        self.faults: list[ProgramFault] = []
+        self.moves = Moves(1.0)
+        self.unit = 1.0
+        self.cycles: set[int] = set()  # that the program defines
+        self.skip = False  # the block was read with the one before
+
+    def parse(self) -> list[Procedure]:
+        """The main program under the empty name, and the subprograms that are called, under their labels."""
+        self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
+        self._find_labels()
+        start = Place(self.source.file, 1, self.source.begin)
+        main = self._body(0, len(self.blocks))
+        procedures = []
+        done: set[int] = set()
+        while todo := self.called - done:
+            for label in sorted(todo):
+                done.add(label)
+                if label in self.known:
+                    first = self.known[label]
+                    procedures.append(
+                        Procedure(
+                            procedure_name(label),
+                            self.blocks[first].place,
+                            self._body(first, self._end_of(first), True),
+                        )
+                    )
+        set_up: list[tuple[Parameter, Expression]] = [
+            (one, ZERO) for one in (X, Y, Z, *POLE, *POLAR, *CORNER)
+        ]
+        set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")] + [
+            (own(f"rep{k}"), ZERO) for k in range(self.repeats)
+        ]
+        return [Procedure("", start, [Line(start, (), tuple(set_up)), *main]), *procedures]
+
+    # --- labels -----------------------------------------------------------------------------------------------------------------
+
+    def _find_labels(self) -> None:
+        for k, block in enumerate(self.blocks):
+            if not block.text.upper().startswith("LBL"):
+                if number := re.match(r"CYCL DEF\s+(\d+)", block.text, re.IGNORECASE):
+                    self.cycles.add(int(number.group(1)))
+                continue
+            try:
+                label, _ = self._label(block, 3)
+            except ProgramFault:
+                continue
+            if label:
+                self.known.setdefault(label, k)
+
+    def _end_of(self, first: int) -> int:
+        """The block after the LBL 0 that ends a subprogram."""
+        for k in range(first + 1, len(self.blocks)):
+            if re.match(r"LBL\s*0\b", self.blocks[k].text, re.IGNORECASE):
+                return k
+        return len(self.blocks)
+
+    # --- blocks -----------------------------------------------------------------------------------------------------------------
+
+    def _body(self, first: int, last: int, called: bool = False) -> list[Statement]:
+        """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known already."""
+        body: list[Statement] = []
+        faults = len(self.faults)
+        self.skip = False
+        for k in range(first, last):
+            if self.skip:
+                self.skip = False
+                continue
+            try:
+                body += self._block(k, last)
+            except ProgramFault as fault:
+                self.faults.append(fault)
+        if called:
+            del self.faults[faults:]
+            body.append(Return(self.blocks[last - 1].place))
+        return body
+
+    def _block(self, k: int, last: int) -> list[Statement]:
+        block = self.blocks[k]
+        found = _FUNCTION.match(block.text)
+        name = " ".join(found.group().upper().split()) if found else ""
+        read = _READ.get(name)
+        if found is None or read is None:
+            raise block.fault(
+                f"{name or block.text[:20]} of the conversational language is not read; {_REMEDY}"
+            )
+        if name in ("L", "LP"):
+            return self._straight(k, last, found.end(), name)
+        return read(self, block, found.end())
+
+    def _nothing(self, block: Block, column: int) -> list[Statement]:
+        return []
+
+    def _begin(self, block: Block, column: int) -> list[Statement]:
+        inch = block.text.upper().split()[-1] == "INCH"
+        self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
+        at = block.place.at
+        codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
+        return [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+
+    def _end(self, block: Block, column: int) -> list[Statement]:
+        return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
+
+    def _tool(self, block: Block, column: int) -> list[Statement]:
+        found = re.match(
+            r"\s*(?:(\d+)(?:\.\d+)?|\"[^\"]*\")?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?((?:\s*(?:D[LR]2?|D[LR])[-+=\d.]+)*)\s*$",
+            block.text[column:],
+            re.IGNORECASE,
+        )
+        if found is None:
+            raise block.fault('TOOL CALL takes a number or "name", the axis Z, S and F', column)
+        tool, axis, _, feed, more = found.groups()
+        if axis and axis.upper() != "Z":
+            raise block.fault(f"tool axis {axis.upper()}; Z is planned", column + found.start(2))
+        if more and more.strip():
+            raise block.fault(
+                "DL and DR of a tool call are not read; correct the tool's length in the machine file",
+                column + found.start(5),
+            )
+        at = block.place.at
+        words = [word("T", at, Number(float(tool or 0))), word("M", at, Number(6.0))]
+        length = [word("G", at, Number(43.0)), word("H", at, Number(float(tool or 0)))]
+        rows: list[Statement] = (
+            [Line(block.place, tuple(words)), Line(block.place, tuple(length))] if tool else []
+        )
+        if found.group(3):
+            speed, _ = value(block, column + found.start(3))
+            rows.append(Line(block.place, (word("S", at, speed),)))
+        self.moves.automatic = None
+        if feed and feed.upper() != "MAX":
+            self.moves.automatic, _ = value(block, column + found.start(4))
+            rows.append(Line(block.place, (word("F", at, self.moves.scaled(self.moves.automatic)),)))
+        return rows
+
+    # --- moves ------------------------------------------------------------------------------------------------------------------
+
+    def _ends(self, block: Block, given: Items) -> dict[str, Expression]:
+        if given.polar:
+            raise block.fault("polar coordinates belong to LP and CP")
+        return {axis: target(axis, found) for axis, found in given.axes.items()}
+
+    def _straight(self, k: int, last: int, column: int, name: str) -> list[Statement]:
+        block = self.blocks[k]
+        given = items(block, column)
+        before, after, machine = self._codes(block, given)
+        lines: list[Statement] = list(before)
+        if name == "LP":
+            found, ends = self.moves.polar_ends(block, given)
+            lines += found
+        else:
+            ends = self._ends(block, given)
+        corner = self._corner(k + 1, last) if name == "L" and not machine else None
+        if corner is not None:
+            lines += self.moves.cut_corner(block, given, ends, corner, self._after(k + 2, last, corner[0]))
+            self.skip = True
+        else:
+            lines += self.moves.straight(block, given, ends, machine)
+        return [*lines, *after]
+
+    def _corner(self, k: int, last: int) -> tuple[Block, Expression, bool] | None:
+        """RND or CHF in block k, with its number."""
+        if k >= last:
+            return None
+        block = self.blocks[k]
+        found = re.match(r"(RND|CHF)\b", block.text, re.IGNORECASE)
+        if found is None:
+            return None
+        rounded = found.group().upper() == "RND"
+        column = found.end()
+        if rounded and (radius := re.match(r"\s*R(?=\s*[-+.\dQ])", block.text[column:], re.IGNORECASE)):
+            column += radius.end()
+        number, column = value(block, column)
+        if block.text[column:].strip():
+            raise block.fault(
+                "nothing may follow the number of RND and CHF; write the feed into the next block", column
+            )
+        return block, number, rounded
+
+    def _after(self, k: int, last: int, corner: Block) -> dict[str, Expression]:
+        """Where the straight move behind a corner leads."""
+        block = self.blocks[k] if k < last else corner
+        found = _FUNCTION.match(block.text)
+        if found is None or found.group().upper() != "L":
+            raise corner.fault("RND and CHF stand between two straight moves (L); write other corners out")
+        given = items(block, found.end())
+        place = {"X": CORNER[0], "Y": CORNER[1], "Z": Z}
+        return {
+            axis: plus(place[axis], end) if relative else end for axis, (end, relative) in given.axes.items()
+        }
+
+    def _lonely_corner(self, block: Block, column: int) -> list[Statement]:
+        raise block.fault("RND and CHF stand between two straight moves (L); write other corners out")
+
+    def _arc(self, block: Block, column: int) -> list[Statement]:
+        name = block.text[:column].upper()
+        given = items(block, column)
+        before, after, _ = self._codes(block, given)
+        if name == "CP":
+            return [*before, *self.moves.polar_arc(block, given), *after]
+        refuse_arc_axes(block, given)
+        how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
+        return [*before, *how(block, given, self._ends(block, given)), *after]
+
+    def _pole(self, block: Block, column: int) -> list[Statement]:
+        given = items(block, column)
+        ends = self._ends(block, given) if given.axes else {"X": X, "Y": Y}
+        named: list[tuple[Parameter, Expression]] = [
+            (POLE["XY".index(axis)], end) for axis, end in ends.items() if axis in "XY"
+        ]
+        return [Line(block.place, (), tuple(named))]
+
+    def _codes(self, block: Block, given: Items) -> tuple[list[Statement], list[Statement], bool]:
+        """What the M codes of a block do before its move and after it, and whether it goes in machine coordinates."""
+        before: list[Statement] = []
+        after: list[Statement] = []
+        machine = False
+        for code, column in given.codes:
+            row = Line(block.place, (word("M", block.byte(column), Number(float(code))),))
+            if code == 99:
+                after += self._call_cycle(block)
+            elif code == 91:
+                machine = True
+            elif code in (13, 14):
+                spindle = Number(3.0 if code == 13 else 4.0)
+                before.append(
+                    Line(
+                        block.place,
+                        (word("M", block.byte(column), spindle), word("M", block.byte(column), Number(8.0))),
+                    )
+                )
+            elif code in (89, 92, *_TILTED):
+                raise block.fault(f"M{code} is not read: it changes how the axes move; {_REMEDY}", column)
+            elif code in (0, 1, 5, 9, *_AT_END):
+                after.append(row)
+            else:
+                before.append(row)
+        return before, after, machine
+
+    def _code(self, block: Block, column: int) -> list[Statement]:
+        before, after, _ = self._codes(block, items(block, 0))
+        return [*before, *after]
+
+    def _stop(self, block: Block, column: int) -> list[Statement]:
+        given = items(block, column)
+        before, after, _ = self._codes(block, given)
+        return [*before, Line(block.place, (word("M", block.place.at, ZERO),)), *after]
+
+    # --- cycles -----------------------------------------------------------------------------------------------------------------
+
+    def _define(self, block: Block, column: int) -> list[Statement]:
+        found = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
+        if found is None:
+            raise block.fault("CYCL DEF needs the number of a cycle", column)
+        cycle, part, column = int(found.group(1)), found.group(2), column + found.end()
+        if part is not None:
+            return self._old_cycle(block, cycle, int(part), column)
+        if cycle not in drilling.CYCLES:
+            raise block.fault(
+                f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}",
+                column,
+            )
+        given: list[tuple[Parameter, Expression]] = []
+        for entry in re.finditer(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE):
+            number, _ = value(block, column + entry.end())
+            if int(entry.group(1)) == 212 and isinstance(number, Number) and number.value != 0.0:
+                raise block.fault("Q212, a decrement of the infeed, is not read", column + entry.start())
+            given.append((self._q(block, int(entry.group(1))), number))
+        return [Line(block.place, (), (*given, (own("cycle"), Number(float(cycle)))))]
+
+    def _old_cycle(self, block: Block, cycle: int, part: int, column: int) -> list[Statement]:
+        at = block.place.at
+        if cycle in (7, 9, 32) and part == 0:
+            return []
+        if cycle == 32:
+            found = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
+            if found is None:
+                return []  # 32.2: filter and rotary axes
+            tolerance, _ = value(block, column + found.end())
+            return [Line(block.place, (word("G", at, Number(64.0)), word("P", at, tolerance)))]
+        if cycle == 9:
+            found = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
+            seconds, _ = value(block, column + (found.end() if found else 0))
+            return [Line(block.place, (word("G", at, Number(4.0)), word("P", at, seconds)))]
+        if cycle == 7:
+            given = items(block, column)
+            words = [word("G", at, Number(52.0))]
+            words += [word(axis, at, end) for axis, (end, relative) in given.axes.items() if not relative]
+            if len(words) == 1 or any(relative for _, relative in given.axes.values()):
+                raise block.fault(
+                    "a datum shift by X, Y or Z is read, not incremental and not from a table", column
+                )
+            return [Line(block.place, tuple(words))]
+        raise block.fault(
+            f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}", column
+        )
+
+    def _cycle_call(self, block: Block, column: int) -> list[Statement]:
+        rest = re.match(r"\s*POS\b", block.text[column:], re.IGNORECASE)
+        if rest is None:
+            given = items(block, column)
+            before, after, _ = self._codes(block, given)
+            return [*before, *self._call_cycle(block), *after]
+        given = items(block, column + rest.end())
+        before, after, _ = self._codes(block, given)
+        ends = {axis: end for axis, end in self._ends(block, given).items() if axis != "Z"}
+        return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
+
+    def _call_cycle(self, block: Block) -> list[Statement]:
+        known = [cycle for cycle in drilling.CYCLES if cycle in self.cycles]
+        if not known:
+            raise block.fault("there is no drilling cycle to call; write CYCL DEF 200 before")
+        branches = tuple(
+            (
+                of("EQ", own("cycle"), Number(float(cycle))),
+                drilling.drill(block, cycle, self.moves, self.unit),
+            )
+            for cycle in known
+        )
+        nothing: list[Statement] = [
+            Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
+        ]
+        return [If(block.place, branches, nothing)]
+
+
+_REMEDY = "let the CAM system write the moves out as L, C and CC"
+_READ: dict[str, Callable[[Parser, Block, int], list[Statement]]] = {
+    "BEGIN PGM": Parser._begin,
+    "END PGM": Parser._end,
+    **dict.fromkeys(("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), Parser._nothing),
+    "TOOL CALL": Parser._tool,
+    **dict.fromkeys(("L", "LP"), Parser._nothing),
+    **dict.fromkeys(("C", "CR", "CT", "CP"), Parser._arc),
+    "CC": Parser._pole,
+    **dict.fromkeys(("RND", "CHF"), Parser._lonely_corner),
+    "LBL": Parser._label_here,
+    "CALL LBL": Parser._call,
+    "Q": Parser._parameter,
+    "FN": Parser._fn,
+    "CYCL DEF": Parser._define,
+    "CYCL CALL": Parser._cycle_call,
+    "STOP": Parser._stop,
+    "M": Parser._code,
+}

@@ -1,0 +1,438 @@
+"""LinuxCNC's language (RS274NGC with O words) as statements.
+
+    o100 sub ... o100 endsub [value]      o100 call [a] [b] ...      o100 return [value]
+    o101 if [c] / elseif [c] / else / endif      o102 while [c] ... endwhile      o103 do ... while [c]
+    o104 repeat [n] ... endrepeat         o104 break, continue
+    O100 ... M99 and M98 P100 L3: subprograms as other controls write them
+
+A label is a number, a <name>, or an expression where it calls. A call runs the subprogram of that name in the program, else that of the
+file name.ngc in the program's folder. Parameters 1 to 30 are a call's own: its arguments, then zeros; so are named parameters that do
+not begin with an underscore. M98 shares its caller's.
+
+What LinuxCNC refuses and this reader takes: a subprogram that stands after its call, break and continue in repeat loops.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from planner.nc.language.asked import LinuxcncAsked
+from planner.nc.language.source import Source, SourceLine
+from planner.nc.language.spelling import NEGATIVE, LineReader, Spelling, Unspelled
+from planner.nc.language.tree import (
+    Break,
+    Call,
+    Continue,
+    Expression,
+    If,
+    Language,
+    Line,
+    Loop,
+    Message,
+    Modes,
+    Named,
+    Number,
+    Numbered,
+    Place,
+    PlainRows,
+    Procedure,
+    ProgramFault,
+    Return,
+    Statement,
+)
+
+ARGUMENTS_MAX = 30
+CONTROL_NESTED_MAX = 100  # loops and branches in each other
+EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
+_MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
+_FUNCTIONS = (
+    "ABS",
+    "ACOS",
+    "ASIN",
+    "ATAN",
+    "COS",
+    "EXISTS",
+    "EXP",
+    "FIX",
+    "FUP",
+    "LN",
+    "ROUND",
+    "SIN",
+    "SQRT",
+    "TAN",
+)
+_RANKS = {
+    "**": 5,
+    **dict.fromkeys(("*", "/", "MOD"), 4),
+    **dict.fromkeys(("+", "-"), 3),
+    **dict.fromkeys(("EQ", "NE", "GT", "GE", "LT", "LE"), 2),
+    **dict.fromkeys(("AND", "OR", "XOR"), 1),
+}
+SPELLING = Spelling(functions=frozenset(_FUNCTIONS), ranks=_RANKS)
+
+
+def modulo(a: float, b: float) -> float:
+    """a MOD b, never negative. Raises ZeroDivisionError."""
+    if b == 0.0:
+        raise ZeroDivisionError
+    rest = math.fmod(a, b)
+    return rest + abs(b) if rest < 0.0 else rest
+
+
+def nearest(x: float) -> float:
+    """ROUND: halves go away from zero."""
+    return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
+
+
+DEGREES: dict[str, Callable[..., object]] = {
+    "sin": lambda x: math.sin(math.radians(x)),
+    "cos": lambda x: math.cos(math.radians(x)),
+    "tan": lambda x: math.tan(math.radians(x)),
+    "asin": lambda x: math.degrees(math.asin(x)),
+    "acos": lambda x: math.degrees(math.acos(x)),
+    "atan": lambda x: math.degrees(math.atan(x)),
+    "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
+}
+ARITHMETIC: dict[tuple[str, int], str] = {
+    (NEGATIVE, 1): "(-{0})",
+    ("+", 2): "({0}+{1})",
+    ("-", 2): "({0}-{1})",
+    ("*", 2): "({0}*{1})",
+    ("/", 2): "({0}/{1})",
+    ("GT", 2): "({0}>{1})",
+    ("GE", 2): "({0}>={1})",
+    ("LT", 2): "({0}<{1})",
+    ("LE", 2): "({0}<={1})",
+    ("ABS", 1): "abs({0})",
+    ("EXP", 1): "exp({0})",
+    ("LN", 1): "log({0})",
+    ("SQRT", 1): "sqrt({0})",
+    **{(name.upper(), 1): f"{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
+}
+LANGUAGE = Language(
+    name="linuxcnc",
+    operations=ARITHMETIC
+    | {
+        ("**", 2): "power({0},{1})",
+        ("MOD", 2): "modulo({0},{1})",
+        ("EQ", 2): f"(abs({{0}}-{{1}})<{EQUAL!r})",
+        ("NE", 2): f"(abs({{0}}-{{1}})>={EQUAL!r})",
+        ("AND", 2): "({0}!=0 and {1}!=0)",
+        ("OR", 2): "({0}!=0 or {1}!=0)",
+        ("XOR", 2): "(({0}!=0)!=({1}!=0))",
+        ("ATAN", 2): "atan2({0},{1})",
+        ("FIX", 1): "float(floor({0}))",
+        ("FUP", 1): "float(ceil({0}))",
+        ("ROUND", 1): "nearest({0})",
+    },
+    conditions=frozenset(("EQ", "NE", "GT", "GE", "LT", "LE", "AND", "OR", "XOR")),
+    functions=DEGREES
+    | {
+        "exp": math.exp, "log": math.log, "sqrt": math.sqrt, "power": math.pow, "floor": math.floor, "ceil": math.ceil,
+        "modulo": modulo, "nearest": nearest,
+    },
+    locals=ARGUMENTS_MAX,
+    largest=5601,
+    vacant=0.0,
+    asked=LinuxcncAsked.numbers,
+    asked_names=LinuxcncAsked.names,
+)  # fmt: skip
+
+
+@dataclass
+class _Open:
+    """A control statement whose end has not come: its body so far, and for `if` its branches."""
+
+    kind: str
+    label: str
+    place: Place
+    condition: Expression | None
+    body: list[Statement]
+    branches: list[tuple[Expression, list[Statement]]]
+
+
+_ENDS = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
+_KEYWORDS = frozenset(
+    ("sub", "call", "return", "if", "elseif", "else", "while", "do", "repeat", "break", "continue", *_ENDS)
+)
+_PROGRAM = ""
+
+
+class Parser:
+    """Statements of one file. Faults of all its lines are kept in `faults`."""
+
+    def __init__(self, source: Source):
+        self.source = source
+        self.procedures: dict[str, Procedure] = {}
+        self.faults: list[ProgramFault] = []
+        self.main: list[Statement] = []
+        self.open: list[_Open] = []
+        self.base = self.body = self.main
+        self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
+        self.ended = False  # the main program has ended; subprograms may follow
+
+    def parse(self) -> list[Procedure]:
+        """All procedures of the file; the main program first, under the empty name."""
+        for item in self.source.in_order():
+            if isinstance(item, PlainRows):
+                self._plain(item)
+                continue
+            try:
+                self._line(item)
+            except Unspelled as fault:
+                place = item.place._replace(at=item.start + fault.column)
+                self.faults.append(ProgramFault(place, fault.message))
+            except ProgramFault as fault:
+                self.faults.append(fault)
+        for left in self.open[:1] if not self.faults else ():
+            self.faults.append(
+                ProgramFault(
+                    left.place, f"this {left.kind} has no end; write o{left.label} {_end_of(left.kind)}"
+                )
+            )
+        return [Procedure(_PROGRAM, Place(self.source.file, 1, 0), self.main), *self.procedures.values()]
+
+    def _plain(self, rows: PlainRows) -> None:
+        in_main = self.body is self.main
+        if not (in_main and self.ended):
+            self.body.append(rows)
+        self.ended |= in_main and rows.may_end and self.source.has_end(rows)
+
+    def _line(self, line: SourceLine) -> None:
+        reader = LineReader(line.text, line.start, SPELLING, line.place.line)
+        reader.take("/")
+        if reader.peek() in "oO" and not reader.ended:
+            self._o_word(reader, line)
+        elif self.ended and self.body is self.main:
+            return
+        elif line.row >= 0 and not self._code(reader, line):
+            words, assignments = reader.words_and_assignments(line.scale)
+            for word in words:
+                if word.letter == ord("N") and not isinstance(word.value, Number):
+                    raise ProgramFault(line.place._replace(at=word.at), "a line number is written in digits")
+            if words or assignments:
+                self.body.append(Line(line.place, words, assignments))
+        self._messages(reader, line)
+
+    def _messages(self, reader: LineReader, line: SourceLine) -> None:
+        for comment in reader.comments:
+            kind, comma, text = comment.partition(",")
+            if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
+                expanded = kind.strip().upper() != "MSG"
+                self.body.append(Message(line.place, _pieces(text) if expanded else (text,)))
+
+    # --- codes that are control flow ------------------------------------------------------------------------------------------
+
+    def _code(self, reader: LineReader, line: SourceLine) -> bool:
+        """M70 to M73, M98 and M99 as statements; False if the line has none of them."""
+        found = _FLOW.match(reader.text, reader.at)
+        if found is None:
+            return False
+        code = int(found.group(1))
+        reader.at = found.end()
+        if code in _MODES:
+            self._nothing_left(reader, f"M{code}")
+            self.body.append(Modes(line.place, _MODES[code]))
+        elif code == 98:
+            words, _ = reader.words_and_assignments()
+            given = {chr(word.letter): word.value for word in words}
+            if "P" not in given or set(given) - {"P", "L"}:
+                raise ProgramFault(
+                    line.place, "M98 takes P with the number of a subprogram, and L with its repetitions"
+                )
+            name = _constant_name(given["P"])
+            self.body.append(Call(line.place, name, None, "M98", given.get("L", Number(1.0))))
+        else:
+            self._nothing_left(reader, "M99")
+            if not self.plain_sub:
+                raise ProgramFault(line.place, "M99 ends a subprogram; the main program ends with M2 or M30")
+            self.body.append(Return(line.place))
+            if not self.open:
+                self.base = self.body = self.main
+                self.plain_sub = ""
+        return True
+
+    # --- O words ----------------------------------------------------------------------------------------------------------------
+
+    def _o_word(self, reader: LineReader, line: SourceLine) -> None:
+        reader.at += 1
+        label = self._label(reader)
+        at = reader.at
+        keyword = reader.keyword()
+        if not keyword and reader.ended and isinstance(label, str):
+            self._plain_program(label, line)
+            return
+        if keyword not in _KEYWORDS:
+            raise reader.refused(at, f"after an O word one of {', '.join(sorted(_KEYWORDS))} is expected")
+        if keyword == "call":
+            self._call(reader, line, label)
+        elif not isinstance(label, str):
+            raise ProgramFault(line.place, "only a call may compute its O word; write a number or a <name>")
+        else:
+            condition = reader.bracket() if reader.peek() == "[" else None
+            self._control(keyword, label, condition, line)
+        self._nothing_left(reader, f"o... {keyword}")
+
+    def _label(self, reader: LineReader) -> str | Expression:
+        if reader.peek() == "<":
+            return reader.name()
+        value = reader.value()
+        return _constant_name(value) if isinstance(value, Number) else value
+
+    def _plain_program(self, label: str, line: SourceLine) -> None:
+        """O100 alone: a program number, or a subprogram if an M99 follows before the next one."""
+        if self.open:
+            raise ProgramFault(
+                line.place, f"O{label} stands inside {self.open[-1].kind}; write its end before it"
+            )
+        if self._returns(line):
+            self.plain_sub, self.base = label, []
+            self._add(label, line.place, self.base)
+        else:
+            self.plain_sub, self.base = "", self.main
+        self.body = self.base
+
+    def _returns(self, line: SourceLine) -> bool:
+        found = _NEXT_PROGRAM.search(self.source.words.data, line.start - self.source.begin + len(line.text))
+        return found is not None and found.group(1) is not None
+
+    def _add(self, label: str, place: Place, body: list[Statement]) -> None:
+        if label in self.procedures:
+            first = self.procedures[label].place.line
+            raise ProgramFault(place, f"a second subprogram o{label}; the first is on line {first}")
+        self.procedures[label] = Procedure(label, place, body)
+
+    def _call(self, reader: LineReader, line: SourceLine, label: str | Expression) -> None:
+        arguments: list[Expression] = []
+        while reader.peek() == "[":
+            arguments.append(reader.bracket())
+        if len(arguments) > ARGUMENTS_MAX:
+            raise ProgramFault(line.place, f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
+        word = f"o<{label}> call" if isinstance(label, str) and not label.isdigit() else "o call"
+        if isinstance(label, str) and label.isdigit():
+            word = f"o{label} call"
+        self.body.append(Call(line.place, label, tuple(enumerate(arguments, 1)), word))
+
+    def _control(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
+        top = self.open[-1] if self.open else None
+        if keyword == "while" and top is not None and top.kind == "do" and top.label == label:
+            self._close(top)
+            self.body.append(Loop(top.place, "do", label, _needed(condition, keyword, line), top.body))
+        elif keyword in ("sub", "if", "while", "do", "repeat"):
+            self._begin(keyword, label, condition, line)
+        elif keyword in ("elseif", "else"):
+            self._another_branch(keyword, label, condition, line)
+        elif keyword in _ENDS:
+            self._end(keyword, label, condition, line)
+        elif keyword == "return":
+            if not any(o.kind == "sub" for o in self.open):
+                raise ProgramFault(line.place, "return stands in a subprogram only")
+            self.body.append(Return(line.place, condition))
+        else:
+            if not any(o.kind in ("while", "do", "repeat") and o.label == label for o in self.open):
+                raise ProgramFault(line.place, f"there is no loop o{label} around this {keyword}")
+            self.body.append((Break if keyword == "break" else Continue)(line.place, label))
+
+    def _begin(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
+        if keyword == "sub" and self.open:
+            raise ProgramFault(
+                line.place, f"a subprogram begins inside {self.open[-1].kind}; write its end before it"
+            )
+        if len(self.open) >= CONTROL_NESTED_MAX:
+            raise ProgramFault(line.place, f"more than {CONTROL_NESTED_MAX} loops and branches in each other")
+        if keyword not in ("sub", "do"):
+            _needed(condition, keyword, line)
+        body: list[Statement] = []
+        self.open.append(_Open(keyword, label, line.place, condition, body, []))
+        if keyword == "sub":
+            self._add(label, line.place, body)
+        self.body = body
+
+    def _another_branch(
+        self, keyword: str, label: str, condition: Expression | None, line: SourceLine
+    ) -> None:
+        top = self._innermost("if", keyword, label, line)
+        if top.condition is None:
+            raise ProgramFault(line.place, f"{keyword} after else; else comes last")
+        top.branches.append((top.condition, top.body))
+        top.condition = _needed(condition, keyword, line) if keyword == "elseif" else None
+        top.body = self.body = []
+
+    def _end(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
+        kind = _ENDS[keyword]
+        top = self._innermost(kind, keyword, label, line)
+        self._close(top)
+        if kind == "sub":
+            if condition is not None:
+                top.body.append(Return(line.place, condition))
+        elif kind == "if":
+            if top.condition is not None:
+                top.branches.append((top.condition, top.body))
+            self.body.append(
+                If(top.place, tuple(top.branches), [] if top.condition is not None else top.body)
+            )
+        else:
+            assert top.condition is not None
+            self.body.append(Loop(top.place, kind, label, top.condition, top.body))
+
+    def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> _Open:
+        if not self.open or self.open[-1].kind != kind or self.open[-1].label != label:
+            last = (
+                f"o{self.open[-1].label} {self.open[-1].kind} on line {self.open[-1].place.line} is open"
+                if self.open
+                else "nothing is open"
+            )
+            raise ProgramFault(line.place, f"o{label} {keyword} has no o{label} {kind} before it: {last}")
+        return self.open[-1]
+
+    def _close(self, top: _Open) -> None:
+        self.open.pop()
+        self.body = self.open[-1].body if self.open else self.base
+
+    def _nothing_left(self, reader: LineReader, after: str) -> None:
+        if not reader.ended:
+            raise reader.refused(reader.at, f"nothing may follow {after} on its line")
+
+
+_FLOW = re.compile(r"[Mm](7[0-3]|9[89])(?![\d.])")
+_NEXT_PROGRAM = re.compile(
+    rb"^[ \t]*(?:(?:N[\d \t]+)?M[ \t]*(99)(?!\d)|O[ \t]*\d+[ \t\r]*(?:\(|;|$))", re.MULTILINE | re.IGNORECASE
+)
+
+
+def _needed(condition: Expression | None, keyword: str, line: SourceLine) -> Expression:
+    if condition is None:
+        raise ProgramFault(line.place, f"{keyword} needs an [expression] after it")
+    return condition
+
+
+def _end_of(kind: str) -> str:
+    return "while [condition]" if kind == "do" else f"end{kind}"
+
+
+def _constant_name(value: Expression) -> str | Expression:
+    if isinstance(value, Number):
+        return f"{value.value:.0f}" if value.value == round(value.value) else f"{value.value:g}"
+    return value
+
+
+_PARAMETER = re.compile(r"#(?:<([^<>]*)>|(\d+))")
+
+
+def _pieces(text: str) -> tuple[str | Named | Numbered, ...]:
+    """The text of a message with its parameters."""
+    pieces: list[str | Named | Numbered] = []
+    done = 0
+    for found in _PARAMETER.finditer(text):
+        pieces.append(text[done : found.start()])
+        done = found.end()
+        if found.group(2):
+            number = float(found.group(2))
+            pieces.append(Numbered(Number(number)) if 1 <= number <= LANGUAGE.largest else found.group())
+        else:
+            name = re.sub(r"\s", "", found.group(1)).lower()
+            pieces.append(Named(name, name.startswith("_")))
+    return (*pieces, text[done:])

@@ -1,0 +1,176 @@
+"""What a running program appends, and how it becomes rows of words for the interpreter.
+
+Appending has to be cheap, since a loop does it a million times: a statement appends its number to `pending` and the values it has
+computed to `values`. Everything else about its rows is constant and stands in tables: letters, places, the numbers that are not
+computed. `take` puts both together, some 100,000 rows at once, with a few numpy operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.nc.lexer import Words
+
+
+@dataclass
+class _Tables:
+    """All rows that can be appended, of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed` words have no
+    value here."""
+
+    letter: Array
+    value: FloatArray
+    at: Array
+    computed: Array
+    line: Array
+    first: Array
+    begin: Array  # first row of each entry
+    end: Array  # one after its last row
+
+
+class Rows:
+    """Rows that were appended and not yet executed.
+
+    pending : entries in their order, by number
+    values  : computed values of their words, in their order
+    frames  : (entries pending when the frame changed, frame), ascending
+    """
+
+    def __init__(self) -> None:
+        self.pending: list[int] = []
+        self.values: list[float | None] = []
+        self.frames: list[tuple[int, int]] = [(0, 0)]
+        self.data = b""
+        self.files: list[tuple[int, str]] = []
+        self._letter: list[Array] = []
+        self._value: list[FloatArray] = []
+        self._at: list[Array] = []
+        self._computed: list[Array] = []
+        self._line: list[Array] = []
+        self._count: list[Array] = []  # words of each row
+        self._rows = 0
+        self._entries: list[tuple[int, int]] = []
+        self._new: list[
+            tuple[int, Sequence[tuple[int, int, float | None]]]
+        ] = []  # rows that are not in arrays yet
+        self._tables: _Tables | None = None
+
+    def add_file(self, words: Words, name: str) -> tuple[int, int]:
+        """Take a file's words into the tables; returns the number of its first row, and where its bytes begin in `data`."""
+        self._settle()
+        begin = len(self.data)
+        if begin:
+            self.files.append((begin, name))
+        self.data += words.data + b"\n"
+        self._append(words.letter, words.value, words.at + begin, words.line, np.diff(words.first))
+        return self._rows - len(words.line), begin
+
+    def add_row(self, line: int, words: Sequence[tuple[int, int, float | None]]) -> int:
+        """Make an entry of one row of (letter code, place, value), with None where the value is computed; returns its number."""
+        self._new.append((line, words))
+        row = self._rows + len(self._new) - 1
+        return self.add_entry(row, row + 1)
+
+    def add_entry(self, first: int, last: int) -> int:
+        """Make an entry of the rows `first` to `last` - 1 of the tables; returns its number."""
+        self._entries.append((first, last))
+        self._tables = None
+        return len(self._entries) - 1
+
+    def enter(self, frame: int) -> None:
+        """Rows appended from now on stand in this call."""
+        if self.frames[-1][0] == len(self.pending):
+            self.frames[-1] = (len(self.pending), frame)
+        else:
+            self.frames.append((len(self.pending), frame))
+
+    def take(self) -> Words:
+        """All pending rows as words, which are then no longer pending. A computed value of NaN was vacant: its word is left out.
+
+        Raises NotFinite if a computed value is infinite.
+        """
+        tables = self._tables_now()
+        entries = np.array(self.pending, dtype=np.int64)
+        at_entry, frame = np.array(self.frames, dtype=np.int64).T
+        frame = np.repeat(frame, np.diff(np.append(at_entry, len(entries))))
+        rows, count = _ranges(tables.begin[entries], tables.end[entries])
+        words, length = _ranges(tables.first[rows], tables.first[rows + 1])
+        value, computed = tables.value[words], tables.computed[words]
+        value[computed] = np.array(self.values, dtype=np.float64)
+        letter, at = tables.letter[words], tables.at[words]
+        self.pending.clear()
+        self.values.clear()
+        self.frames[:] = self.frames[-1:]
+        self.frames[0] = (0, self.frames[0][1])
+        infinite = np.flatnonzero(np.isinf(value))
+        if len(infinite):
+            word = int(infinite[0])
+            row = int(np.searchsorted(np.cumsum(length), word, side="right"))
+            raise NotFinite(int(at[word]), int(tables.line[rows[row]]), chr(letter[word]))
+        kept = ~np.isnan(value)
+        if not kept.all():
+            length = np.add.reduceat(np.append(kept, False), np.cumsum(length) - length) * (length > 0)
+            letter, value, at = letter[kept], value[kept], at[kept]
+        return Words(
+            letter=letter,
+            value=value,
+            at=at,
+            line=tables.line[rows].astype(np.int32),
+            first=np.concatenate([[0], np.cumsum(length)]),
+            data=self.data,
+            frame=np.repeat(frame, count).astype(np.int32),
+            files=tuple(self.files),
+        )
+
+    def _append(self, letter: Array, value: FloatArray, at: Array, line: Array, count: Array) -> None:
+        self._letter.append(letter)
+        self._value.append(np.nan_to_num(value))
+        self._at.append(at.astype(np.int64))
+        self._computed.append(np.isnan(value))
+        self._line.append(line)
+        self._count.append(count)
+        self._rows += len(line)
+        self._tables = None
+
+    def _settle(self) -> None:
+        """Put the rows that were added one by one into arrays."""
+        if not self._new:
+            return
+        words = [word for _, row in self._new for word in row]
+        self._append(
+            np.array([word[0] for word in words], dtype=np.uint8),
+            np.array([word[2] for word in words], dtype=np.float64),  # None becomes NaN
+            np.array([word[1] for word in words], dtype=np.int64),
+            np.array([line for line, _ in self._new], dtype=np.int32),
+            np.array([len(row) for _, row in self._new], dtype=np.int64),
+        )
+        self._new.clear()
+
+    def _tables_now(self) -> _Tables:
+        self._settle()
+        if self._tables is None:
+            begin, end = np.array(self._entries, dtype=np.int64).reshape(-1, 2).T
+            count = np.concatenate(self._count)
+            columns = (self._letter, self._value, self._at, self._computed, self._line)
+            letter, value, at, computed, line = (np.concatenate(column) for column in columns)
+            first = np.concatenate([[0], np.cumsum(count)])
+            self._tables = _Tables(letter, value, at, computed, line, first, begin, end)
+        return self._tables
+
+
+class NotFinite(Exception):
+    """A computed word is infinite; where it stands."""
+
+    def __init__(self, at: int, line: int, letter: str):
+        super().__init__(letter)
+        self.at, self.line, self.letter = at, line, letter
+
+
+def _ranges(first: Array, last: Array) -> tuple[Array, Array]:
+    """The numbers first[k] ... last[k] - 1 for all k, one after another, and how many for each k."""
+    count = last - first
+    shift = np.repeat(first - (np.cumsum(count) - count), count)
+    return np.arange(len(shift)) + shift, count

@@ -1,0 +1,306 @@
+"""The running program: its parameters, its calls, its limits, and the errors of its arithmetic as sentences.
+
+Rows go to the interpreter in chunks. A parameter that holds the state of the control (a position, an offset, the tool) is asked of the
+interpreter after everything pending has been executed.
+
+A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, or `ROWS_MAX` rows, or at `DEPTH_MAX` open
+calls, with a sentence that names the line.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from collections.abc import Callable
+from types import TracebackType
+
+from planner.nc.interpreter import Interpreter
+from planner.nc.language.asked import Asked, Modes
+from planner.nc.language.compiled import Compiled, whole
+from planner.nc.language.rows import NotFinite, Rows
+from planner.nc.language.tree import Language, Place, ProgramFault
+from planner.nc.lexer import Words
+from planner.nc.program import Frame
+
+TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: some ten seconds of computing
+ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
+DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
+ROWS_AT_ONCE = 100_000  # rows that are executed together
+FRAMES_MAX = 1_000_000  # different chains of calls
+_MESSAGES_MAX = 1_000  # different messages that are kept
+
+Load = Callable[[str], bool]
+
+
+class Ended(Exception):
+    """The program has come to its end."""
+
+
+class Run:
+    """One run of a compiled program.
+
+    numbered : values of the numbered parameters, by number
+    shared   : values of the named parameters that all calls share
+    resume   : the label where the caller of a procedure goes on, or None
+    """
+
+    def __init__(self, interpreter: Interpreter, rows: Rows, language: Language, asked: Asked):
+        self.interpreter, self.rows, self.language, self.asked = interpreter, rows, language, asked
+        self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
+        if language.vacant is None:
+            self.numbered[0] = None
+        self.shared: dict[str, float] = {}
+        self.turns = 0
+        self.resume: float | None = None
+        self.units: dict[str, Compiled] = {}  # by the marker of their source
+        self.functions: dict[str, Callable[..., float | None]] = {}
+        self.frames = [Frame(name="", source=interpreter.source, line=0, caller=-1)]
+        self.files = [interpreter.source]
+        self.load: Load = lambda name: False
+        self.tee: Callable[[Words], None] = lambda words: None
+        self.calls: Counter[str] = Counter()  # by name
+        self.executed = 0  # rows
+        self._frame = 0
+        self._depth = 0
+        self._known_frames: dict[tuple[int, int, int, str], int] = {}
+        self._saved: list[Modes | None] = [None]
+        self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
+        self._restored_at_return: list[bool] = [False]
+        self._messages = 0
+
+    def start(self, main: str = "") -> ProgramFault | None:
+        """Run the main program to its end; returns what stopped it before."""
+        try:
+            self.functions[main](self, {})
+            self.flush()
+        except Ended:
+            return None
+        except ProgramFault as fault:
+            return self._stopped(fault)
+        except NotFinite as fault:
+            place = Place(self._file_at(fault.at), fault.line, fault.at)
+            return ProgramFault(place, f"the computed {fault.letter} word is infinite")
+        except (ArithmeticError, ValueError, KeyError) as fault:
+            return self._stopped(ProgramFault(self._place(fault.__traceback__), _sentence(fault)))
+        return None
+
+    def add(self, compiled: Compiled, marker: str) -> None:
+        """Take in compiled procedures."""
+        self.units[marker] = compiled
+        for name, function in compiled.functions.items():
+            self.functions.setdefault(name, function)
+
+    # --- what the compiled program calls ------------------------------------------------------------------------------------
+
+    def flush(self) -> None:
+        """Execute what is pending. Raises Ended if the program has ended with it."""
+        if self.rows.pending:
+            words = self.rows.take()
+            self.executed += len(words.line)
+            self.tee(words)
+            self.interpreter.execute(words)
+        if self.interpreter.ended:
+            raise Ended
+
+    def tick(self, turns: int) -> int:
+        """Count turns of a loop and look at the limits; returns 0."""
+        self.turns += turns
+        if self.turns > TURNS_MAX:
+            raise _Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
+        pending = len(self.rows.pending)
+        if pending > ROWS_AT_ONCE:
+            self.flush()
+        if self.executed + pending > ROWS_MAX:
+            raise _Endless(f"{ROWS_MAX:,} lines executed")
+        return 0
+
+    def call(
+        self,
+        place: tuple[int, int, int],
+        word: str,
+        name: str | int,
+        arguments: tuple[tuple[int, float | None], ...] | None,
+        times: float,
+    ) -> None:
+        """Run a procedure; its value, if it has one, is `_value` afterwards."""
+        function = self._function(str(name), word)
+        if self._depth >= DEPTH_MAX:
+            raise _TooDeep(f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time")
+        count, numbered, own = whole(times), self.numbered, self.language.locals
+        caller, self._frame = self._frame, self._frame_of(place, str(name))
+        self._depth += 1
+        self._saved.append(None)
+        self._restored_at_return.append(False)
+        self.rows.enter(self._frame)
+        value = None
+        for _ in range(count):
+            self.turns += 1
+            self.calls[str(name)] += 1
+            if not self.turns & 127 or len(self.rows.pending) > ROWS_AT_ONCE:
+                self.tick(0)
+            if arguments is None:
+                value = function(self, {})
+            else:
+                kept = numbered[1 : own + 1]
+                numbered[1 : own + 1] = [self.language.vacant] * own
+                for number, given in arguments:
+                    numbered[number] = given
+                value = function(self, {})
+                numbered[1 : own + 1] = kept
+            if self._restored_at_return[-1]:
+                self.modes("restore", place)
+        self._saved.pop()
+        self._restored_at_return.pop()
+        self._depth -= 1
+        self._frame = caller
+        self.rows.enter(caller)
+        self.shared["_value"] = 0.0 if value is None else value
+        self.shared["_value_returned"] = 0.0 if value is None else 1.0
+
+    def get(self, index: float) -> float | None:
+        """The value of a parameter whose number is computed."""
+        number = self._number(index)
+        return self.ask(number) if number in self.language.asked else self.numbered[number]
+
+    def put(self, index: float, value: float | None) -> None:
+        """Give a value to a parameter whose number is computed, or that belongs to the control."""
+        number = self._number(index)
+        if number in self.language.asked:
+            self.flush()
+            self.asked.put(number, value)
+        elif number == 0:
+            raise ValueError("parameter #0 cannot be given a value")
+        else:
+            self.numbered[number] = value
+
+    def exists(self, index: float) -> bool:
+        """Whether there is a parameter of that number, with a value."""
+        number = round(index)
+        return 0 < number <= self.language.largest and (
+            number in self.language.asked or self.numbered[number] is not None
+        )
+
+    def ask(self, parameter: int | str) -> float:
+        """A parameter that holds the state of the control, after everything before it."""
+        self.flush()
+        return self.asked.get(parameter, self._depth)
+
+    def message(self, line: int, pieces: tuple[object, ...]) -> None:
+        """Keep a text for the user."""
+        self._messages += 1
+        if self._messages > _MESSAGES_MAX:
+            return
+        text = "".join(
+            piece if isinstance(piece, str) else "######" if piece is None else f"{piece:.6f}"
+            for piece in pieces
+        )
+        self.interpreter.note(f"message: {text.strip()}", line)
+
+    def modes(self, action: str, place: tuple[int, int, int]) -> None:
+        """Save the modal state, forget it, or write the words that restore it."""
+        self.flush()
+        if action == "forget":
+            self._saved[-1] = None
+        elif action in ("save", "save until return"):
+            self._saved[-1] = self.asked.modes()
+            self._restored_at_return[-1] |= action == "save until return"
+        elif self._saved[-1] is not None:
+            for words in self._saved[-1]:
+                row = (place, words)
+                if row not in self._entries:
+                    at_place = [(ord(letter), place[2], value) for letter, value in words]
+                    self._entries[row] = self.rows.add_row(place[1], at_place)
+                self.rows.pending.append(self._entries[row])
+            self.flush()
+        elif not self._restored_at_return[-1]:
+            raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
+
+    def label(self, blocks: dict[int, int], number: float) -> int:
+        """Where a computed jump leads."""
+        if whole(number) not in blocks:
+            raise ValueError(f"there is no block N{number:g} to go to; write its number at its start")
+        return blocks[whole(number)]
+
+    def resumed(self) -> float:
+        """The label where the caller goes on, which is used up."""
+        label, self.resume = self.resume, None
+        assert label is not None
+        return label
+
+    # --- inside -------------------------------------------------------------------------------------------------------------
+
+    def _number(self, index: float) -> int:
+        number = whole(index)
+        if not 0 <= number <= self.language.largest or (number == 0 and self.language.vacant is not None):
+            low = 1 if self.language.vacant is not None else 0
+            raise ValueError(f"parameter #{number} is not one of #{low} to #{self.language.largest}")
+        return number
+
+    def _function(self, name: str, word: str) -> Callable[..., float | None]:
+        if name not in self.functions and (not self.load(name) or name not in self.functions):
+            raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
+        return self.functions[name]
+
+    def _frame_of(self, place: tuple[int, int, int], name: str) -> int:
+        key = (self._frame, place[0], place[1], name)
+        known = self._known_frames.get(key)
+        if known is None:
+            if len(self.frames) >= FRAMES_MAX:
+                raise _Endless(f"{FRAMES_MAX:,} different chains of calls")
+            known = self._known_frames[key] = len(self.frames)
+            file = self.units[self.functions[name].__code__.co_filename].places[0].file
+            self.frames.append(Frame(name=name, source=self.files[file], line=place[1], caller=self._frame))
+        return known
+
+    def _stopped(self, fault: ProgramFault) -> ProgramFault:
+        """What was pending is executed; the message gets the calls that led to the place."""
+        message, frame = fault.message, self._frame
+        while frame > 0:
+            message += f"; called from line {self.frames[frame].line}"
+            if message.count("; called") == 3:
+                message += " ..."
+                break
+            frame = self.frames[frame].caller
+        with contextlib.suppress(Ended, NotFinite):
+            self.flush()
+        return ProgramFault(fault.place, message)
+
+    def _place(self, traceback: TracebackType | None) -> Place:
+        """The statement that a traceback ends in."""
+        place = None
+        while traceback is not None:
+            unit = self.units.get(traceback.tb_frame.f_code.co_filename)
+            if unit is not None:
+                place = unit.places[traceback.tb_lineno - 1]
+            traceback = traceback.tb_next
+        assert place is not None
+        return place
+
+    def _file_at(self, at: int) -> int:
+        return sum(begin <= at for begin, _ in self.rows.files)
+
+
+class _Endless(ValueError):
+    def __init__(self, what: str):
+        super().__init__(
+            f"stopped after {what}: does this loop end? if it does, split the program "
+            "(limits: TURNS_MAX, ROWS_MAX in planner.nc.language.run)"
+        )
+
+
+class _TooDeep(ValueError):
+    pass
+
+
+def _sentence(fault: Exception) -> str:
+    """What a Python error of the compiled program means."""
+    text = str(fault)
+    if isinstance(fault, ZeroDivisionError):
+        return "division by zero"
+    if isinstance(fault, OverflowError):
+        return "the result is too large"
+    if isinstance(fault, KeyError):
+        return f"the named parameter #<{fault.args[0]}> has no value here; assign one before it is read"
+    if text == "math domain error" or text.startswith("expected a"):
+        return "the function or power is not defined for this number"
+    return text

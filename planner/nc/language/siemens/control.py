@@ -1,0 +1,172 @@
+"""Control statements of a Sinumerik program: branches, loops, labels and jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from planner.nc.language.siemens.text import Reader, of, variable
+from planner.nc.language.tree import (
+    Expression,
+    Goto,
+    If,
+    Label,
+    Line,
+    Loop,
+    Number,
+    Parameter,
+    Place,
+    Statement,
+)
+
+ZERO, ONE = Number(0.0), Number(1.0)
+_NESTED_MAX = 100  # loops and branches in each other
+
+
+@dataclass
+class _Open:
+    """A control statement whose end has not come."""
+
+    kind: str
+    place: Place
+    condition: Expression | None
+    body: list[Statement]
+    branches: list[tuple[Expression, list[Statement]]]
+    count: tuple[Parameter, Expression] | None = None  # of FOR: its variable and last value
+
+
+class Control:
+    """The statements so far, and those that are open.
+
+    main, body : statements of the program, and where the next one goes
+    open       : control statements whose end has not come, the outermost first
+    labels     : their numbers in the tree, by name
+    counters   : how many sections are repeated by their labels
+    """
+
+    def __init__(self) -> None:
+        self.main: list[Statement] = []
+        self.body = self.main
+        self.open: list[_Open] = []
+        self.labels: dict[str, int] = {}
+        self.counters = 0
+
+    def _label(self, name: str, place: Place) -> None:
+        self.body.append(Label(place, self._number_of(name)))
+
+    def _number_of(self, label: str) -> int:
+        return self.labels.setdefault(label, len(self.labels) + 1)
+
+    def _begin(self, kind: str, reader: Reader, condition: Expression | None) -> _Open:
+        if len(self.open) >= _NESTED_MAX:
+            raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
+        opened = _Open(kind, reader.place, condition, [], [])
+        self.open.append(opened)
+        self.body = opened.body
+        return opened
+
+    def _close(self, kind: str, reader: Reader) -> _Open:
+        if not self.open or self.open[-1].kind != kind:
+            raise reader.fault(f"there is no {kind} open that this ends", 0)
+        closed = self.open.pop()
+        self.body = self.open[-1].body if self.open else self.main
+        return closed
+
+    def _if(self, reader: Reader) -> None:
+        condition = reader.expression()
+        if reader.peek().startswith("GOTO"):
+            reader.next += 1
+            body: list[Statement] = []
+            self._jump(reader, body)
+            self.body.append(If(reader.place, ((condition, body),), []))
+        else:
+            self._begin("IF", reader, condition)
+
+    def _else(self, reader: Reader) -> None:
+        if not self.open or self.open[-1].kind != "IF" or self.open[-1].condition is None:
+            raise reader.fault("there is no IF open that this belongs to", 0)
+        top = self.open[-1]
+        assert top.condition is not None
+        top.branches.append((top.condition, top.body))
+        top.condition, top.body = None, []
+        self.body = top.body
+
+    def _end_if(self, reader: Reader) -> None:
+        closed = self._close("IF", reader)
+        if closed.condition is not None:
+            self.body.append(If(closed.place, ((closed.condition, closed.body),), []))
+        else:
+            self.body.append(If(closed.place, tuple(closed.branches), closed.body))
+
+    def _while(self, reader: Reader) -> None:
+        self._begin("WHILE", reader, reader.expression())
+
+    def _loop(self, reader: Reader) -> None:
+        self._begin("LOOP", reader, ONE)
+
+    def _end_loop(self, reader: Reader) -> None:
+        kind = {"ENDWHILE": "WHILE", "ENDLOOP": "LOOP"}[reader.peek(-1)]
+        closed = self._close(kind, reader)
+        assert closed.condition is not None
+        self.body.append(
+            Loop(closed.place, "while", f"{kind} {closed.place.at}", closed.condition, closed.body)
+        )
+
+    def _for(self, reader: Reader) -> None:
+        target = reader.parameter(reader.tokens[reader.next]) if not reader.ended else None
+        if target is None:
+            raise reader.fault("FOR needs a variable that is declared")
+        reader.next += 1
+        reader.expect("=")
+        first = reader.expression()
+        reader.expect("TO")
+        last = reader.expression()
+        self.body.append(Line(reader.place, (), ((target, first),)))
+        self._begin("FOR", reader, None).count = (target, last)
+
+    def _end_for(self, reader: Reader) -> None:
+        closed = self._close("FOR", reader)
+        assert closed.count is not None
+        target, last = closed.count
+        closed.body.append(Line(closed.place, (), ((target, of("+", target, ONE)),)))
+        self.body.append(
+            Loop(closed.place, "while", f"FOR {closed.place.at}", of("<=", target, last), closed.body)
+        )
+
+    def _repeat(self, reader: Reader) -> None:
+        """REPEAT ... UNTIL, or REPEAT label P=n: the lines from the label to here, n times more."""
+        if reader.ended:
+            self._begin("REPEAT", reader, None)
+            return
+        label = reader.peek()
+        reader.next += 1
+        if label not in self.labels:
+            raise reader.fault(f"there is no label {label} above this line", 0)
+        times: Expression = ONE
+        if reader.take("P"):
+            reader.expect("=")
+            times = reader.expression()
+        counter = variable(f"_count{self.counters}")
+        self.counters += 1
+        place = reader.place
+        again: list[Statement] = [
+            Line(place, (), ((counter, of("+", counter, ONE)),)),
+            Goto(place, Number(float(self.labels[label]))),
+        ]
+        end: list[Statement] = [Line(place, (), ((counter, ZERO),))]
+        self.body.append(If(place, ((of("<", counter, times), again),), end))
+
+    def _until(self, reader: Reader) -> None:
+        closed = self._close("REPEAT", reader)
+        self.body.append(
+            Loop(closed.place, "do", f"REPEAT {closed.place.at}", of("NOT", reader.expression()), closed.body)
+        )
+
+    def _goto(self, reader: Reader) -> None:
+        self._jump(reader, self.body)
+
+    def _jump(self, reader: Reader, body: list[Statement]) -> None:
+        label = reader.peek()
+        if not label:
+            raise reader.fault("a label is expected here")
+        reader.next += 1
+        body.append(Goto(reader.place, Number(float(self._number_of(label)))))

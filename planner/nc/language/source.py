@@ -1,0 +1,148 @@
+"""The lines of a program: which are plain words, and which belong to the language.
+
+The lexer has split every line into words as far as it goes. A row with what it could not read, or with an O word or a code that calls a
+subprogram, is looked at again here as text; all others stay as they are, in runs of rows (`tree.PlainRows`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.nc.faults import Fault
+from planner.nc.integers import Integers
+from planner.nc.language.detect import bare, computes, may_compute, row_text
+from planner.nc.language.tree import Place, PlainRows, ProgramFault
+from planner.nc.lexer import Words
+
+_BOM = b"\xef\xbb\xbf"
+_CALLS = {
+    ord("M"): (70, 71, 72, 73, 97, 98, 99),
+    ord("G"): (65, 66, 67),
+}  # codes that call, return, save and restore
+_PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
+_MESSAGE = re.compile(rb"\([ \t]*(?:DEBUG|PRINT|MSG)[ \t]*,", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class SourceLine:
+    """A line of the source as text.
+
+    row   : its row of words; -1 for a comment alone
+    start : byte offset of its first character in the words' data
+    scale : what a length without a point is multiplied by
+    """
+
+    row: int
+    place: Place
+    start: int
+    text: str
+    scale: float = 1.0
+
+
+class Source:
+    """One file: its words, and the lines among them that may belong to the language."""
+
+    def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):
+        self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
+        self.scale = integers.scale(words)
+        self.lines = self._statements()
+
+    def _statements(self) -> list[int]:
+        """Rows, ascending, that are statements of the language rather than words."""
+        words = self.words
+        bare_texts = ((row, bare(row_text(words, row))) for row in may_compute(words).tolist())
+        return [row for row, text in bare_texts if computes(text) or _PROGRAM.match(text)]
+
+    def _message_lines(self) -> list[tuple[int, SourceLine]]:
+        """Lines with a message in a comment, each with the row that it comes before."""
+        data = self.words.data
+        found = [match.start() for match in _MESSAGE.finditer(data)]
+        if not found:
+            return []
+        newlines = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == 10)
+        lines = []
+        for number in np.unique(np.searchsorted(newlines, found)).tolist():
+            start = int(newlines[number - 1]) + 1 if number else 0
+            end = int(newlines[number]) if number < len(newlines) else len(data)
+            place = Place(self.file, number + 1, self.begin + start)
+            row = int(np.searchsorted(self.words.line, number + 1))
+            lines.append((row, SourceLine(row, place, start + self.begin, data[start:end].decode("latin-1"))))
+        return lines
+
+    def line(self, row: int) -> SourceLine:
+        """The text of a row."""
+        words = self.words
+        at = int(words.at[words.first[row]])
+        start = words.data.rfind(b"\n", 0, at) + 1
+        end = words.data.find(b"\n", at)
+        text = words.data[start : end if end >= 0 else len(words.data)]
+        if start == 0 and text.startswith(_BOM):
+            start, text = len(_BOM), text[len(_BOM) :]
+        place = Place(self.file, int(words.line[row]), self.begin + at)
+        return SourceLine(row, place, start + self.begin, text.decode("latin-1"), float(self.scale[row]))
+
+    def in_order(self) -> Iterator[SourceLine | PlainRows]:
+        """The program in its order: lines of the language, and runs of plain rows between them."""
+        waiting = [(row, self.line(row)) for row in self.lines]
+        known = {row for row, _ in waiting}
+        for row, line in self._message_lines():
+            if row < len(self.words.line) and self.words.line[row] == line.place.line:
+                if row not in known:
+                    waiting.append((row, self.line(row)))
+            else:
+                waiting.append((row, replace(line, row=-1)))
+        waiting.sort(key=lambda item: item[1].place.line)
+        done = 0
+        for row, line in waiting:
+            if row > done:
+                yield from self.plain(done, row)
+            yield line
+            done = row if line.row < 0 else row + 1
+        if len(self.words.line) > done:
+            yield from self.plain(done, len(self.words.line))
+
+    def plain(self, first: int, last: int) -> list[PlainRows]:
+        """Statements for the rows `first` to `last` - 1; those that may end the program stand alone."""
+        words = self.words
+        span = slice(int(words.first[first]), int(words.first[last]))
+        letter, value = words.letter[span], words.value[span]
+        ends = (letter == ord("%")) | ((letter == ord("M")) & np.isin(value, (2, 30)))
+        at = np.flatnonzero(ends) + span.start
+        runs: list[PlainRows] = []
+        begin = first
+        for row in np.unique(np.searchsorted(words.first, at, side="right") - 1).tolist():
+            runs.append(self._run(begin, row + 1, may_end=True))
+            begin = row + 1
+        if begin < last:
+            runs.append(self._run(begin, last, may_end=False))
+        return runs
+
+    def has_end(self, rows: PlainRows) -> bool:
+        """Whether the rows hold M2 or M30."""
+        words, first = self.words, rows.first - self.first_row
+        span = slice(int(words.first[first]), int(words.first[rows.last - self.first_row]))
+        return bool(((words.letter[span] == ord("M")) & np.isin(words.value[span], (2, 30))).any())
+
+    def _run(self, first: int, last: int, *, may_end: bool) -> PlainRows:
+        place = Place(
+            self.file, int(self.words.line[first]), self.begin + int(self.words.at[self.words.first[first]])
+        )
+        return PlainRows(place, self.first_row + first, self.first_row + last, may_end)
+
+    def fault(self, fault: ProgramFault, name: str = "") -> Fault:
+        """A fault of this file as the reader reports it."""
+        data, at = self.words.data, fault.place.at - self.begin
+        start = data.rfind(b"\n", 0, at) + 1
+        column = len(data[start:at].removeprefix(_BOM).decode("utf-8", "replace")) + 1
+        word = re.match(rb"[^\s(;]{1,20}", data[at:])
+        return Fault(
+            fault.place.line,
+            column,
+            word.group().decode("utf-8", "replace") if word else "",
+            fault.message,
+            name,
+        )

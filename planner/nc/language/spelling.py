@@ -1,0 +1,284 @@
+"""Words, expressions and assignments as RS274NGC and Fanuc macro spell them.
+
+    word       = letter value                        value = [+|-] ( number | parameter | [ expression ] | function )
+    parameter  = # value | # < name >                function = NAME [ expression ] | ATAN [ expression ] / [ expression ]
+    assignment = parameter = value                   (Fanuc: parameter = expression)
+
+Blanks mean nothing, also inside numbers and names; case means nothing. Operators of one rank are taken from left to right; a sign
+belongs to what follows it, so that -2**2 is 4.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from planner.nc.integers import LENGTHS
+from planner.nc.language.tree import (
+    Exists,
+    Expression,
+    Named,
+    Number,
+    Numbered,
+    Operation,
+    Parameter,
+    Word,
+)
+
+NESTED_MAX = (
+    40  # brackets in brackets; the line of 255 characters of RS274NGC holds no more that means anything
+)
+OPERATIONS_MAX = 80  # one inside the other: Python compiles no more brackets than 200
+
+_NUMBER = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?")
+_NAME = re.compile(r"<([^<>#()\n]+)>")
+_LETTERS = re.compile(r"[A-Za-z]+")
+_OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
+_BLANK = re.compile(r"[ \t\r\x1a]")
+NEGATIVE = "-"
+LINE = Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
+
+
+class Unspelled(Exception):
+    """What cannot be read, and where in the line's text."""
+
+    def __init__(self, column: int, message: str):
+        super().__init__(message)
+        self.column, self.message = column, message
+
+
+@dataclass(frozen=True)
+class Spelling:
+    """functions : names of functions of one value;  ranks : operators with their rank, the highest first applied
+
+    long_values : an assignment takes an expression without brackets
+    """
+
+    functions: frozenset[str]
+    ranks: Mapping[str, int]
+    long_values: bool = False
+
+
+class LineReader:
+    """Reads one line from left to right. `text` starts at byte `start` of the source; `at` counts its characters without blanks and
+    comments.
+    """
+
+    def __init__(self, text: str, start: int, spelling: Spelling, line: int):
+        self.start, self.spelling, self.line = start, spelling, line
+        self.at = 0
+        self.nested = 0
+        self.comments: list[str] = []
+        self.places: list[int] | None = None  # of the characters that are left, in `text`
+        self.text = (
+            text
+            if _BLANK.search(text) is None and "(" not in text and ";" not in text
+            else self._cleaned(text)
+        )
+
+    def _cleaned(self, text: str) -> str:
+        """The text without blanks and comments; comments are kept."""
+        places: list[int] = []
+        at, end = 0, len(text)
+        while at < end:
+            c = text[at]
+            if c == ";":
+                self.comments.append(text[at + 1 :])
+                break
+            if c == "(":
+                close = text.find(")", at)
+                if close < 0:
+                    raise Unspelled(at, "the comment is not closed on its line; write )")
+                inner = text[at + 1 : close]
+                if "(" in inner:
+                    message = "a comment inside a comment is not allowed; remove the inner parenthesis"
+                    raise Unspelled(at + 1 + inner.index("("), message)
+                self.comments.append(inner)
+                at = close
+            elif c not in " \t\r\x1a":
+                places.append(at)
+            at += 1
+        self.places = places
+        return "".join([text[k] for k in places])
+
+    def column(self, at: int) -> int:
+        """Where a character stands in the text as it was given."""
+        if self.places is None:
+            return at
+        return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
+
+    def refused(self, at: int, message: str) -> Unspelled:
+        """What to raise about the character at `at`."""
+        return Unspelled(self.column(at), message)
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing is left on the line."""
+        return self.at >= len(self.text)
+
+    def peek(self) -> str:
+        """The next character, or an empty text."""
+        return self.text[self.at : self.at + 1]
+
+    def take(self, character: str) -> bool:
+        """Go past the character if it comes next."""
+        if self.text[self.at : self.at + 1] != character:
+            return False
+        self.at += 1
+        return True
+
+    def expect(self, character: str, after: str) -> None:
+        """Go past the character. Raises Unspelled if another one comes."""
+        if not self.take(character):
+            found = f"{self.peek()!r}" if not self.ended else "the end of the line"
+            raise self.refused(self.at, f"{character} is missing after {after}; {found} comes instead")
+
+    def keyword(self) -> str:
+        """The letters that come next, in lower case; empty if none."""
+        found = _LETTERS.match(self.text, self.at)
+        if found is None:
+            return ""
+        self.at = found.end()
+        return found.group().lower()
+
+    def name(self) -> str:
+        """A name between < and >."""
+        found = _NAME.match(self.text, self.at)
+        if found is None:
+            raise self.refused(self.at, "a name is < characters >, such as <depth>")
+        name = found.group(1).lower()
+        if name.startswith(("_hal[", "_ini[")):
+            raise self.refused(self.at, "a signal or setting that only the control knows; write its value")
+        self.at = found.end()
+        return name
+
+    # --- values -------------------------------------------------------------------------------------------------------------
+
+    def number(self) -> float | None:
+        """The number that comes next, without a sign, or None."""
+        found = _NUMBER.match(self.text, self.at)
+        if found is None:
+            return None
+        self.at = found.end()
+        return float(found.group())
+
+    def value(self) -> Expression:
+        """A number, parameter, bracket or function, with signs before it."""
+        c = self.peek()
+        if c == "-" or c == "+":
+            self.at += 1
+            self._deeper()
+            operand = self.value()
+            self.nested -= 1
+            if c == "+":
+                return operand
+            return Number(-operand.value) if isinstance(operand, Number) else Operation(NEGATIVE, (operand,))
+        if c == "#":
+            parameter = self.parameter()
+            return Number(float(self.line)) if parameter == LINE else parameter
+        if c == "[":
+            return self.bracket()
+        number = self.number()
+        if number is not None:
+            return Number(number)
+        if c.isalpha():
+            return self._function()
+        found = f"{c!r}" if c else "the end of the line"
+        raise self.refused(
+            self.at, f"a number, parameter, function or [expression] was expected; {found} comes"
+        )
+
+    def bracket(self) -> Expression:
+        """[expression]"""
+        self.expect("[", "this")
+        self._deeper()
+        found = self.expression()
+        self.nested -= 1
+        self.expect("]", "the expression")
+        return found
+
+    def _deeper(self) -> None:
+        self.nested += 1
+        if self.nested > NESTED_MAX:
+            raise self.refused(
+                self.at,
+                f"more than {NESTED_MAX} brackets in each other; write the expression in several lines",
+            )
+
+    def parameter(self) -> Parameter:
+        """#number, #[expression], ##number or #<name>."""
+        at = self.at
+        self.expect("#", "this")
+        if self.peek() == "<":
+            name = self.name()
+            return Named(name, name.startswith("_"))
+        self._deeper()
+        index = self.value()
+        self.nested -= 1
+        if isinstance(index, Number) and index.value != int(index.value):
+            raise self.refused(at, "the number of a parameter is a whole number")
+        return Numbered(index)
+
+    def _function(self) -> Expression:
+        at = self.at
+        name = self.keyword().upper()
+        if name == "EXISTS" and name in self.spelling.functions:
+            self.expect("[", name)
+            parameter = self.parameter()
+            self.expect("]", "the parameter")
+            return Exists(parameter)
+        if name not in self.spelling.functions:
+            known = ", ".join(sorted(self.spelling.functions))
+            raise self.refused(at, f"{name} is no function; there are {known}")
+        operand = self.bracket()
+        if name == "ATAN" and self.take("/"):
+            return Operation(name, (operand, self.bracket()))
+        return Operation(name, (operand,))
+
+    def expression(self, rank: int = 0) -> Expression:
+        """Values with operators of at least that rank between them."""
+        left, count = self.value(), 0
+        while self.text[self.at : self.at + 1] != "]":
+            found = _OPERATOR.match(self.text, self.at)
+            operator = found.group().upper() if found else ""
+            its = self.spelling.ranks.get(operator, -1)
+            if found is None or its < rank:
+                break
+            self.at = found.end()
+            left = Operation(operator, (left, self.expression(its + 1)))
+            count += 1
+            if count > OPERATIONS_MAX:
+                raise self.refused(
+                    self.at, f"more than {OPERATIONS_MAX} operations in a row; write them in several lines"
+                )
+        return left
+
+    # --- words --------------------------------------------------------------------------------------------------------------
+
+    def words_and_assignments(
+        self, scale: float = 1.0
+    ) -> tuple[tuple[Word, ...], tuple[tuple[Parameter, Expression], ...]]:
+        """All words and assignments up to the end of the line; lengths written without a point are multiplied by `scale`."""
+        words: list[Word] = []
+        assignments: list[tuple[Parameter, Expression]] = []
+        while not self.ended:
+            at, c = self.at, self.peek()
+            if c == "#":
+                target = self.parameter()
+                self.expect("=", "the parameter")
+                assignments.append((target, self.expression() if self.spelling.long_values else self.value()))
+            elif c.isalpha() and c.isascii():
+                self.at += 1
+                letter, value = ord(c.upper()), self.value()
+                if (
+                    scale != 1.0
+                    and isinstance(value, Number)
+                    and letter in LENGTHS
+                    and "." not in self.text[at : self.at]
+                ):
+                    value = Number(value.value * scale)
+                words.append(Word(letter, self.start + self.column(at), value))
+            else:
+                raise self.refused(at, f"{c!r} starts neither a word nor an assignment")
+        return tuple(words), tuple(assignments)

@@ -1,0 +1,232 @@
+"""What a program that computes says, as a tree: expressions, statements, procedures. No language's spelling is known here.
+
+A statement appends rows of words, changes parameters, or decides what is executed next. Rows that need no computing stay as the lexer
+split them and are named by their numbers (`PlainRows`): a program of 100,000 lines with ten expressions is not parsed twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+
+class Place(NamedTuple):
+    """Where a statement stands: its file (0 for the main program), its 1-based line, and the byte offset of its first letter."""
+
+    file: int
+    line: int
+    at: int
+
+
+# --- expressions ------------------------------------------------------------------------------------------------------------
+
+
+class Number(NamedTuple):
+    """A number as it is written."""
+
+    value: float
+
+
+class Numbered(NamedTuple):
+    """A parameter by its number, which may be computed."""
+
+    index: Expression  # type: ignore[assignment]  # hides tuple.index, which nobody asks for
+
+
+class Named(NamedTuple):
+    """A parameter by its name; `shared` ones are the same in all calls."""
+
+    name: str
+    shared: bool
+
+
+class Operation(NamedTuple):
+    """An operator or function of the language, by its name there, on its operands."""
+
+    name: str
+    operands: tuple[Expression, ...]
+
+
+class Exists(NamedTuple):
+    """1 if the parameter has a value, else 0."""
+
+    parameter: Numbered | Named
+
+
+Expression = Number | Numbered | Named | Operation | Exists
+Parameter = Numbered | Named
+
+
+# --- statements -------------------------------------------------------------------------------------------------------------
+
+
+class PlainRows(NamedTuple):
+    """Rows `first` to `last` - 1 of a file's words, as they are; they may hold the end of the program."""
+
+    place: Place
+    first: int
+    last: int
+    may_end: bool = False
+
+
+class Word(NamedTuple):
+    """A letter's code, its place in the source, and its value."""
+
+    letter: int
+    at: int
+    value: Expression
+
+
+class Line(NamedTuple):
+    """A row of words and assignments; all values are computed before any is assigned."""
+
+    place: Place
+    words: tuple[Word, ...]
+    assignments: tuple[tuple[Parameter, Expression], ...] = ()
+
+
+class If(NamedTuple):
+    """The body of the first condition that holds, else `otherwise`."""
+
+    place: Place
+    branches: tuple[tuple[Expression, list[Statement]], ...]
+    otherwise: list[Statement]
+
+
+class Loop(NamedTuple):
+    """`while` asks before each turn, `do` after it, `repeat` counts; `name` is what Break and Continue say."""
+
+    place: Place
+    kind: str
+    name: str
+    condition: Expression
+    body: list[Statement]
+
+
+class Break(NamedTuple):
+    """Leave the loop of that name."""
+
+    place: Place
+    loop: str
+
+
+class Continue(NamedTuple):
+    """Go to the next turn of the loop of that name."""
+
+    place: Place
+    loop: str
+
+
+class Label(NamedTuple):
+    """A place that Goto names."""
+
+    place: Place
+    number: int
+
+
+class Goto(NamedTuple):
+    """Go to the label whose number the expression gives, in the same procedure."""
+
+    place: Place
+    target: Expression
+
+
+class Call(NamedTuple):
+    """Run a procedure `times` times.
+
+    procedure : its name, or an expression that gives its number
+    arguments : values of parameters by number, in a new set of local parameters; None shares the caller's
+    word      : as the program writes it, for messages
+    """
+
+    place: Place
+    procedure: str | Expression
+    arguments: tuple[tuple[int, Expression], ...] | None
+    word: str
+    times: Expression = Number(1.0)
+
+
+class Return(NamedTuple):
+    """Leave the procedure, with a value or None; `label` is where the caller goes on, else after its call."""
+
+    place: Place
+    value: Expression | None = None
+    label: Expression | None = None
+
+
+class Message(NamedTuple):
+    """A text for the user, with parameters in it."""
+
+    place: Place
+    pieces: tuple[str | Parameter, ...]
+
+
+class Modes(NamedTuple):
+    """What happens to the modal state: "save", "forget", "restore" or "save until return"."""
+
+    place: Place
+    action: str
+
+
+Statement = (
+    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """A subprogram, or the main program under the empty name.
+
+    place : of its first line
+    body  : its statements
+    """
+
+    name: str
+    place: Place
+    body: list[Statement]
+
+
+@dataclass(frozen=True)
+class Language:
+    """What the operators and parameters of a language mean.
+
+    name       : for messages
+    operations : Python text by operator or function and number of operands, with {0} and {1} for the operands
+    conditions : those among them that are true or false rather than a number
+    functions  : what the Python texts call, by name
+    locals     : parameters 1 to `locals` are a call's own
+    largest    : largest number of a parameter
+    vacant     : the value of a parameter that was never assigned; None where "no value" differs from 0
+    asked      : numbers of the parameters that hold the state of the control
+    read       : the Python text of a parameter's value in an expression, with {0} for what was stored
+    """
+
+    name: str
+    operations: Mapping[tuple[str, int], str]
+    conditions: frozenset[str]
+    functions: Mapping[str, Callable[..., object]]
+    locals: int
+    largest: int
+    vacant: float | None
+    asked: frozenset[int]
+    asked_names: frozenset[str] = frozenset()
+    read: str = "{0}"
+    raw: frozenset[str] = field(default_factory=frozenset)
+
+
+class Parser(Protocol):
+    """Reads one file of a language. Whoever writes one gives it a `planner.nc.language.source.Source`."""
+
+    faults: list[ProgramFault]
+
+    def parse(self) -> list[Procedure]:
+        """All procedures of the file, the main program under the empty name; lines that cannot be read are in `faults`."""
+
+
+class ProgramFault(Exception):
+    """A program that cannot be run, or not further; carries the place and the sentence."""
+
+    def __init__(self, place: Place, message: str):
+        super().__init__(message)
+        self.place, self.message = place, message

@@ -1,0 +1,159 @@
+"""Codes that set offsets: G10, G43 to G49, G52, G92 to G92.3, G28.1 and G30.1. None of them moves anything.
+
+With q the position in a work system before G92 is taken off (state.py), a coordinate x is
+
+    x = q - G92 offset,      q = R^-1 (position - origin - tool offset)
+
+and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for the G92 offset, G10 L20 for
+the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10 takes coordinates as absolute, whatever G90 and G91
+say; a tool's new offset is in force from its next G43 on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.nc import codes
+from planner.nc.block import Block
+from planner.nc.moves import WordFault, coordinate, integer
+from planner.nc.state import State, System, Tool
+
+Note = Callable[[str, int], None]
+
+_SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)  # G10 P1 ... P9
+_FIXTURE = 593  # the system of G10 L11
+
+
+def set_tool_offset(state: State, block: Block, note: Note) -> None:
+    """G43, G43.1, G43.2, G49. Raises WordFault for words that contradict each other."""
+    code = block.g["tool length"]
+    if code == 490:
+        state.tool_offset = np.zeros(3)
+    elif code == 431:
+        state.tool_offset = _given(state, block, state.tool_offset)
+    elif code == 430:
+        tool = integer(block, "H", 0) if "H" in block.value else state.tool_loaded
+        state.tool_offset = _offset_of(state, tool, block, note)
+    elif "H" in block.value:
+        if block.has("XYZ"):
+            raise WordFault(
+                block.at["H"], "G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines"
+            )
+        state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, note)
+    elif block.has("XYZ"):
+        state.tool_offset = state.tool_offset + _given(state, block, np.zeros(3))
+    else:
+        raise WordFault(block.at["tool length"], "G43.2 needs a tool as an H word, or lengths as X, Y and Z")
+
+
+def store_position(state: State, code: int) -> None:
+    """G28.1, G30.1: where the machine stands becomes the position of G28 or G30."""
+    state.homes[code - 1] = state.position.copy()
+
+
+def shift_origin(state: State, block: Block) -> None:
+    """G92 gives the place the coordinates, G52 gives the offset; G92.1 and G92.2 take it back, G92.3 brings it again.
+
+    Raises WordFault for a G52 or G92 without X, Y and Z.
+    """
+    code = block.g["one-shot"]
+    if code in (520, 920):
+        if not block.has("XYZ"):
+            what = "the coordinates to give to this place" if code == 920 else "the offsets to set"
+            raise WordFault(
+                block.at["one-shot"], f"G{codes.number(code)} needs at least one of X, Y and Z: {what}"
+            )
+        here = state.in_system()
+        for axis in _axes(block):
+            length = coordinate(state, block, axis)
+            state.g92[axis] = length if code == 520 else here[axis] - length
+        state.g92_saved = state.g92.copy()
+    else:
+        state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
+        if code == 921:
+            state.g92_saved = np.zeros(3)
+    state.apply_offsets()
+
+
+def set_data(state: State, block: Block, note: Note) -> None:
+    """G10. Raises WordFault for words that are missing or not used."""
+    kind = integer(block, "L", 0) if "L" in block.value else -1
+    if kind in (2, 20):
+        _set_system(state, block, kind)
+        state.apply_offsets()
+    elif kind in (1, 10, 11):
+        _set_tool(state, block, kind, note)
+    else:
+        word = block.at["L"] if kind >= 0 else block.at["one-shot"]
+        raise WordFault(
+            word,
+            "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them",
+        )
+
+
+def _set_system(state: State, block: Block, kind: int) -> None:
+    number = integer(block, "P", 0) if "P" in block.value else -1
+    if not 0 <= number <= len(_SYSTEMS):
+        word = block.at["P"] if number >= 0 else block.at["one-shot"]
+        raise WordFault(word, f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P9")
+    code = _SYSTEMS[number - 1] if number else state.system
+    system = state.work_system(code)
+    for letter in "IJQ" if kind == 2 else "IJQR":
+        if letter in block.value:
+            raise WordFault(block.at[letter], f"G10 L{kind} does not use {letter}; remove it")
+    if kind == 2:
+        system = System(_given(state, block, system.origin), block.value.get("R", system.rotation))
+    else:
+        wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
+        system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
+    state.systems[code] = system
+
+
+def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:
+    if "P" not in block.value:
+        raise WordFault(block.at["one-shot"], f"G10 L{kind} needs its tool as a P word")
+    number = integer(block, "P", 1)
+    tool = state.tools.get(number) or Tool(np.zeros(3))
+    for letter in "IJQ":
+        if letter in block.value:
+            note(
+                f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge", block.line
+            )
+    offset = _given(state, block, tool.offset) if kind == 1 else _offset_from_place(state, block, tool, kind)
+    diameter = 2.0 * block.value["R"] * state.unit if "R" in block.value else tool.diameter
+    state.tools[number] = Tool(offset, diameter)
+
+
+def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:
+    """(3,) the tool's offset [mm] with which the place has the block's coordinates: in the system in force (L10), or in G59.3 without
+    G92 (L11)."""
+    system = state.work_system(_FIXTURE if kind == 11 else 0)
+    place = system.turn(state.position - system.origin, -1.0)
+    if kind == 10:
+        place = place - state.g92
+    offset = np.array(system.turn(tool.offset, -1.0))
+    for axis in _axes(block):
+        offset[axis] = place[axis] - coordinate(state, block, axis)
+    return system.turn(offset)
+
+
+def _offset_of(state: State, number: int, block: Block, note: Note) -> FloatArray:
+    if number not in state.tools and number != 0:
+        note(f"tool {number} has no length in the machine file: 0", block.line)
+    return state.tools[number].offset.copy() if number in state.tools else np.zeros(3)
+
+
+def _axes(block: Block) -> list[int]:
+    return [axis for axis, letter in enumerate("XYZ") if letter in block.value]
+
+
+def _given(state: State, block: Block, others: FloatArray) -> FloatArray:
+    """(3,) the block's lengths [mm], and `others` where it has none."""
+    lengths = others.copy()
+    for axis in _axes(block):
+        lengths[axis] = coordinate(state, block, axis)
+    return lengths

@@ -1,0 +1,105 @@
+"""How a program is read: what is refused, what is left out, and what is assumed where the program does not say it.
+
+Without settings a reader is lenient where nothing moves and strict where something does: what it does not know and what cannot move an
+axis is counted in a note (planner/nc/assumed.py), and what may move is refused with its line.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from planner.base.errors import InputError
+from planner.nc.settings import may_be_ignored
+
+AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
+ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
+REFUSE, IGNORE = "refuse", "ignore"
+EXTRUDERS = (REFUSE, IGNORE)
+LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
+DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
+
+_CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
+_OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?")
+_SAY = "write G and M codes, rotary or second axes (A B C U V W) or commands of the control ($X), such as M428,G187,A"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """Settings of the reader, kept in `Program.reading`.
+
+    strict       : refuse everything that would be assumed
+    ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands ("$X"); in one normal form
+    arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute", or "auto", which is
+                   incremental unless only absolute centres close every arc of the program
+    extruder     : "refuse" or "ignore": what is done with the E words of 3-D printers
+    dialect      : whose language parameters, expressions and subprograms are: "linuxcnc", "fanuc" (Haas too), or "auto", by what the
+                   program holds
+    block_delete : leave out the lines that start with "/"
+
+    Raises InputError for a value that is not one of these.
+    """
+
+    strict: bool = False
+    ignore: tuple[str, ...] = ()
+    arc_centres: str = AUTO
+    extruder: str = REFUSE
+    dialect: str = AUTO
+    block_delete: bool = True
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("arc_centres", ARC_CENTRES), ("extruder", EXTRUDERS), ("dialect", DIALECTS)):
+            if getattr(self, name) not in allowed:
+                raise InputError(f"{name} = {getattr(self, name)!r}; allowed are {', '.join(allowed)}")
+        if isinstance(self.ignore, str):
+            raise InputError(f"ignore = {self.ignore!r} is one text; give a tuple, such as ('M428', 'A')")
+        object.__setattr__(self, "ignore", tuple(dict.fromkeys(map(_normal, self.ignore))))
+
+    def changed(self) -> dict[str, Any]:
+        """The settings that are not the usual ones, ready for JSON; `Reading.saved` makes the record of them again."""
+        return {
+            field.name: list(value) if isinstance(value := getattr(self, field.name), tuple) else value
+            for field in dataclasses.fields(self)
+            if getattr(self, field.name) != field.default
+        }
+
+    @classmethod
+    def saved(cls, changed: object) -> Reading:
+        """The settings that a file says; entries that are none are left out."""
+        given = changed if isinstance(changed, dict) else {}
+        settings: dict[str, Any] = {}
+        for field in dataclasses.fields(cls):
+            value = given.get(field.name)
+            value = tuple(value) if isinstance(value, list) else value
+            if isinstance(value, type(getattr(AS_USUAL, field.name))):
+                settings[field.name] = value
+        try:
+            return cls(**settings)
+        except (InputError, AttributeError, TypeError):
+            return AS_USUAL
+
+
+def ignore_list(text: str) -> tuple[str, ...]:
+    """The entries of a list such as "M428,G187,A". Raises InputError for an entry that is none."""
+    return Reading(ignore=tuple(part for part in text.split(",") if part.strip())).ignore
+
+
+def _normal(entry: str) -> str:
+    """The one way to write an entry: "m007" is "M7"."""
+    text = "".join(entry.upper().split())
+    if found := _CODE.fullmatch(text):
+        letter, whole, tenth = found.groups()
+        name = f"{letter}{int(whole)}" + (f".{tenth}" if tenth and tenth != "0" else "")
+        if not may_be_ignored(name):
+            raise InputError(
+                f"ignore: {name} cannot be left out: it moves the axes, or what follows it has another meaning without it"
+            )
+        return name
+    if _OTHER.fullmatch(text):
+        return text
+    raise InputError(f"ignore: '{entry}' is nothing that can be ignored; {_SAY}")
+
+
+AS_USUAL = Reading()

@@ -1,0 +1,148 @@
+"""Codes that set something of the control and move nothing: which they are, and which words of their line are theirs.
+
+RS274NGC knows none of them; what a control does with them, nobody can read from the program. So each is an `Assumption`, counted in a
+note, and refused by `--strict`. A line such as `M203 X500 Y500 E5000` or `M73 P50 R70` has words that look like others: they are the
+setting's where it stands first on its line.
+
+    code                                                  words of its line that are its own, if it stands first
+    settings of the axes of a 3-D printer (M92 M201 ...)  all
+    M100 to M199, which RS274NGC leaves to each machine   all but X Y Z F T: those move and set as anywhere
+    other M codes                                         all; with X Y Z it may be a move, and is refused
+    any of them behind a G code or a coordinate           P and Q
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption
+
+AXES = "XYZABCUVW"
+_MOVED = frozenset(AXES + "IJK")
+EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
+
+UNKNOWN_M = Assumption(
+    "M code that this reader does not know",
+    "M codes that this reader does not know",
+    "assumed not to move anything",
+)
+PRINTER_M = Assumption(
+    "code of a 3-D printer that moves nothing",
+    "codes of a 3-D printer that move nothing",
+    "temperatures, fans, limits, messages; they take no time in this plan",
+)
+SPINDLE_LIMIT = Assumption(
+    "largest spindle speed", "largest spindle speeds", "they change nothing in the path"
+)
+EXTRUDER_ZERO = Assumption("zero of the extruder", "zeros of the extruder", "left out with its words")
+RETRACTION = Assumption(
+    "retraction of an extruder (G10, G11)",
+    "retractions of an extruder (G10, G11)",
+    "they take no time in this plan",
+)
+G_SETTING = Assumption(
+    "G code that sets the control or cancels what this reader does not have",
+    "G codes that set the control or cancel what this reader does not have",
+    "assumed not to move anything",
+)
+PARKS = Assumption(
+    "code that changes or loads filament, or parks the head",
+    "codes that change or load filament, or park the head",
+    "a full stop; what it moves is not planned, and the head is assumed to come back",
+)
+
+# By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.
+EXTRUDER_MODES = frozenset((82, 83))
+_PARKING = frozenset((125, 600, 701, 702))
+# fmt: off
+_OF_AXES = frozenset((
+    17, 18, 84, 92, 201, 202, 203, 204, 205, 206, 207, 208, 218, 301, 304, 350, 425, 557, 558, 566, 569,
+    574, 579, 584, 593, 665, 666, 851, 906, 907, 913, 914,
+))
+_OF_PRINTERS = _OF_AXES | EXTRUDER_MODES | frozenset((
+    73,
+    *range(104, 112), *range(114, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164, 190, 191,
+    220, 221, 240, 250, 280, 300, 302, 303, 305, 400, 412, 413, 420, 486, 500, 501, 502, 503, 504,
+    572, 575, 605, 862, 900, 928,
+))
+# fmt: on
+TEXTS = frozenset((117, 118))  # a message to the end of the line
+MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printers that move
+
+# G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates off, polar interpolation off,
+# stored stroke and spindle speed checks, mirror image off, look-ahead of Haas and its smoothness, rotation off.
+_G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 690, 1030, 1130, 1870))
+
+# Codes of the groups that are settings beside some words.
+_SOMETIMES = frozenset((50, 51, 80, 100, 920))
+ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {730}}
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A code that moves nothing: what is said of it, the letters behind it on its line that are its own, whether it is a full stop."""
+
+    what: Assumption
+    own: str
+    stops: bool = False
+
+
+def setting(letter: str, code: int, before: str, behind: str) -> Setting | None:
+    """The setting that a code (in tenths) is beside the letters before it on its line, and those behind it up to the next code.
+
+    None for a code that is read, or refused.
+    """
+    return _g_setting(code, before, behind) if letter == "G" else _m_setting(code, before, behind)
+
+
+def _g_setting(code: int, before: str, behind: str) -> Setting | None:
+    moved = _MOVED.intersection(before + behind)
+    if moved:
+        return None
+    if code in (500, 920) and "S" in behind:
+        return Setting(SPINDLE_LIMIT, "SPQR")
+    if code == 500 or code in _G_SETTINGS:
+        return Setting(G_SETTING, "DEHLPQRS")
+    if code in (100, 110) and "L" not in behind:
+        return Setting(RETRACTION, "PRS")
+    if code == 920 and "E" in behind:
+        return Setting(EXTRUDER_ZERO, "")
+    # look-ahead of Fanuc controls: G5 P10000, G5.1 Q1, G8 P1
+    if (code in (50, 80) and "P" in behind) or (code == 51 and "Q" in behind):
+        return Setting(G_SETTING, "PQR")
+    return None
+
+
+def _m_setting(code: int, before: str, behind: str) -> Setting | None:
+    number = code // 10
+    progress = number == 73 and ("P" in behind or "R" in behind)
+    if (
+        code % 10
+        or code < 0
+        or number in MAY_MOVE
+        or ((code in M_GROUP or code in M_REFUSED) and not progress)
+    ):
+        return None
+    if number in _PARKING:
+        return Setting(PARKS, EVERYTHING, stops=True)
+    what = PRINTER_M if number in _OF_PRINTERS else UNKNOWN_M
+    if before:
+        return Setting(what, "PQ")
+    if number in _OF_AXES:
+        return Setting(what, EVERYTHING)
+    if 100 <= number <= 199:
+        return Setting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
+    return None if set("XYZ").intersection(behind) else Setting(what, EVERYTHING)
+
+
+def may_be_ignored(name: str) -> bool:
+    """Whether a code can be left out because the user knows it to be harmless: not a G code that is read or moves the axes, not the
+    end of a program, not a call."""
+    letter, number = name[0], name[1:]
+    if letter not in "GM" or not number[:1].isdigit():
+        return True
+    code = round(float(number) * 10)
+    if letter == "M":
+        return code not in (20, 300, 970, 980, 990)
+    moving = 50 <= code <= 69 or 330 <= code <= 389 or 700 <= code <= 899  # splines, threads, probing, cycles
+    return code not in G_GROUP and not moving

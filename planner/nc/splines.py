@@ -1,0 +1,340 @@
+"""G5, G5.1, G5.2 with G5.3, and G6.2: words to rational Bezier cubics (nc/bezier.py), exactly.
+
+    G5   X Y I J P Q    cubic; its inner control points are the start plus (I, J) and the end plus (P, Q). Without I J it goes on from a
+                        G5 just before it: (I, J) = -(P, Q) of that one
+    G5.1 X Y I J        quadratic; its inner control point is the start plus (I, J)
+    G5.2 X Y P L        control points with weights P; the order L (degree plus one) is 2, 3 or 4, by itself 3. The first control point
+                        is where the machine stands; a P without X and Y, before any other, is its weight. G5.3 ends the list, and the
+                        curve is run: knots are even, with the ends' repeated, as LinuxCNC has them
+    G6.2 P K X Y Z R    a knot K in every line, a control point X Y Z with the weight R in all but the last P ones, P the order, 2 to 4,
+                        by itself 4, as Fanuc has it. The curve is run with its last knot
+
+G5 to G5.2 are curves in the X Y plane (G17). A curve of several lines is one block, at the line where it begins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.nc.bezier import cubic_pieces, homogeneous, raised
+from planner.nc.block import Block
+from planner.nc.codes import CUBIC, NURBS, NURBS_END, NURBS_WITH_KNOTS, QUADRATIC
+from planner.nc.lexer import Words
+from planner.nc.moves import WordFault, target
+from planner.nc.state import State
+
+ORDERS = (2, 3, 4)
+# A first control point this near is where the machine stands [mm]: the least digit of metric programs.
+SAME_PLACE = 1e-3
+
+Pieces = tuple[FloatArray, FloatArray]  # (K, 4, 3) control points [mm] and (K, 4) weights
+
+
+@dataclass(slots=True)
+class OpenSpline:
+    """A curve of several lines, as far as it was read.
+
+    line, word : where it begins
+    code       : NURBS or NURBS_WITH_KNOTS
+    order      : degree plus one
+    blocks     : of the program before it
+    points     : control points (3,) [mm]
+    weights    : of each [-]
+    knots      : of G6.2
+    """
+
+    line: int
+    word: int
+    code: int
+    order: int
+    blocks: int
+    points: list[FloatArray] = field(default_factory=list)
+    weights: list[float] = field(default_factory=list)
+    knots: list[float] = field(default_factory=list)
+
+    @property
+    def ended(self) -> bool:
+        """Whether a G6.2 curve has all of its knots."""
+        return self.code == NURBS_WITH_KNOTS and len(self.knots) >= len(self.points) + self.order
+
+    @property
+    def unfinished(self) -> str:
+        """What is said of a curve that is left before its end."""
+        if self.code == NURBS:
+            return f"the spline of line {self.line} does not end; write G5.3 after its last control point"
+        return (
+            f"the spline of line {self.line} has {len(self.points)} control points and {len(self.knots)} knots; order P{self.order} "
+            f"needs {len(self.points) + self.order} knots, the last {self.order} in lines of their own"
+        )
+
+
+class SplineReader:
+    """Reads the lines of splines; `open` is the curve that is not at its end."""
+
+    def __init__(self) -> None:
+        self.open: OpenSpline | None = None
+        self._words: Words | None = (
+            None  # those that hold the word of the open curve, if they were executed before
+        )
+        self._reflected: tuple[int, FloatArray] | None = None  # blocks after the last G5, and its -(P, Q)
+
+    def read(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
+        """The pieces of the curve that ends on this line, and the line where it begins; None where none ends. `blocks` of the program
+        were read before.
+
+        Raises WordFault for words that are missing or contradict each other; an open curve is then given up.
+        """
+        code = state.motion
+        try:
+            if self.open is not None and self.open.blocks != blocks:
+                raise WordFault(
+                    _any_word(block),
+                    f"a dwell, a stop or a move stands inside the spline of line {self.open.line}",
+                )
+            if self.open is not None and _leaves(self.open, block):
+                raise WordFault(_any_word(block), self.open.unfinished)
+            if code in (CUBIC, QUADRATIC):
+                return (self._cubic if code == CUBIC else _quadratic)(state, block, blocks), block.line
+            if code == NURBS_WITH_KNOTS:
+                return self._fanuc(state, block, blocks)
+            return self._nurbs(state, block, blocks)
+        except WordFault:
+            self.open = None
+            raise
+
+    def keep(self, words: Words) -> None:
+        """The chunk `words` was executed."""
+        if self.open is None:
+            self._words = None
+        elif self._words is None:
+            self._words = words
+
+    def faults(self) -> list[tuple[Words, int, str]]:
+        """The fault of a curve that is open where the program ends."""
+        if self.open is None or self._words is None:
+            return []
+        return [(self._words, self.open.word, self.open.unfinished)]
+
+    def _cubic(self, state: State, block: Block, blocks: int) -> Pieces:
+        end = _end_in_plane(state, block, "G5")
+        if not ("P" in block.value and "Q" in block.value):
+            raise WordFault(block.motion_word(), "G5 needs P and Q: its second control point, from its end")
+        near, far = _offset(state, block, "IJ"), _offset(state, block, "PQ")
+        if "I" not in block.value and "J" not in block.value:
+            if self._reflected is None or self._reflected[0] != blocks:
+                raise WordFault(
+                    block.motion_word(),
+                    "G5 needs I and J, its first control point from its start, unless a G5 is just before it",
+                )
+            near = self._reflected[1]
+        elif not ("I" in block.value and "J" in block.value):
+            raise WordFault(block.motion_word(), "G5 needs both I and J, or neither")
+        self._reflected = blocks + 1, -far
+        start = state.position.copy()
+        return np.stack([start, start + near, end + far, end])[None], np.ones((1, 4))
+
+    def _nurbs(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
+        """A line of G5.2, or G5.3."""
+        opened, now = self.open, block.g.get("motion")
+        if now == NURBS_END:
+            if opened is None:
+                raise WordFault(
+                    block.at["motion"],
+                    "G5.3 ends a spline, and none is open; write G5.2 and control points before it",
+                )
+            self.open = None
+            return _even_knots(opened, block), opened.line
+        if opened is None:
+            if now != NURBS:
+                raise WordFault(
+                    _any_word(block),
+                    "control points of a spline after its G5.3; write G5.2, or another motion code",
+                )
+            opened = OpenSpline(
+                block.line, block.at["motion"], NURBS, 3, blocks, [state.position.copy()], [1.0]
+            )
+            self.open = opened
+            if "P" in block.value and not block.has("XY"):
+                opened.weights[0] = _weight(block, "P")
+        elif "P" in block.value and not block.has("XY"):
+            raise WordFault(block.at["P"], "a weight without a control point; write X and Y beside it")
+        if "L" in block.value:
+            opened.order = _order(block, "L")
+        if block.has("XYZ"):
+            if not ("X" in block.value and "Y" in block.value):
+                raise WordFault(block.first_of("XYZ"), "a control point of G5.2 needs both X and Y")
+            opened.points.append(_end_in_plane(state, block, "G5.2"))
+            opened.weights.append(_weight(block, "P"))
+        return None
+
+    def _fanuc(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
+        """A line of G6.2."""
+        opened = self.open
+        if opened is None:
+            if block.g.get("motion") != NURBS_WITH_KNOTS:
+                raise WordFault(
+                    _any_word(block),
+                    "words of a spline after its last knot; write G6.2, or another motion code",
+                )
+            order = _order(block, "P") if "P" in block.value else 4
+            opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS_WITH_KNOTS, order, blocks)
+        elif "P" in block.value:
+            raise WordFault(block.at["P"], "the order P of a spline stands in its first line")
+        first = not opened.points
+        if first or block.has("XYZ"):
+            if len(opened.knots) > len(opened.points):
+                raise WordFault(
+                    block.first_of("XYZ"), "a control point after a line with a knot only; write it before"
+                )
+            opened.points.append(_control_point(state, block, opened))
+            opened.weights.append(_weight(block, "R"))
+        elif "R" in block.value:
+            raise WordFault(block.at["R"], "a weight without a control point; write X, Y or Z beside it")
+        if "K" not in block.value:
+            raise WordFault(_any_word(block), "a line of G6.2 needs its knot K")
+        if opened.knots and block.value["K"] < opened.knots[-1]:
+            raise WordFault(
+                block.at["K"], f"knots must not decrease: K{block.value['K']:g} after K{opened.knots[-1]:g}"
+            )
+        opened.knots.append(block.value["K"])
+        if not opened.ended:
+            return None
+        self.open = None
+        return _given_knots(opened, block), opened.line
+
+
+def is_spline_line(block: Block) -> bool:
+    """Whether a line under a spline's motion code has words of the spline."""
+    taken = block.g.get("one-shot") == 40 or block.g.get("path control") == 640  # P and Q are theirs
+    return "motion" in block.g or block.has("XYZIJKLR" if taken else "XYZIJKLRPQ")
+
+
+def _leaves(opened: OpenSpline, block: Block) -> bool:
+    """Whether the block's motion code leaves the open curve, or begins another one."""
+    code = block.g.get("motion")
+    if opened.code == NURBS:
+        return code not in (None, NURBS, NURBS_END)
+    return code not in (None, NURBS_WITH_KNOTS)
+
+
+def _any_word(block: Block) -> int:
+    """Index of the first word of a line."""
+    return min(block.at.values())
+
+
+def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
+    end = _end_in_plane(state, block, "G5.1")
+    near = _offset(state, block, "IJ")
+    if not ("I" in block.value and "J" in block.value) or not near.any():
+        raise WordFault(
+            block.motion_word(), "G5.1 needs I and J, its control point from its start, not both 0"
+        )
+    start = state.position.copy()
+    return _split(raised(homogeneous(np.stack([start, start + near, end])[None], np.ones((1, 3)))))
+
+
+def _split(pieces: FloatArray) -> Pieces:
+    """Control points and weights of homogeneous pieces (K, 4, 4)."""
+    return pieces[..., :-1] / pieces[..., -1:], pieces[..., -1].copy()
+
+
+def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
+    """(3,) where X and Y lead [mm]."""
+    if state.normal != 2:
+        raise WordFault(block.motion_word(), f"{name} is a curve in the X Y plane; write G17 before it")
+    if "Z" in block.value:
+        raise WordFault(block.at["Z"], f"{name} is a curve in the X Y plane; Z does not move along it")
+    if not block.has("XY"):
+        raise WordFault(block.motion_word(), f"{name} needs an end point; write X and Y")
+    if not state.absolute and name == "G5.2":
+        raise WordFault(
+            block.first_of("XY"), "control points of G5.2 with G91 are relative to what? write G90 before it"
+        )
+    return target(state, block)
+
+
+def _offset(state: State, block: Block, letters: str) -> FloatArray:
+    """(3,) the vector of two words [mm]."""
+    given = np.array([block.value.get(letter, 0.0) * state.unit for letter in letters] + [0.0])
+    return state.work_system().turn(given)
+
+
+def _weight(block: Block, letter: str) -> float:
+    weight = block.value.get(letter, 1.0)
+    if not weight > 0.0:
+        raise WordFault(block.at[letter], "a weight must be positive")
+    return weight
+
+
+def _order(block: Block, letter: str) -> int:
+    order = round(block.value[letter])
+    if order not in ORDERS or abs(order - block.value[letter]) > 1e-3:
+        raise WordFault(block.at[letter], "splines of order 2, 3 and 4 are read (degree 1, 2 and 3)")
+    return order
+
+
+def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray:
+    """(3,) the control point of a line of G6.2 [mm]; coordinates that it does not name are those of the point before."""
+    if not state.absolute:
+        raise WordFault(_any_word(block), "control points of G6.2 with G91 are not read; write G90 before it")
+    here = state.position
+    state.position = opened.points[-1] if opened.points else here
+    point = target(state, block)
+    state.position = here
+    if opened.points:
+        return point
+    away = float(np.linalg.norm(point - state.position))
+    if away > SAME_PLACE:
+        raise WordFault(
+            block.first_of("XYZ"),
+            f"the first control point of G6.2 is {away:.6g} mm from where the machine stands; move there before it",
+        )
+    return state.position.copy()
+
+
+def _check_count(opened: OpenSpline, word: int) -> None:
+    if len(opened.points) < opened.order:
+        raise WordFault(
+            word,
+            f"a spline of order {opened.order} needs {opened.order} control points or more; {len(opened.points)} are given",
+        )
+
+
+def _even_knots(opened: OpenSpline, block: Block) -> Pieces:
+    """The curve of G5.2: knots 0 (L times), 1, 2 ... n - L, and n - L + 1 (L times) for n points."""
+    _check_count(opened, block.at["motion"])
+    count, order = len(opened.points), opened.order
+    knots = np.clip(np.arange(count + order) - order + 1, 0, count - order + 1).astype(float)
+    return _split(
+        cubic_pieces(homogeneous(np.array(opened.points), np.array(opened.weights)), knots, order - 1)
+    )
+
+
+def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
+    """The curve of G6.2, which ends with the knot of this block."""
+    _check_count(opened, block.at["K"])
+    knots, order = np.array(opened.knots), opened.order
+    if knots[order - 1] != knots[0] or knots[-order] != knots[-1] or knots[0] == knots[-1]:
+        raise WordFault(
+            block.at["K"],
+            f"the first {order} knots of a spline of order {order} must be equal, and the last {order}",
+        )
+    inner = knots[order:-order]
+    if (
+        np.unique(inner, return_counts=True)[1].max(initial=0) >= order
+        or inner.min(initial=np.inf) == knots[0]
+    ):
+        raise WordFault(
+            block.at["K"],
+            f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve",
+        )
+    if inner.max(initial=-np.inf) == knots[-1]:
+        raise WordFault(
+            block.at["K"], f"the last {order} knots must be larger than those before: more break the curve"
+        )
+    return _split(
+        cubic_pieces(homogeneous(np.array(opened.points), np.array(opened.weights)), knots, order - 1)
+    )

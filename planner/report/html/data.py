@@ -1,0 +1,184 @@
+"""What a report shows of a plan: samples of the motion, the NC lines with their times, limits.
+
+An hour of motion has millions of samples. A report has `SAMPLES_MAX` of them at most, at equal steps and with the highest feed of each
+step beside its first sample, so that no peak of the feed is lost; `step` says so.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.units import RAD_PER_DEG
+from planner.geometry.chords import arc_point
+from planner.geometry.distance import distance_near
+from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.motion.trajectory import Trajectory, joined
+from planner.report.block_feeds import planned_blocks
+
+if TYPE_CHECKING:
+    from planner.geometry.toolpath import Toolpath
+    from planner.job.plan import Plan
+
+SAMPLES_MAX = 200_000
+PROGRAMMED_MAX = 60_000  # points of the programmed path that are shown
+ARC_POINTS = 24  # of every arc and curve that are shown
+NO_LIMIT = "none"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Samples:
+    """N samples of the motion.
+
+    step      : every so many samples of the trajectory are shown
+    shown     : the samples, rotary axes in rad
+    limit     : (N,) index in `limits` of the limit that holds the motion there
+    limits    : their names; the last one is `NO_LIMIT`
+    deviation : (N,) distance from the programmed path near the block of the sample [mm]
+    """
+
+    step: int
+    shown: Trajectory
+    limit: Array
+    limits: tuple[str, ...]
+    deviation: FloatArray
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Lines:
+    """L NC lines that move, in the order of the motion.
+
+    line       : (L,) number
+    planned    : (L,) time of the motion [s], dwells not included
+    programmed : (L,) time at the programmed feed without any acceleration [s]; NaN for rapids
+    highest    : (L,) highest feed of the samples shown, or what is known of lines without one [mm/s]
+    limit      : (L,) index in `Samples.limits` of the limit that holds the motion there for the longest time
+    deviation  : (L,) largest distance of the samples shown from the programmed path [mm]; NaN where no sample is shown
+    """
+
+    line: Array
+    planned: FloatArray
+    programmed: FloatArray
+    highest: FloatArray
+    limit: Array
+    deviation: FloatArray
+
+
+def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
+    """The samples that a report shows. The plan must have a trajectory."""
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    step = max(1, -(-len(trajectory) // (most if len(trajectory) <= most else most // 2)))
+    shown = _thinned(trajectory, step)
+    names, limit = _limits(plan, shown)
+    segment = np.searchsorted(plan.toolpath.block, shown.block, side="right") - 1
+    deviation = distance_near(plan.toolpath, shown.position, np.maximum(segment, 0))
+    return Samples(step=step, shown=shown, limit=limit, limits=names, deviation=deviation)
+
+
+def _thinned(trajectory: Trajectory, step: int) -> Trajectory:
+    """Every so many samples, the fastest one of each step, and the last one."""
+    if step == 1:
+        return joined(list(trajectory.chunks()))
+    parts, first = [], 0
+    for chunk in trajectory.chunks():
+        n = len(chunk)
+        starts = np.arange(-first % step, n, step)
+        bounds = np.append(starts, n)
+        fastest = [a + int(np.argmax(chunk.feed[a:b])) for a, b in itertools.pairwise(bounds)]
+        last = [n - 1] if first + n >= len(trajectory) else []
+        parts.append(chunk.rows(np.unique(np.array([*starts, *fastest, *last], dtype=np.int64))))
+        first += n
+    return joined(parts)
+
+
+def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
+    """Names of the limits, and which holds each sample: that of the solution, or where there is none the one closest to its limit."""
+    if plan.grid is not None and len(plan.grid.t):
+        at = np.clip(np.searchsorted(plan.grid.t, shown.t, side="right") - 1, 0, None)
+        return _used(plan.grid.active_names, plan.grid.active[at])
+    names, ratios = [NO_LIMIT], [np.full(len(shown), 0.99)]
+    for quantity in ("velocity", "acceleration", "jerk"):
+        of_axes = np.abs(getattr(shown, quantity)) / plan.machine.limits(quantity, shown.axes)
+        names += [f"{quantity}.{axis}" for axis in shown.axes]
+        ratios += list(of_axes.T)
+    names.append("feed")
+    ratios.append(shown.feed / plan.program.feed[shown.block])
+    return _used(tuple(names), np.argmax(np.stack(ratios), axis=0))
+
+
+def _used(names: tuple[str, ...], index: Array) -> tuple[tuple[str, ...], Array]:
+    """The names that occur, `NO_LIMIT` last, and the indices among them."""
+    used = sorted(set(np.unique(index).tolist()), key=lambda k: (names[k] == NO_LIMIT, k))
+    place = np.zeros(len(names), np.int64)
+    place[used] = np.arange(len(used))
+    found = tuple(names[k] for k in used)
+    return (found if NO_LIMIT in found else (*found, NO_LIMIT)), place[index]
+
+
+def lines_of(plan: Plan, samples: Samples) -> Lines:
+    """The NC lines of a plan that move."""
+    toolpath, trajectory = plan.toolpath, plan.trajectory
+    assert trajectory is not None
+    blocks = planned_blocks(trajectory, toolpath)
+    fresh = np.append(True, np.diff(toolpath.line) != 0)
+    row = np.cumsum(fresh) - 1  # of each segment
+    rows = int(row[-1]) + 1 if len(row) else 0
+    programmed = np.where(toolpath.rapid, np.nan, toolpath.length / toolpath.feed)
+    segment = np.maximum(np.searchsorted(toolpath.block, samples.shown.block, side="right") - 1, 0)
+    at = row[segment]
+    highest, unseen = np.full(rows, -1.0), np.zeros(rows)
+    np.maximum.at(highest, at, samples.shown.feed)
+    np.maximum.at(unseen, row, blocks.highest)
+    deviation = np.full(rows, -1.0)
+    np.maximum.at(deviation, at, samples.deviation)
+    return Lines(
+        line=toolpath.line[fresh],
+        planned=np.bincount(row, blocks.duration, rows).astype(np.float64),
+        programmed=np.bincount(row, programmed, rows).astype(np.float64),
+        highest=np.where(highest < 0.0, unseen, highest),
+        limit=_longest(at, samples, rows),
+        deviation=np.where(deviation < 0.0, np.nan, deviation),
+    )
+
+
+def _longest(at: Array, samples: Samples, rows: int) -> Array:
+    """(rows,) the limit that holds each row's samples for the longest time; `NO_LIMIT` where there is none."""
+    kinds = len(samples.limits)
+    lasting = np.diff(samples.shown.t, append=samples.shown.t[-1:])
+    time = np.bincount(at * kinds + samples.limit, lasting, rows * kinds).reshape(rows, kinds)
+    longest: Array = np.where(time.sum(axis=1) > 0, time.argmax(axis=1), samples.limits.index(NO_LIMIT))
+    return longest
+
+
+def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArray:
+    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc and curve; every so many where they are
+    more than `most`."""
+    linear = [k for k, axis in enumerate(toolpath.axes) if axis in LINEAR_AXES]
+    if not len(toolpath):
+        return np.zeros((0, 3))
+    count = np.where(toolpath.straight, 1, ARC_POINTS)
+    segment = np.repeat(np.arange(len(toolpath)), count)
+    number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 1
+    points = toolpath.end[segment].copy()
+    inner = np.flatnonzero(number < count[segment])
+    at = segment[inner]
+    along = toolpath.length[at] * number[inner] / count[at]
+    bent = toolpath.arc[at] >= 0
+    arcs, curves = at[bent], at[~bent]
+    points[inner[bent]] = toolpath.arcs.center[toolpath.arc[arcs]] + arc_point(toolpath, arcs, along[bent])
+    points[inner[~bent]] = toolpath.curves.at(toolpath.curve[curves], toolpath.length[curves], along[~bent])[
+        :, 0
+    ]
+    points = np.vstack([toolpath.start[:1], points])[:, linear]
+    points = points[:: max(1, -(-len(points) // most))]
+    return np.pad(points, ((0, 0), (0, 3 - len(linear))))
+
+
+def in_degrees(axes: tuple[str, ...]) -> FloatArray:
+    """(A,) what turns lengths and angles of the package into mm and degrees."""
+    return np.array([1.0 / RAD_PER_DEG if axis in ROTARY_AXES else 1.0 for axis in axes])

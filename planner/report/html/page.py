@@ -1,0 +1,150 @@
+"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a network.
+
+Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own DecompressionStream. Texts
+of the program and of names are data as well, and the page shows them as text, so that nothing in a program is ever run.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planner.base.arrays import Array
+from planner.base.errors import InputError
+from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.report.export import plain, summary
+from planner.report.html.data import in_degrees, lines_of, programmed_path, samples_of
+from planner.report.replace import check_file
+
+if TYPE_CHECKING:
+    from planner.job.plan import Plan
+
+REPORT = "report.html"
+CORNERS_MAX = 20_000  # corners that are listed, those closest to eq. 18-19
+_MARK = '<meta name="generator" content="feedrate-planner">'
+_LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
+
+
+def check_report_place(path: Path, *, force: bool = False) -> None:
+    """Raise InputError if a page cannot be written to a file: a directory, or a file that is no report while `force` is not set."""
+    check_file(path, (), _is_report, force=force)
+
+
+def _is_report(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return _MARK.encode() in stream.read(500)
+
+
+def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | None = None) -> str:
+    """The page of a plan.
+
+    text : the program as it was read; None where it is not known
+    said : the summary to show; None for that of the plan
+
+    Raises InputError if plotly is not installed. Raises ValueError for a plan without a trajectory.
+    """
+    if plan.trajectory is None:
+        raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
+    columns, about = _columns(plan)
+    columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
+    about["summary"] = said or summary(plan)
+    about["columns"] = {name: column.dtype.str.lstrip("<|") for name, column in columns.items()}
+    page = _template("report.html")
+    parts = {
+        "TITLE": html.escape(Path(plan.program.source).name),
+        "STYLE": _template("report.css"),
+        "PLOTLY": _plotly(),
+        "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
+        "COLUMNS": "\n".join(
+            f'<script type="text/plain" id="column-{name}">{_packed(column)}</script>'
+            for name, column in columns.items()
+        ),
+        "SCRIPT": _template("report.js"),
+    }
+    return "".join(parts.get(piece, piece) for piece in page.split("@@"))
+
+
+def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Columns of numbers by name, and what the page has to know of them."""
+    samples = samples_of(plan)
+    shown, axes = samples.shown, samples.shown.axes
+    lines = lines_of(plan, samples)
+    scale = in_degrees(axes)
+    columns: dict[str, Array] = {
+        "t": shown.t,
+        "s": shown.s.astype(np.float32),
+        "feed": shown.feed.astype(np.float32),
+        "line": shown.line.astype(np.int32),
+        "limit": samples.limit.astype(np.uint8),
+        "deviation": samples.deviation.astype(np.float32),
+        "programmed": np.nan_to_num(plan.program.feed[shown.block], posinf=np.nan).astype(np.float32),
+        "path": programmed_path(plan.toolpath).astype(np.float32).ravel(),
+        "line_number": lines.line.astype(np.int32),
+        "line_planned": lines.planned.astype(np.float32),
+        "line_programmed": lines.programmed.astype(np.float32),
+        "line_highest": lines.highest.astype(np.float32),
+        "line_limit": lines.limit.astype(np.uint8),
+        "line_deviation": lines.deviation.astype(np.float32),
+    }
+    for k, axis in enumerate(axes):
+        columns[axis] = (shown.position[:, k] * scale[k]).astype(np.float32)
+        columns[f"v{axis}"] = (shown.velocity[:, k] * scale[k]).astype(np.float32)
+        columns[f"a{axis}"] = (shown.acceleration[:, k] * scale[k]).astype(np.float32)
+        columns[f"j{axis}"] = (shown.jerk[:, k] * scale[k]).astype(np.float32)
+    machine = plan.machine
+    about = {
+        "axes": [*axes],
+        "linear": [axis for axis in axes if axis in LINEAR_AXES],
+        "rotary": [axis for axis in axes if axis in ROTARY_AXES],
+        "limits": list(samples.limits),
+        "step": samples.step,
+        "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
+        "machine": {axis: machine.axes[axis].model_dump() for axis in axes},
+        "corners": plain(_corners(plan)),
+    }
+    return columns, about
+
+
+def _corners(plan: Plan) -> dict[str, list[Any]]:
+    """Eq. 18-20 at the corners that were looked at (verify/corners.py)."""
+    found = plan.corners
+    if found is None:
+        return {}
+    seen = np.flatnonzero(found.looked)
+    worst = np.maximum(found.speed_ratio[seen], found.budget_ratio[seen])
+    seen = np.sort(seen[np.argsort(-worst, kind="stable")[:CORNERS_MAX]])
+    return {
+        "line": found.line[seen].tolist(),
+        "angle": np.degrees(found.theta[seen]).tolist(),
+        "feed": found.feed_planned[seen].tolist(),
+        "eq19": found.speed_ratio[seen].tolist(),
+        "eq18": found.budget_ratio[seen].tolist(),
+        "eq20": found.feed_paper[seen].tolist(),
+        "gain": found.gain[seen].tolist(),
+    }
+
+
+def _packed(column: Array) -> str:
+    """Bytes of a column, compressed, as base64."""
+    data = np.ascontiguousarray(column)
+    little = data.astype(data.dtype.newbyteorder("<"), copy=False)
+    return base64.b64encode(gzip.compress(little.tobytes(), _LEVEL, mtime=0)).decode("ascii")
+
+
+def _plotly() -> str:
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as fault:
+        raise InputError("a report needs the package plotly: pip install plotly") from fault
+    return str(get_plotlyjs())
+
+
+def _template(name: str) -> str:
+    return (resources.files("planner") / "report" / "html" / name).read_text(encoding="utf-8")

@@ -1,0 +1,380 @@
+"use strict";
+// Everything of the page works on columns of numbers (see page.py): c.t, c.feed, c.x ... of the samples, c.line_... of the NC lines.
+(async () => {
+  const about = JSON.parse(document.getElementById("about").textContent);
+  const summary = about.summary;
+  const c = {};
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
+  const ink = dark ? "#e6e9ef" : "#1d2430", dim = dark ? "#97a1b2" : "#667085", rule = dark ? "#2e3744" : "#d9dee7";
+  const ARRAYS = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
+  // Okabe and Ito's colours, told apart with red-green blindness too; axes and limits take them in order.
+  const COLOURS = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
+  const POINTS_OF_PATH = 40000, BUCKETS = 1200;
+
+  const element = (id) => document.getElementById(id);
+  const make = (tag, text, className) => {
+    const made = document.createElement(tag);
+    if (text !== undefined) made.textContent = text;
+    if (className) made.className = className;
+    return made;
+  };
+  async function unpack(name, type) {
+    const held = element("column-" + name);
+    const bytes = Uint8Array.from(atob(held.textContent), (one) => one.charCodeAt(0));
+    held.remove();
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const buffer = await new Response(stream).arrayBuffer();
+    c[name] = new ARRAYS[type](buffer);
+  }
+  await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
+  const N = c.t.length, axes = about.axes, linear = about.linear;
+  const unit = (axis) => (about.rotary.includes(axis) ? "deg" : "mm");
+  const digits = (value, n = 4) => (value === null || !Number.isFinite(value) ? "–" : Number(value.toPrecision(n)).toString());
+  const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+  const limits = about.limits.map(escaped);
+  const text = new TextDecoder().decode(c.program);
+  const programLines = text.length ? text.split(/\r\n|\n|\r/) : [];
+
+  // Header, verdict, prices, notes
+  {
+    const passed = summary.verdict && summary.verdict.passed;
+    element("subtitle").textContent = `${summary.method} on machine ${summary.machine}` +
+      (summary.tolerance_mm === null ? "" : `, tolerance ${summary.tolerance_mm} mm`) + `; ${summary.blocks.toLocaleString()} blocks`;
+    element("verdict").textContent = passed ? "passed" : "failed";
+    element("verdict").className = passed ? "passed" : "failed";
+    const figures = [
+      ["cycle time", digits(summary.cycle_time_s, 6) + " s"],
+      ["stopping at every block", digits(summary.stop_time_s, 5) + " s"],
+      ["contour error", summary.verdict.contour_error_mm === null ? "–" : digits(1000 * summary.verdict.contour_error_mm, 3) + " µm"],
+    ];
+    for (const [name, value] of figures) {
+      const pair = make("div");
+      pair.append(make("dt", name), make("dd", value));
+      element("figures").append(pair);
+    }
+    const rows = [["limit", "largest ratio"], ...Object.entries(summary.verdict.limits).map(([name, ratio]) => [name, digits(ratio, 6), ratio])];
+    rows.forEach(([name, value, ratio], k) => {
+      const row = make("tr");
+      row.append(make(k ? "td" : "th", name), make(k ? "td" : "th", value, ratio > 1 + 1e-6 ? "bad" : ""));
+      element("judged").append(row);
+    });
+    for (const fault of summary.verdict.faults) {
+      const row = make("tr"), said = make("td", fault, "bad");
+      said.colSpan = 2;
+      row.append(said);
+      element("judged").append(row);
+    }
+    for (const note of summary.notes.length ? summary.notes : ["nothing was assumed or given up"]) element("notes").append(make("li", note));
+    const prices = summary.prices, saved = prices && prices.saved_s ? Object.entries(prices.saved_s) : [];
+    if (saved.length) {
+      const head = make("tr");
+      head.append(make("th", "more of"), make("th", "saves [s]"));
+      element("prices").append(head);
+      for (const [name, seconds] of saved.sort((a, b) => b[1] - a[1]).slice(0, 8)) {
+        if (!(seconds > 0)) continue;
+        const row = make("tr"), more = name === "tolerance" ? `${1000 * prices.more_tolerance_mm} µm` : `${100 * prices.more_limit} %`;
+        const hint = (prices.hints || []).includes(name) ? "about " : "";
+        row.append(make("td", `${name}, ${more}`), make("td", hint + digits(seconds, 3)));
+        element("prices").append(row);
+      }
+    }
+    const every = about.step > 1 ? `Every ${about.step}th of ${about.samples.toLocaleString()} samples, and the fastest between them. ` : "";
+    element("foot").textContent = every + `Made by planner ${summary.versions.planner}; this page needs no network.`;
+  }
+
+  // The path
+  const colourings = {
+    feed: { column: c.feed, title: "feed [mm/s]", scale: "Cividis" },
+    deviation: { column: c.deviation.map((v) => 1000 * v), title: "deviation [µm]", scale: "Cividis" },
+    limit: { column: c.limit, title: "", limits: true },
+  };
+  const highest = (column, counts) => column.reduce((most, v, k) => (counts(k) && v > most ? v : most), 1e-9);
+  // Rapids would leave one colour for all the rest: the scale is that of the moves with a feed, if there are any.
+  const feeds = c.programmed.some(Number.isFinite) ? (k) => Number.isFinite(c.programmed[k]) : () => true;
+  colourings.feed.highest = highest(c.feed, feeds);
+  colourings.deviation.highest = highest(colourings.deviation.column, () => true);
+  let colouring = "feed", range = [0, N - 1], against = "t", now = 0;
+  const limitColour = (k) => (limits[k] === "none" ? "#8c8c8c" : COLOURS[k % 7]);
+  function stepScale() {
+    const scale = [], n = limits.length;
+    limits.forEach((_, k) => scale.push([k / n, limitColour(k)], [(k + 1) / n, limitColour(k)]));
+    return scale;
+  }
+  function pathRows() {
+    const [first, last] = range, count = last - first + 1, step = Math.max(1, Math.ceil(count / POINTS_OF_PATH));
+    const rows = [];
+    for (let k = first; k <= last; k += step) rows.push(k);
+    if (rows[rows.length - 1] !== last) rows.push(last);
+    return rows;
+  }
+  const pick = (column, rows) => Array.from(rows, (k) => column[k]);
+  const place = (k) => [0, 1, 2].map((a) => (a < linear.length ? c[linear[a]][k] : 0));
+  function pathTrace() {
+    const rows = pathRows(), how = colourings[colouring], line = { width: 5, color: pick(how.column, rows), showscale: true };
+    line.colorbar = { title: { text: how.title, font: { color: ink } }, thickness: 12, len: 0.8, outlinewidth: 0, tickfont: { color: ink } };
+    if (how.limits) {
+      line.colorscale = stepScale();
+      line.cmin = -0.5;
+      line.cmax = limits.length - 0.5;
+      line.colorbar.tickvals = limits.map((_, k) => k);
+      line.colorbar.ticktext = limits;
+    } else {
+      line.colorscale = how.scale;
+      line.cmin = 0;
+      line.cmax = how.highest;
+    }
+    const at = [0, 1, 2].map((a) => (a < linear.length ? pick(c[linear[a]], rows) : rows.map(() => 0)));
+    return {
+      type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,
+      customdata: rows.map((k) => [c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k]]),
+      hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} mm/s<br>held by %{customdata[2]}<br>" +
+        "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm<extra></extra>",
+    };
+  }
+  const programmed = { x: [], y: [], z: [] };
+  for (let k = 0; k + 2 < c.path.length; k += 3) {
+    programmed.x.push(c.path[k]);
+    programmed.y.push(c.path[k + 1]);
+    programmed.z.push(c.path[k + 2]);
+  }
+  const marker = () => {
+    const [x, y, z] = place(now);
+    return { x: [[x]], y: [[y]], z: [[z]] };
+  };
+  const extents = linear.map((axis) => c[axis].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]));
+  const size = Math.max(...extents.map(([a, b]) => b - a), 1e-9);
+  const flat = linear.length < 3 || extents[2][1] - extents[2][0] < 0.12 * size;
+  const axis3d = (title) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false });
+  const bare = { displaylogo: false, responsive: true };
+  function scene() {
+    return {
+      aspectmode: "data", xaxis: axis3d(linear[0] || ""), yaxis: axis3d(linear[1] || ""), zaxis: axis3d(linear[2] || ""),
+      camera: { projection: { type: "orthographic" }, eye: flat ? { x: 0, y: 0, z: 1.6 } : { x: 1.2, y: -1.3, z: 0.9 },
+        up: flat ? { x: 0, y: 1, z: 0 } : { x: 0, y: 0, z: 1 } },
+    };
+  }
+  const pathPlot = element("path"), profilePlot = element("profile");
+  await Plotly.newPlot(pathPlot, [
+    { type: "scatter3d", mode: "lines", ...programmed, line: { width: 2, color: dim }, opacity: 0.45, hoverinfo: "skip", name: "programmed" },
+    pathTrace(),
+    { type: "scatter3d", mode: "markers", x: [place(0)[0]], y: [place(0)[1]], z: [place(0)[2]], hoverinfo: "skip",
+      marker: { size: 7, color: dark ? "#ffffff" : "#000000" }, name: "here" },
+  ], { scene: scene(), margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, uirevision: "keep" }, bare);
+  function redrawPath() {
+    const trace = pathTrace();
+    return Plotly.react(pathPlot, [pathPlot.data[0], trace, pathPlot.data[2]], pathPlot.layout, bare);
+  }
+  for (const button of element("colours").children) {
+    button.onclick = () => {
+      colouring = button.dataset.colour;
+      for (const other of element("colours").children) other.classList.toggle("on", other === button);
+      redrawPath();
+    };
+  }
+
+  // The profiles: of every bucket of samples the least and the greatest value, so that no peak is lost.
+  function bucketed(column, scale = 1) {
+    const [first, last] = range, size = Math.max(1, Math.ceil((last - first + 1) / BUCKETS)), base = c[against], x = [], y = [];
+    for (let from = first; from <= last; from += size) {
+      let low = from, high = from;
+      for (let k = from; k < Math.min(from + size, last + 1); k++) {
+        if (column[k] < column[low]) low = k;
+        if (column[k] > column[high]) high = k;
+      }
+      for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
+        x.push(base[k]);
+        y.push(column[k] * scale);
+      }
+    }
+    return { x, y };
+  }
+  function profileTraces() {
+    const line = (color, dash) => ({ color, width: dash ? 1 : 1.4, dash });
+    const traces = [
+      { ...bucketed(c.programmed), name: "programmed", line: line(dim, "dash"), yaxis: "y", hoverinfo: "skip" },
+      { ...bucketed(c.feed), name: "feed", line: line(ink), yaxis: "y" },
+    ];
+    axes.forEach((axis, k) => {
+      for (const [kind, place, quantity] of [["a", "y2", "acceleration"], ["j", "y3", "jerk"]]) {
+        const limit = about.machine[axis][quantity];
+        traces.push({ ...bucketed(c[kind + axis], 100 / limit), name: axis, legendgroup: axis, showlegend: kind === "a", line: line(COLOURS[k % 7]),
+          yaxis: place, hovertemplate: `${axis}: %{y:.4g} % of ${digits(limit)} ${unit(axis)}/s${kind === "a" ? "²" : "³"}<extra></extra>` });
+      }
+    });
+    return traces.map((trace) => ({ type: "scatter", mode: "lines", ...trace }));
+  }
+  const yAxis = (title, domain, more) => ({ title: { text: title }, domain, gridcolor: rule, zerolinecolor: rule, fixedrange: true, ...more });
+  function profileLayout() {
+    const bound = (at, place) => ({ type: "line", xref: "paper", x0: 0, x1: 1, yref: place, y0: at, y1: at, line: { color: dim, width: 1, dash: "dot" } });
+    const base = c[against];
+    return {
+      margin: { l: 62, r: 14, t: 8, b: 42 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
+      hovermode: "closest", legend: { orientation: "h", y: 1.06 },
+      xaxis: { title: { text: against === "t" ? "time [s]" : "length along the path [mm]" }, range: [base[range[0]], base[range[1]]], gridcolor: rule, anchor: "y3" },
+      yaxis: yAxis("feed [mm/s]", [0.7, 1], { rangemode: "tozero" }),
+      yaxis2: yAxis("acceleration<br>[% of the limit]", [0.36, 0.64], { range: [-112, 112], tickvals: [-100, -50, 0, 50, 100] }),
+      yaxis3: yAxis("jerk<br>[% of the limit]", [0, 0.29], { range: [-112, 112], tickvals: [-100, -50, 0, 50, 100] }),
+      shapes: [bound(100, "y2"), bound(-100, "y2"), bound(100, "y3"), bound(-100, "y3"),
+        { type: "line", xref: "x", yref: "paper", x0: base[now], x1: base[now], y0: 0, y1: 1, line: { color: COLOURS[5], width: 1.5 } }],
+    };
+  }
+  const drawProfile = () => Plotly.react(profilePlot, profileTraces(), profileLayout(), bare);
+  await drawProfile();
+  for (const button of element("against").children) {
+    button.onclick = () => {
+      against = button.dataset.against;
+      for (const other of element("against").children) other.classList.toggle("on", other === button);
+      drawProfile();
+    };
+  }
+  const find = (column, value) => {
+    let low = 0, high = N - 1;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (column[middle] < value) low = middle + 1; else high = middle;
+    }
+    return low;
+  };
+  profilePlot.on("plotly_relayout", (change) => {
+    if (change["xaxis.autorange"]) range = [0, N - 1];
+    else if (change["xaxis.range[0]"] !== undefined) {
+      const first = find(c[against], change["xaxis.range[0]"]), last = find(c[against], change["xaxis.range[1]"]);
+      range = [Math.max(0, Math.min(first, N - 2) - 1), Math.max(last, 1)];
+    } else return;
+    drawProfile();
+    redrawPath();
+  });
+
+  // Lists of any length: only the rows in sight are in the page.
+  function list(id, count, row, onClick) {
+    const box = element(id), height = 20, spacer = make("div"), drawn = new Map();
+    let marked = -1;
+    spacer.style.height = count * height + "px";
+    box.append(spacer);
+    const draw = () => {
+      const first = Math.max(0, Math.floor(box.scrollTop / height) - 5), last = Math.min(count, first + Math.ceil(box.clientHeight / height) + 10);
+      for (const [k, made] of drawn) if (k < first || k >= last) { made.remove(); drawn.delete(k); }
+      for (let k = first; k < last; k++) {
+        if (drawn.has(k)) continue;
+        const made = row(k);
+        made.classList.add("row");
+        made.style.top = k * height + "px";
+        made.classList.toggle("on", k === marked);
+        made.onclick = () => onClick(k);
+        box.append(made);
+        drawn.set(k, made);
+      }
+    };
+    box.onscroll = draw;
+    new ResizeObserver(draw).observe(box);
+    draw();
+    return {
+      clear() { for (const made of drawn.values()) made.remove(); drawn.clear(); draw(); },
+      mark(k, scroll) {
+        if (k !== marked) { drawn.get(marked)?.classList.remove("on"); marked = k; drawn.get(k)?.classList.add("on"); }
+        if (scroll && k >= 0 && (k * height < box.scrollTop || (k + 1) * height > box.scrollTop + box.clientHeight)) {
+          box.scrollTop = Math.max(0, k * height - box.clientHeight / 2);
+          draw();
+        }
+      },
+    };
+  }
+  const firstSample = new Map();
+  for (let k = N - 1; k >= 0; k--) firstSample.set(c.line[k], k);
+  const goToLine = (line) => { if (firstSample.has(line)) show(firstSample.get(line), true); };
+  const programList = list("program", programLines.length, (k) => {
+    const made = make("div");
+    made.append(make("span", String(k + 1), "number"), document.createTextNode(programLines[k]));
+    return made;
+  }, (k) => goToLine(k + 1));
+  if (!programLines.length) element("program").append(make("p", "The text of the program is not at hand.", "hint"));
+
+  function table(id, headings, columns, lineOf, wide) {
+    const order = Array.from(lineOf, (_, k) => k), head = make("div", undefined, wide);
+    let sorted = -1, way = 1, shown;
+    headings.forEach((heading, k) => {
+      const button = make("button", heading.name, heading.text ? "text" : "");
+      button.onclick = () => {
+        way = sorted === k ? -way : heading.text || k === 0 ? 1 : -1;
+        sorted = k;
+        const value = columns[k], safe = (v) => (typeof v === "number" && !Number.isFinite(v) ? -Infinity : v ?? -Infinity);
+        order.sort((a, b) => { const u = safe(value(a)), v = safe(value(b)); return way * (u < v ? -1 : u > v ? 1 : 0) || a - b; });
+        for (const other of head.children) other.classList.toggle("sorted", other === button);
+        shown.clear();
+      };
+      head.append(button);
+    });
+    element(id + "-head").append(head);
+    shown = list(id, order.length, (k) => {
+      const made = make("div", undefined, wide);
+      headings.forEach((heading, n) => {
+        const value = columns[n](order[k]);
+        made.append(make("span", typeof value === "number" ? (heading.whole ? String(value) : digits(value)) : value ?? "–", heading.text ? "text" : ""));
+      });
+      return made;
+    }, (k) => goToLine(lineOf[order[k]]));
+  }
+  table("lines", [
+    { name: "line", whole: true }, { name: "text", text: true }, { name: "planned [s]" }, { name: "programmed [s]" }, { name: "planned / programmed" },
+    { name: "highest feed [mm/s]" }, { name: "held by", text: true }, { name: "deviation [µm]" },
+  ], [
+    (k) => c.line_number[k], (k) => (programLines[c.line_number[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
+    (k) => c.line_planned[k] / c.line_programmed[k], (k) => c.line_highest[k], (k) => about.limits[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
+  ], c.line_number, "cells");
+  const corner = about.corners;
+  if (corner.line && corner.line.length) {
+    table("corners", [
+      { name: "line", whole: true }, { name: "angle [deg]" }, { name: "feed [mm/s]" }, { name: "eq. 19: feed / allowed" }, { name: "eq. 18: error / budget" },
+      { name: "eq. 20 [mm/s]" }, { name: "feed / eq. 20" },
+    ], ["line", "angle", "feed", "eq19", "eq18", "eq20", "gain"].map((name) => (k) => corner[name][k]), corner.line, "cells seven");
+    element("corner-count").textContent = `${corner.line.length.toLocaleString()} of ${summary.corners.count.toLocaleString()} corners`;
+  } else element("corners-box").hidden = true;
+
+  // Shares of the time
+  {
+    const held = Object.entries(summary.held_by || {}).filter(([, share]) => share > 0.0005).reverse();
+    const named = about.limits;
+    const colour = (name) => (named.includes(name) ? limitColour(named.indexOf(name)) : "#8c8c8c");
+    if (held.length) {
+      await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(name)), x: held.map(([, share]) => 100 * share),
+        marker: { color: held.map(([name]) => colour(name)) }, hovertemplate: "%{y}: %{x:.3g} % of the time<extra></extra>" }],
+      { margin: { l: 110, r: 14, t: 6, b: 40 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
+        xaxis: { title: { text: "share of the cycle time [%]" }, gridcolor: rule }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
+    } else element("share").remove();
+  }
+
+  // One place of the motion, shown everywhere
+  function show(k, scroll) {
+    now = k;
+    element("clock").textContent = c.t[k].toFixed(3) + " s";
+    element("where").textContent = `line ${c.line[k]}, ${digits(c.feed[k])} mm/s, ${about.limits[c.limit[k]]}`;
+    programList.mark(c.line[k] - 1, scroll);
+    Plotly.restyle(pathPlot, marker(), [2]);
+    Plotly.relayout(profilePlot, { "shapes[4].x0": c[against][k], "shapes[4].x1": c[against][k] });
+  }
+  const sampleOf = (event) => {
+    const point = event.points.find((one) => one.data.rows);
+    return point ? point.data.rows[point.pointNumber] : null;
+  };
+  pathPlot.on("plotly_click", (event) => { const k = sampleOf(event); if (k !== null) show(k, true); });
+  pathPlot.on("plotly_hover", (event) => { const k = sampleOf(event); if (k !== null) programList.mark(c.line[k] - 1, true); });
+  profilePlot.on("plotly_hover", (event) => show(find(c[against], event.points[0].x), true));
+
+  let playing = null;
+  element("play").onclick = () => {
+    if (playing !== null) { cancelAnimationFrame(playing); playing = null; element("play").textContent = "▶"; return; }
+    element("play").textContent = "⏸";
+    if (now >= N - 1) show(0, true);
+    let before = performance.now(), time = c.t[now], drawn = 0;
+    const frame = (at) => {
+      time += (at - before) / 1000 * Number(element("speed").value);
+      before = at;
+      if (at - drawn > 60) { drawn = at; show(find(c.t, Math.min(time, c.t[N - 1])), true); }
+      if (time >= c.t[N - 1]) { show(N - 1, true); playing = null; element("play").textContent = "▶"; return; }
+      playing = requestAnimationFrame(frame);
+    };
+    playing = requestAnimationFrame(frame);
+  };
+  window.report = { ready: true, show, state: () => ({ now, range, colouring, against, line: c.line[now], samples: N }) };
+  document.body.dataset.ready = "yes";
+})();

@@ -1,0 +1,248 @@
+"""Trajectory files, read: those of this package (trajectory_file.py), and files made elsewhere.
+
+Only `t` and the positions are required. Positions may also be one NumPy array (T, n) that is named by its axes, `xyz`. Columns of
+other names are left alone.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.files import require_ending
+from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.motion.trajectory import Trajectory
+from planner.report.digits import on_grid, rounding
+from planner.verify.given import DERIVATIVES, Given
+
+Format = Literal["parquet", "csv", "npz"]
+FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")
+CSV_METADATA = ".meta.json"  # takes the place of the suffix .csv
+KNOWN = {"t", "s", "feed", "line", "block"} | {
+    prefix + axis for prefix in ("", "v", "a", "j") for axis in LINEAR_AXES + ROTARY_AXES
+}
+# Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
+# are noise.
+TIME_STEP_MIN = 1e-9
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrajectoryFile:
+    """A trajectory as it was read from a file.
+
+    trajectory : the samples
+    given      : which columns the file had, and with how many digits
+    metadata   : what the file says about itself; empty for files made elsewhere
+    notes      : columns that the file lacks and how they were filled, one sentence each
+    """
+
+    trajectory: Trajectory
+    given: Given
+    metadata: dict[str, Any]
+    notes: tuple[str, ...]
+
+
+def read_trajectory(path: str | Path) -> TrajectoryFile:
+    """Read a trajectory file, written by this package or by another program.
+
+    Required are `t` [s] and at least one column for an axis [mm]. Missing velocities, accelerations and jerks are divided differences
+    of the other columns, at rest before the first sample and after the last; a missing `s` is the length of the polyline through the
+    samples, a missing `feed` the speed on it. Missing `line` and `block` are 0 and -1, "unknown".
+
+    Raises InputError naming the file and the column.
+    """
+    path = Path(path)
+    read = {".parquet": _read_parquet, ".csv": _read_csv, ".npz": _read_npz}.get(path.suffix.lower())
+    if read is None:
+        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(FORMATS)}", source=str(path))
+    try:
+        require_ending(path)
+        given, text = read(path)
+        about = json.loads(text) if text else {}
+    except InputError:
+        raise
+    except FileNotFoundError as fault:
+        raise InputError("trajectory file not found", source=str(path)) from fault
+    except RecursionError:
+        raise InputError("cannot be read: its metadata are nested too deep", source=str(path)) from None
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
+        raise InputError(f"cannot be read: {fault}", source=str(path)) from fault
+    columns: dict[str, Array] = {}
+    for name, column in _one_by_one(given).items():
+        word = name.strip().lower()
+        if word in KNOWN:
+            columns[word] = _numbers(path, name, column)
+    trajectory, digits, notes = _assemble(str(path), columns, tuple(given))
+    return TrajectoryFile(
+        trajectory=trajectory, given=digits, metadata=about if isinstance(about, dict) else {}, notes=notes
+    )
+
+
+def _one_by_one(given: dict[str, Any]) -> dict[str, Any]:
+    """The columns, with an array (T, n) that is named by n axes taken apart."""
+    columns: dict[str, Any] = {}
+    for name, column in given.items():
+        letters = name.strip().lower()
+        if (
+            np.ndim(column) == 2
+            and np.shape(column)[1] == len(letters) > 1
+            and set(letters) <= {*LINEAR_AXES, *ROTARY_AXES}
+        ):
+            columns |= {letter: column[:, k] for k, letter in enumerate(letters)}
+        else:
+            columns[name] = column
+    return columns
+
+
+def _read_parquet(path: Path) -> tuple[dict[str, Any], str]:
+    from pyarrow import parquet
+
+    table = parquet.read_table(path)
+    text = (table.schema.metadata or {}).get(b"planner", b"").decode()
+    return {name: table[name].to_numpy() for name in table.column_names}, text
+
+
+def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
+    from pyarrow import csv
+
+    table = csv.read_csv(path)
+    beside = path.with_suffix(CSV_METADATA)
+    text = beside.read_text(encoding="utf-8") if beside.exists() else ""
+    return {name: table[name].to_numpy() for name in table.column_names}, text
+
+
+def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
+    file = np.load(path, allow_pickle=False)
+    if not isinstance(file, np.lib.npyio.NpzFile):
+        raise ValueError("a single array (.npy), not a .npz file")
+    with file:
+        return {name: file[name] for name in file.files if name != "metadata"}, (
+            str(file["metadata"]) if "metadata" in file.files else ""
+        )
+
+
+def _numbers(path: Path, name: str, column: Any) -> Array:
+    """A column as numbers. Raises InputError naming the column and the row of the first that is none."""
+    column = np.asarray(column)
+    if column.ndim != 1 or column.dtype.kind not in "fiub":
+        raise InputError(
+            f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed",
+            source=str(path),
+        )
+    bad = np.flatnonzero(~np.isfinite(column))
+    if len(bad):
+        raise InputError(
+            f"column '{name}', row {bad[0] + 1}: {column[bad[0]]}; every value must be a finite number",
+            source=str(path),
+        )
+    return column
+
+
+def _assemble(
+    source: str, columns: dict[str, Array], found: tuple[str, ...]
+) -> tuple[Trajectory, Given, tuple[str, ...]]:
+    """The trajectory of the known columns; `found` are the names of all that the file has."""
+    axes = tuple(axis for axis in LINEAR_AXES + ROTARY_AXES if axis in columns)
+    if "t" not in columns or not axes:
+        missing = "column 't' is missing" if "t" not in columns else "there is no column of an axis"
+        raise InputError(
+            f"{missing}; found are {', '.join(found) or 'none'}; needed are t [s] and "
+            "the positions x, y, ... [mm, rotary axes rad]",
+            source=source,
+        )
+    lengths = {name: len(column) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError(f"the columns differ in length: {lengths}", source=source)
+    t, time_rounding, end_rounding, notes = _times(source, columns["t"])
+    levels = [np.stack([columns[axis] for axis in axes], axis=1).astype(np.float64)]
+    order_of = [0]  # order of the last level that the file holds, to differentiate from
+    for prefix, word in (("v", "velocity"), ("a", "acceleration"), ("j", "jerk")):
+        lacking = [prefix + axis for axis in axes if prefix + axis not in columns]
+        if lacking:
+            base, order = levels[order_of[-1]], len(levels) - order_of[-1]
+            levels.append(divided_difference(t, base, order))
+            notes.append(f"{word} derived from the {_LEVELS[order_of[-1]]} (no column {', '.join(lacking)})")
+        else:
+            order_of.append(len(levels))
+            levels.append(np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64))
+    position, velocity, acceleration, jerk = levels
+    linear = [k for k, axis in enumerate(axes) if axis in LINEAR_AXES]
+    fill: dict[str, Callable[[], Array]] = {
+        "s": lambda: np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position[:, linear], axis=0), axis=1))),
+        "feed": lambda: np.linalg.norm(velocity[:, linear], axis=1),
+        "line": lambda: np.zeros(len(t)),
+        "block": lambda: np.full(len(t), -1),
+    }
+    said = {"s": "length of the polyline", "feed": "speed of the axes", "line": "unknown", "block": "unknown"}
+    notes += [f"{name}: {said[name]} (no column {name})" for name in fill if name not in columns]
+    rest = {name: columns[name] if name in columns else make() for name, make in fill.items()}
+    trajectory = Trajectory(
+        axes=axes,
+        dt=float(np.median(np.diff(t))),
+        t=t,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        **rest,
+    )
+    delivered = Given(
+        columns=tuple(DERIVATIVES[level - 1] for level in order_of[1:]),
+        position_rounding=tuple(rounding(columns[axis]) for axis in axes),
+        time_rounding=time_rounding,
+        end_rounding=end_rounding,
+    )
+    return trajectory, delivered, tuple(notes)
+
+
+def _times(source: str, given: Array) -> tuple[FloatArray, float, float, list[str]]:
+    """Times from 0 [s], what of their rounding remains for all and for the last (digits.py), and notes on it."""
+    if len(given) < 2:
+        raise InputError(f"{len(given)} samples; at least 2 are needed", source=source)
+    late = np.flatnonzero(np.diff(given.astype(np.float64)) < TIME_STEP_MIN)
+    if len(late):
+        raise InputError(
+            f"column 't', row {late[0] + 2}: times must increase by at least {TIME_STEP_MIN:g} s",
+            source=source,
+        )
+    t, written, time_rounding, end_rounding = on_grid(given)
+    notes = []
+    if time_rounding:
+        notes.append(f"times are good to {time_rounding:.2g} s, and not those of one period")
+    elif np.abs(t - (given.astype(np.float64) - float(given[0]))).max() > TIME_STEP_MIN:
+        notes.append(f"times are good to {written:.2g} s, and taken as k x {t[1]:.9g} s")
+    return t, time_rounding, end_rounding, notes
+
+
+_LEVELS = ("positions", "velocity", "acceleration")
+
+
+def divided_difference(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
+    """Derivative of samples by divided differences.
+
+    t      : (T,) times [s]
+    values : (T, A) samples
+    order  : 1, 2 or 3
+
+    At sample i: order 1 over i-1, i+1; order 2 over i-1, i, i+1; order 3 over i-1 .. i+2. Before the first sample and after the last
+    the values are held, as a machine at rest holds them. Exact for polynomials of degree 1, 2 and 3 on equal steps.
+    """
+    after = 1 if order < 3 else 2
+    steps = np.diff(t)
+    t = np.concatenate([[t[0] - steps[0]], t, t[-1] + steps[-1] * np.arange(1, after + 1)])
+    values = np.concatenate([values[:1], values, np.repeat(values[-1:], after, axis=0)])
+    if order == 1:
+        return (values[2:] - values[:-2]) / (t[2:] - t[:-2])[:, None]
+    table = values
+    for k in range(1, order + 1):
+        table = (table[1:] - table[:-1]) / (t[k:] - t[:-k])[:, None]
+    return table * math.factorial(order)

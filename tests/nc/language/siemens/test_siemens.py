@@ -1,0 +1,227 @@
+"""Sinumerik programs against the same moves written out in RS274NGC."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.base.errors import InputError
+from planner.machine import load_machine
+from planner.nc.program import Kind, PathControl, Program
+from planner.nc.reader import parse_program
+from planner.nc.reading import Reading
+
+MILL = load_machine("mill")
+REAL = (
+    Path(__file__).resolve().parents[5]
+    / "shared"
+    / "nc"
+    / "121philip__SINUMERIK-840D-sl-CAS-Package__CAM_TEST.MPF"
+)
+SIEMENS = Reading(dialect="siemens")
+
+
+def read(text: str) -> Program:
+    return parse_program(text, MILL, SIEMENS)
+
+
+def same(found: Program, text: str) -> None:
+    expected = parse_program(text, MILL)
+    assert found.kind.tolist() == expected.kind.tolist()
+    np.testing.assert_allclose(found.end, expected.end, atol=1e-9)
+    np.testing.assert_allclose(found.feed, expected.feed)
+    np.testing.assert_allclose(found.arc_center, expected.arc_center, atol=1e-9)
+    np.testing.assert_allclose(found.arc_sweep, expected.arc_sweep, atol=1e-9)
+    np.testing.assert_allclose(found.dwell, expected.dwell)
+
+
+def test_words_with_values_and_coordinates_of_both_kinds() -> None:
+    found = read(
+        """N10 DEF REAL _HOME=5, W
+N20 G17 G710 G90 G94 FNORM FFWON SOFT ; comment
+N25 T="MILL 8" M6 MSG("cut; now")
+N30 G0 X10.5 Y=_HOME Z=2*(_HOME+1) S3000 M3 D1
+N40 G1 X=IC(4) Y=AC(7) F=R1+600
+N50 G3 X20 Y=IC(10) CR=8
+N60 G2 X=AC(30) I=AC(25) J0 G64
+N70 G91 G1 X=AC(0) Y5
+N80 G90 G4 F1.5
+N90 G0 SUPA Z=-3
+M30"""
+    )
+    same(
+        found,
+        """G21 G90 G94
+T0 M6
+G0 X10.5 Y5 Z12
+G1 X14.5 Y7 F600
+G3 X20 Y17 R8
+G2 X30 I5 J0
+G1 X0 Y22
+G4 P1.5
+G53 G0 Z-3
+M30""",
+    )
+    assert found.line.tolist()[1:4] == [4, 5, 6]
+
+
+def test_loops_branches_and_jumps() -> None:
+    found = read(
+        """DEF INT K
+DEF REAL A
+R5=10 R[6]=POT(3)
+G0 X0 Y0
+FOR K=1 TO 3
+  G1 X=K*R5 F600
+ENDFOR
+WHILE A<2
+  A=A+1
+  IF A==1
+    Y=R6
+  ELSE
+    Y=-A
+  ENDIF
+ENDWHILE
+REPEAT
+  A=A-1
+  Z=A
+UNTIL A<=0
+LOOP
+  R1=R1+1
+  IF R1>2 GOTOF DONE
+  X=IC(-1)
+ENDLOOP
+DONE: X=SQRT(16)*SIN(30)+TRUNC(7.9)+5 MOD 3
+AGAIN:
+Y=IC(1)
+REPEAT AGAIN P=2
+IF NOT (R1==4) AND TRUE GOTOF N900
+X999
+N900 Z=7 DIV 2"""
+    )
+    same(
+        found,
+        "G21 G0 X0 Y0\nG1 X10 F600\nX20\nX30\nY9\nY-2\nZ1\nZ0\nX29\nX28\nX11\nY-1\nY0\nY1\nZ3",
+    )
+
+
+def test_drilling_cycles_shifts_and_tolerance() -> None:
+    found = read(
+        """G90 G0 X0 Y0 Z30 F300
+TRANS X10
+ATRANS X5 Z1
+CYCLE832(0.03,_NO)
+X0
+CYCLE82(20,0,2,-10,,0.5)
+MCALL CYCLE81(10,0,3,,8)
+X20
+G0 X30 Y5
+MCALL
+X40
+TRANS
+X1""".replace("_NO", "1")
+    )
+    same(
+        found,
+        """G21 G90 G0 X0 Y0 Z30 F300
+G52 X15 Z1
+X0
+Z2
+G1 Z-10
+G4 P0.5
+G0 Z20
+X20
+Z3
+G1 Z-8
+G0 Z10
+G0 X30 Y5
+Z3
+G1 Z-8
+G0 Z10
+X40
+G52 X0 Z0
+X1""",
+    )
+    assert found.path_control[2] == PathControl.BLEND
+    assert found.tolerance[2] == 0.03
+
+
+@pytest.mark.parametrize("out", [0, 1])
+def test_deep_holes_are_drilled_by_infeeds(out: int) -> None:
+    found = read(f"G90 G0 X0 Y0 Z30 F300\nCYCLE83(20,0,2,-20,,-8,,3,0,0,1,{out})")
+    back = [-7, 2][out]
+    feeds = found.end[found.kind == Kind.LINE, 2].tolist()
+    assert feeds == pytest.approx([-8, -13, -16, -19, -20])
+    assert found.end[3, 2] == back
+    assert found.end[-1, 2] == 20
+    assert read("G0 Z30 F300\nCYCLE83(20,0,2,-20,,-30,,0,0,0,1,1)").end[2, 2] == -20
+
+
+def test_exact_stops_and_units() -> None:
+    found = read("G700 G60 G1 X1 F60\nG64\nG9 X2\nX3")
+    assert found.path_control[0] == PathControl.EXACT_STOP
+    assert found.end[-1, 0] == pytest.approx(76.2)
+    assert Kind.STOP in found.kind.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("G0 X0\nROT Z30", "<text>:2:1: .*ROT is not read"),
+        ("TRAORI", "TRAORI is not read"),
+        ("X=FOO", "<text>:1:3: .*FOO is not declared"),
+        ("CYCLE800(1,,2,3,10,0,0)", "tilts the part"),
+        ("POCKET3(1,2)", "POCKET3 is not read"),
+        ("MCALL POCKET3(1)", "MCALL POCKET3 is not read"),
+        ("IF R1==1", "this IF has no end"),
+        ("ENDWHILE", "no WHILE open"),
+        ("G1 X=1/0 F100", "<text>:1:1: .*division by zero"),
+        ("GOTOF NOWHERE", "to go to"),
+        ("REPEAT NOWHERE", "no label NOWHERE"),
+        ("G187 X1", "G187 of Siemens is not read"),
+        ("DEF STRING[10] A", "DEF STRING is not read"),
+        ("CYCLE81(1,2)", "CYCLE81 needs SDIS"),
+        ("X=(1", r"\) is expected"),
+        ("X=R1000", "R0 to R999"),
+        ("G4 S3", "write G4 F"),
+        ("LOOP\nENDLOOP", "does this loop end"),
+    ],
+)
+def test_what_is_not_read_is_refused_with_its_place(
+    text: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("planner.nc.language.run.TURNS_MAX", 10_000)
+    with pytest.raises(InputError, match=said):
+        read(text)
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="../shared/nc is not here")
+def test_a_real_program_is_recognised_and_read() -> None:
+    found = parse_program(REAL.read_bytes(), MILL)
+    assert len(found) == 980
+    assert found.expansion is not None
+    assert found.expansion.dialect == "siemens"
+
+
+def test_mutated_programs_end_in_a_program_or_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planner.nc.language.run.TURNS_MAX", 2_000)
+    rng = np.random.default_rng(3)
+    base = (
+        "DEF REAL A=2, B\nG17 G90 G0 X10 Y=A*(3+B) Z=IC(5) F600\nFOR R1=1 TO 3\nG1 X=R1 Y=AC(4)\nENDFOR\nIF A>1 GOTOF E1\nX9\n"
+        'E1: CYCLE82(20,0,2,-10,,0.5)\nMSG("x")\nMCALL CYCLE81(10,0,3,,8)\nX5\nMCALL\nG2 X=IC(4) I=AC(7) J0\nTRANS X3\nM30\n'
+    )
+    pieces = base.split()
+    refused = 0
+    for _ in range(200):
+        text = base
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(0, len(text)))
+            cut = int(rng.integers(0, 9))
+            text = text[:at] + " " + str(rng.choice(pieces)) + " " + text[at + cut :]
+        try:
+            read(text)
+        except InputError:
+            refused += 1
+    assert 0 < refused < 200

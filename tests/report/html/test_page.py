@@ -1,0 +1,264 @@
+"""The report: its columns against the plan, distances against another formula, and the page in a real browser."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planner
+from planner.base.errors import InputError
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.distance import distance_near
+from planner.job.plan import Plan
+from planner.machine import load_machine
+from planner.nc.reader import parse_program
+from planner.report.export import write_plan
+from planner.report.html.data import lines_of, programmed_path, samples_of
+from planner.report.html.page import report_page
+from planner.report.html.saved import saved_plan
+from tests.commands.command_line import run
+
+JOB = "G21 F3000 (</script><script>document.title='ran'</script>)\nG1 X40 Y3\nG3 X40 Y33 J15\nG1 X0 Z-2\nG0 X0 Y0 Z0\n"
+MILL = load_machine("mill")
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("report") / "job <b>.ngc"
+    file.write_text(JOB)
+    return file
+
+
+@pytest.fixture(scope="module")
+def plan(job: Path) -> Plan:
+    return planner.plan(job, MILL, effort="quick")
+
+
+@pytest.fixture(scope="module")
+def page(plan: Plan) -> str:
+    return report_page(plan, JOB.encode())
+
+
+def column(page: str, name: str, kind: str) -> np.ndarray:
+    found = re.search(rf'id="column-{name}">([^<]*)<', page)
+    assert found
+    return np.frombuffer(gzip.decompress(base64.b64decode(found.group(1))), kind)
+
+
+def test_columns_are_those_of_the_plan(page: str, plan: Plan) -> None:
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    assert np.array_equal(column(page, "t", "<f8"), trajectory.t)
+    assert np.array_equal(column(page, "feed", "<f4"), trajectory.feed.astype(np.float32))
+    assert np.array_equal(column(page, "jy", "<f4"), trajectory.jerk[:, 1].astype(np.float32))
+    assert column(page, "program", "<u1").tobytes() == JOB.encode()
+    about = json.loads(re.search(r'id="about">(.*?)</script>', page, re.DOTALL).group(1))  # type: ignore[union-attr]
+    assert about["summary"]["cycle_time_s"] == trajectory.cycle_time
+    assert about["limits"][-1] == "none"
+
+
+def test_deviation_is_that_of_the_verdict(plan: Plan) -> None:
+    assert plan.verdict is not None
+    worst = float(samples_of(plan).deviation.max())
+    assert plan.verdict.contour_error_mm is not None
+    assert 0.5 * plan.verdict.contour_error_mm < worst <= plan.verdict.contour_error_mm + 1e-9
+
+
+def test_times_of_lines_add_up(plan: Plan) -> None:
+    assert plan.trajectory is not None
+    lines = lines_of(plan, samples_of(plan))
+    assert lines.line.tolist() == [2, 3, 4, 5]
+    assert lines.planned.sum() == pytest.approx(plan.trajectory.cycle_time)
+    assert np.isnan(lines.programmed[-1])
+    assert lines.programmed[1] == pytest.approx(15.0 * np.pi / 50.0)
+    assert (lines.planned[:3] > lines.programmed[:3] * (1.0 - 1e-2)).all()
+    assert (lines.highest[:3] <= 50.0 * (1 + 1e-9)).all()
+
+
+def test_thinned_samples_keep_the_peaks(plan: Plan) -> None:
+    every, few = samples_of(plan), samples_of(plan, most=200)
+    assert few.step > 1
+    assert len(few.shown) <= 300
+    assert few.shown.feed.max() == every.shown.feed.max()
+    assert few.shown.t[[0, -1]].tolist() == every.shown.t[[0, -1]].tolist()
+    assert (np.diff(few.shown.t) > 0).all()
+
+
+def test_distances_from_lines_arcs_and_helices() -> None:
+    text = "G21 F99\nG1 X10\nG3 X10 Y20 Z6 J10 P3\nG2 X30 Y20 I10\nG1 X40"
+    toolpath = toolpath_from_program(parse_program(text, MILL), MILL, None)
+    rng = np.random.default_rng(1)
+    segment = rng.integers(0, len(toolpath), 200)
+    point = toolpath.start[segment] + rng.normal(0.0, 3.0, (200, 3))
+    fine = []
+    for k in range(len(toolpath)):
+        u = np.linspace(0.0, 1.0, 40_001)[:, None]
+        if toolpath.arc[k] < 0:
+            fine.append(toolpath.start[k] + u * (toolpath.end[k] - toolpath.start[k]))
+            continue
+        row, x = toolpath.arc[k], u * toolpath.length[k]
+        angle = toolpath.arcs.rate[row] * x
+        ring = np.cos(angle) * toolpath.arcs.e1[row] + np.sin(angle) * toolpath.arcs.e2[row]
+        fine.append(
+            toolpath.arcs.center[row] + toolpath.arcs.radius[row] * ring + toolpath.arcs.drift[row] * x
+        )
+    cloud = np.vstack(fine)
+    expected = np.array([np.linalg.norm(cloud - one, axis=1).min() for one in point])
+    found = distance_near(toolpath, point, segment)
+    flat = toolpath.arcs.drift[:, 2] == 0.0
+    assert flat.tolist() == [False, True]
+    # On a helix the point at the same angle is not quite the nearest: its rise per mm bounds by how much.
+    assert (found >= expected - 1e-5).all()  # expected: the nearest of many points
+    assert (found <= expected * np.sqrt(1.0 + (toolpath.arcs.drift[0, 2]) ** 2) + 1e-3).all()
+
+
+def test_distances_from_curves() -> None:
+    toolpath = toolpath_from_program(
+        parse_program("G21 F99\nG1 X10\nG5 I5 J5 P-5 Q8 X40 Y10", MILL), MILL, None
+    )
+    segment = np.flatnonzero(toolpath.curve >= 0)
+    assert len(segment)
+    rng = np.random.default_rng(2)
+    shares = rng.random(len(segment))
+    on = toolpath.curves.at(
+        toolpath.curve[segment], toolpath.length[segment], shares * toolpath.length[segment]
+    )[:, 0]
+    assert distance_near(toolpath, on, segment).max() < 1e-6
+    off = on + np.array([0.0, 0.0, 0.3])
+    np.testing.assert_allclose(distance_near(toolpath, off, segment), 0.3, atol=1e-9)
+
+
+def test_programmed_path_goes_through_the_vertices(plan: Plan) -> None:
+    points = programmed_path(plan.toolpath)
+    for vertex in plan.toolpath.end:
+        assert np.linalg.norm(points - vertex, axis=1).min() < 1e-9
+
+
+def test_a_plan_without_a_solution_profile_has_a_report(job: Path) -> None:
+    stop = planner.plan(job, MILL, method="stop")
+    assert stop.grid is None
+    samples = samples_of(stop)
+    assert set(samples.limits) - {"none"} <= {
+        f"{q}.{a}" for q in ("velocity", "acceleration", "jerk") for a in "xyz"
+    } | {"feed"}
+    assert "column-t" in report_page(stop)
+
+
+def test_report_of_files_shows_the_same(tmp_path: Path, plan: Plan, page: str) -> None:
+    write_plan(plan, tmp_path / "out", report=True)
+    written = (tmp_path / "out" / "report.html").read_text("utf-8")
+    again = run("report", tmp_path / "out", "-o", tmp_path / "again.html")
+    assert again.exit_code == 0, again.output
+    other = (tmp_path / "again.html").read_text("utf-8")
+    for name in ("t", "feed", "deviation", "line_planned"):
+        for shown in (written, other):
+            assert np.array_equal(column(shown, name, "<u1"), column(page, name, "<u1"))
+    assert (
+        run("report", tmp_path / "out", "-o", tmp_path / "again.html").exit_code == 0
+    )  # a report is replaced
+    (tmp_path / "mine.html").write_text("mine")
+    assert run("report", tmp_path / "out", "-o", tmp_path / "mine.html").exit_code == 2
+    assert run("report", tmp_path).exit_code == 2
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    (tmp_path / "out" / "summary.json").write_text(json.dumps({**summary, "run_id": "other"}))
+    with pytest.raises(InputError, match="of two runs"):
+        saved_plan(tmp_path / "out")
+
+
+def test_report_needs_a_directory(job: Path) -> None:
+    refused = run("plan", job, "--report")
+    assert refused.exit_code == 2
+    assert "name one with -o DIR" in refused.output
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory, page: str) -> Iterator[Any]:
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if not chromium or not driver:
+        pytest.skip("chromium and its driver (packages chromium, chromium-driver) are not installed")
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--window-size=1400,1800",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    file = tmp_path_factory.mktemp("page") / "report.html"
+    file.write_text(page, encoding="utf-8")
+    opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    opened.set_script_timeout(60)
+    opened.get(f"file://{file}")
+    _wait(opened, "return document.body.dataset.ready")
+    yield opened
+    opened.quit()
+
+
+def _wait(browser: Any, question: str, seconds: float = 90.0) -> Any:
+    """The answer of the page once it is one."""
+    until = time.monotonic() + seconds
+    while not (answer := browser.execute_script(question)):
+        assert time.monotonic() < until, f"no answer: {question}"
+        time.sleep(0.1)
+    return answer
+
+
+@pytest.mark.slow
+def test_page_renders_in_a_browser(browser: Any, plan: Plan) -> None:
+    assert plan.trajectory is not None
+    assert browser.title == "job <b>.ngc · planned"  # as text: nothing of the program ran
+    assert browser.execute_script("return document.querySelectorAll('#title b').length") == 0
+    assert browser.execute_script("return report.state().samples") == len(plan.trajectory)
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+    first = browser.execute_script("return document.querySelector('#program .row').textContent")
+    assert first == "1" + JOB.splitlines()[0]
+    traces = "return document.getElementById('path').data.map((one) => one.x.length)"
+    assert browser.execute_script(traces)[1] > 100
+
+
+@pytest.mark.slow
+def test_page_answers_to_clicks(browser: Any, plan: Plan) -> None:
+    from selenium.webdriver.common.by import By
+
+    browser.find_element(By.CSS_SELECTOR, "[data-colour=limit]").click()
+    assert browser.execute_script("return report.state().colouring") == "limit"
+    browser.find_element(By.CSS_SELECTOR, "[data-against=s]").click()
+    assert browser.execute_script(
+        "return document.getElementById('profile').layout.xaxis.title.text"
+    ).startswith("length")
+    browser.find_elements(By.CSS_SELECTOR, "#program .row")[3].click()
+    assert browser.execute_script("return report.state().line") == 4
+    hovered = "return document.getElementById('path').data[1].customdata[50]"
+    line, feed = browser.execute_script(hovered)[:2]
+    assert plan.trajectory is not None
+    assert (line, feed) == pytest.approx((plan.trajectory.line[50], plan.trajectory.feed[50]), rel=1e-6)
+    head = browser.find_elements(By.CSS_SELECTOR, "#lines-head button")
+    head[2].click()  # planned time, the longest first
+    rows = (
+        "return [...document.querySelectorAll('#lines .row')].sort((a, b) => a.offsetTop - b.offsetTop)"
+        ".map((row) => row.children[2].textContent)"
+    )
+    times = [float(text) for text in browser.execute_script(rows)]
+    assert times == sorted(times, reverse=True)
+    browser.execute_script("Plotly.relayout('profile', {'xaxis.range[0]': 1, 'xaxis.range[1]': 5})")
+    first, last = _wait(browser, "const r = report.state().range; return r[0] > 0 ? r : null")
+    assert plan.trajectory.s[first] <= 1.0 <= 5.0 <= plan.trajectory.s[last]
+    browser.execute_script("report.show(0)")
+    browser.find_element(By.ID, "play").click()
+    _wait(browser, "return report.state().now > 0")
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []

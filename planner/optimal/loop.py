@@ -66,8 +66,8 @@ from planner.smoothing.spline_path import SplineShape, with_spline
 
 # No round after so many that together gained less than this [-]: half of the gap that the solver leaves.
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
-# Of a round, at first and at least (smoothing/joint.py): with 0.1 for the second the bracket ends 4e-4 slower, between 0 and 1e-2 it ends
-# at the same time within 1e-4.
+# Of a round, at first and at least (smoothing/joint.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
+# same time within 1e-4.
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
 # Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of it [-].
 GOOD, POOR, LESS, MORE = 0.5, 0.1, 0.3, 4.0

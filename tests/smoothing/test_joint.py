@@ -151,7 +151,10 @@ def test_a_window_ends_at_the_optimum_of_its_problem():
         lambda z: (0.5 * band[free.ravel(), 0] * z**2 + linear.ravel()[free.ravel()] * z).sum(),
         np.zeros(free.sum()),
         jac=lambda z: band[free.ravel(), 0] * z + linear.ravel()[free.ravel()],
-        constraints=scipy.LinearConstraint(dense, -rows.lower, rows.upper),
+        constraints=[
+            {"type": "ineq", "fun": lambda z: rows.upper - dense @ z, "jac": lambda z: -dense},
+            {"type": "ineq", "fun": lambda z: rows.lower + dense @ z, "jac": lambda z: dense},
+        ],
         method="SLSQP",
         options={"maxiter": 500, "ftol": 1e-12},
     )

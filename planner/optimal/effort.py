@@ -31,11 +31,13 @@ class Effort:
 
     work   : grid points, counted over all rounds of reshaping
     rounds : of reshaping at most
+    left   : no more of them where one promises less than this share of the time [-]
     sizes  : grids by the size of the job, ascending
     """
 
     work: int
     rounds: int
+    left: float
     sizes: tuple[Grids, ...]
 
     def grids(self, points: int) -> Grids:
@@ -43,21 +45,23 @@ class Effort:
         return next(size for size in self.sizes if points <= size.points)
 
 
-# Rounds: the first five gain 2e-2 of the time, the next five 2e-3, then ten 1e-3, and the last twenty 4e-4 (means over random jobs,
-# benchmarks/ablation.py). Final grids: motions on 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than
+# Rounds: on the bracket the first two gain 2.5e-2 of the time, the next four 5e-3, and the next four 5e-4. Final grids: motions on
+# 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than
 # on 2e-4 (zig-zag on mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the
 # coarse grid leave small jobs 1e-3 slower.
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
-    QUICK: Effort(work=25_000, rounds=5, sizes=(_LARGE,)),
+    QUICK: Effort(work=25_000, rounds=2, left=1e-3, sizes=(_LARGE,)),
     NORMAL: Effort(
         work=150_000,
         rounds=40,
+        left=1e-5,
         sizes=(Grids(1_500, 2e-3, 2e-4), Grids(4_000, 8e-3, 5e-4), Grids(40_000, COARSE, 2e-3), _LARGE),
     ),
     BEST: Effort(
         work=5_000_000,
         rounds=100,
+        left=1e-6,
         sizes=(Grids(4_000, 2e-3, 2e-4), Grids(40_000, 8e-3, 5e-4), Grids(400_000, COARSE, 2e-3), _LARGE),
     ),
 }

@@ -42,7 +42,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.names import AUTO, NORMAL, SPLINE
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
@@ -59,21 +58,21 @@ from planner.optimal.geometry import corner_shape, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order
-from planner.optimal.reshape import FIRST_FORCE, chosen, price_bands, reshape, run_times
+from planner.optimal.reshape import chosen, reshape, run_times
 from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# None after so many that together gained less than this [-]: half of the gap that the solver leaves.
+# No round after so many that together gained less than this [-]: half of the gap that the solver leaves.
 ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
-# Factors on a run's force after a gain and after a loss. After 16 rounds 0.5 and 0.7 for the first are 1e-3 and 5e-4 slower on the mean
-# of bracket, relief and zig-zag, 0.92 is 1e-4 faster; 2 for the second is 2e-3 slower, 5 is the same.
-LESS, MORE = 0.85, 3.0
-SHARE = 0.5  # of the newest multipliers in their mean; with 1 eight rounds end 1e-4 to 1e-3 slower (pentagon, zig-zag, spiral)
-# Without jerk limits a failed round teaches what holds its shape; so more of them may fail, with less pull each. With the numbers
-# above, 4 of 40 random polylines stayed where they began, up to 4.5 % behind the motion with jerk limits.
-PATIENCE, MORE_PATIENT = 10, 1.5
+# Of a round, at first and at least (smoothing/joint.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
+# same time within 1e-4.
+FIRST_PULL, LEAST_PULL = 0.5, 1e-3
+# Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of it [-].
+GOOD, POOR, LESS, MORE = 0.5, 0.1, 0.3, 4.0
+# Gap of the first convex problem, that of the others as a share of what the round before promised, and the least [-].
+FIRST_GAP, GAP_SHARE, LAST_GAP = 1e-3, 0.1, 1e-5
 # Of 345 plans 9 exceeded a limit between the places looked at, and one of these once more (benchmarks/retries.py); each time with ten
 # times the margin.
 SEEN_ROUNDS = 2
@@ -207,25 +206,22 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
     assert shape is not None
     if not best.solution.solved or best.solution.multipliers is None or not len(best.path.spline):
         return best
-    jerk_limited, rounds = settings.order.jerk_limited, settings.rounds
+    rounds = settings.rounds
     if rounds is None:
         rounds = min(settings.effort.work // len(best.samples), settings.effort.rounds)
-    seen, more = (ROUNDS_SEEN, MORE) if jerk_limited else (PATIENCE, MORE_PATIENT)
-    force = np.full(len(shape.laid.fits), FIRST_FORCE)
-    paid: FloatArray | None = None  # what limits cost, mean over the rounds
+    pull, gap = np.full(len(shape.laid.fits), FIRST_PULL), FIRST_GAP
     reached = [best.solution.cycle_time]
     for n in range(1, rounds + 1):
-        if len(reached) > seen and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - seen]:
+        if len(reached) > ROUNDS_SEEN and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - ROUNDS_SEEN]:
             break
         with job.stage("geometry"):
-            newest, pull = price_bands(best)
-            paid = newest if paid is None else paid + SHARE * (newest - paid)
-            shape, _ = reshape(best, force, paid, pull)
+            shape, promised = reshape(best, pull, gap)
         before, tried = best, solve(shape, best)
         _tell_of(job, f"reshape {n}", tried, best)
         if not tried.solution.solved:
             break
-        faster = run_times(tried) < run_times(before)
+        gained = run_times(before) - run_times(tried)
+        faster = gained > 0.0
         if tried.faster_than(best):
             best = tried
         if faster.any() and not (faster | ~shape.laid.fits).all():
@@ -233,10 +229,13 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
             _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
             if mixed.faster_than(best):
                 best = mixed
-        if not jerk_limited and not faster.all():
-            paid = paid + SHARE * (price_bands(tried)[0] - paid)
-        force = np.where(faster, LESS * force, more * force)
+        change = np.where(gained > GOOD * promised, LESS, np.where(gained > POOR * promised, 1.0, MORE))
+        pull = np.maximum(change * pull, LEAST_PULL)
         reached.append(best.solution.cycle_time)
+        left = float(promised.sum()) / reached[-1]
+        if left < settings.effort.left:
+            break
+        gap = min(FIRST_GAP, max(GAP_SHARE * left, LAST_GAP))
     return best
 
 

@@ -1,27 +1,28 @@
-"""A round of reshaping: splines give way, within the tolerance, where limits cost their time-optimal motion most.
+"""A round of reshaping: splines and the motion along them are improved together, within the tolerance.
 
-Let x(t) be the time-optimal motion along a spline and lambda its multipliers, those of the axis jerks for instance. If the parameter of
-the spline is kept as a function of time, a small change of the control points changes the optimal time by
+Along the time-optimal motion of the present path all limits are linearised in the control points and in the time that every part of it
+takes; smoothing/joint.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem is
+then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of the
+promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
+order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+
+What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the parameter of the spline is
+kept as a function of time, a small change of the control points changes the optimal time by
 
     dT = sum over grid points and axes of  |lambda| d(|jerk| / limit)  +  the same of accelerations, velocities and feed,
 
-which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape. This sum is a convex quadratic in the control points,
-because the motion is linear in them. A round minimises it, with a pull towards the present shape,
+which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape, a convex quadratic in the control points. The
+multipliers of the corridor in
 
-    sum |lambda|/2 (jerk/limit)^2 + ...  +  force/2 integral ((jerk - jerk_now)/limit)^2 dt,
+    minimise  sum |lambda|/2 (jerk/limit)^2 + ...  +  force/2 integral ((jerk - jerk_now)/limit)^2 dt
 
-inside the corridor (smoothing/). The feedrate problem is then solved on the new path. Runs that got faster keep their new shape and are
-pulled less in the next round; the others keep their old shape and are pulled more (optimal/loop.py). When nothing can be gained to
-first order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
-
-The multipliers jump from round to round, because limits take turns; their running mean over the rounds works better. Without jerk
-limits the profile has corners, at which another limit takes over as soon as the shape gives way; there the mean also includes the
-multipliers of the shapes that failed.
+are dT/d(tolerance) at its sites (`corridor_prices`).
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,13 +33,16 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE
 from planner.smoothing.forms import SplineMotion, motion_bands
-from planner.smoothing.relax import Goal, relax
+from planner.smoothing.joint import Limits, improve
+from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
-FIRST_FORCE = 0.5  # of the pull; 0.3 and 1 gain the same within 1e-3 in eight rounds
+FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]
-GAP = 1e-4  # of a round's convex problem, share of the run's time [-]: below what a round gains
+GAP = 1e-4  # of the convex problem with the multipliers, share of the run's time [-]
+AGAIN = 2  # times at most in windows around sites that are tightened; 1 and 3 end up to 2.4e-4 later and 1e-4 earlier, on a spiral
+UNBOUNDED = 1e12  # stands for a feed or an acceleration that nothing bounds [mm/s], [mm/s2]
 
 
 def run_times(planned: OnPath) -> FloatArray:
@@ -66,17 +70,51 @@ def chosen(planned: OnPath, new: SplineShape, better: Array) -> SplineShape:
     )
 
 
-def reshape(
-    planned: OnPath, force: FloatArray, H: FloatArray, Q: FloatArray
-) -> tuple[SplineShape, FloatArray]:
-    """The shape after one round with the bands H of what is paid and Q of the pull (`price_bands`), the latter times `force` (Q,) of
-    each run; also what the sites' radii cost (J,) [s/mm]. A run without a certificate keeps its shape."""
-    shape = _shape(planned)
-    goal = Goal(H, Q, force, GAP * run_times(planned), 0.0, np.ones(len(H)))
-    relaxed = relax(shape.corridor, shape.laid, shape.runs, shape.used, shape.left, goal)
-    laid = shape.laid._replace(control=relaxed.control)
-    new = dataclasses.replace(shape, laid=laid, used=relaxed.used, left=relaxed.left)
-    return chosen(planned, new, relaxed.certified & ~cusps(laid)), -relaxed.multiplier / relaxed.used
+def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape, FloatArray]:
+    """The shape after one round with the pull (Q,) of each run, and what it gains to first order (Q,) [s]. A run without a certificate
+    keeps its shape.
+
+    gap : of the convex problem, share of the time [-]
+    """
+    shape, problem = _shape(planned), planned.problem
+    axes, laid, scale = problem.machine_axes, shape.laid, _jerk_scale(planned)
+    jerk = problem.jerk if planned.solution.jerk_limited else np.full(len(problem.jerk), UNBOUNDED)
+    limits = np.stack([problem.velocity[:axes], problem.acceleration[:axes], jerk[:axes]])
+    motion, on = _motion(planned, _ends)
+    step = improve(
+        shape.corridor,
+        laid,
+        shape.runs,
+        shape.used,
+        motion,
+        _bounds(planned, on),
+        Limits(limits, scale[:axes].copy()),
+        pull,
+        gap,
+        AGAIN,
+    )
+    # where the curve leaves the tolerance between its sites, the nearest one that does not
+    new = laid._replace(control=step.control)
+    inside, _ = _motion(planned, _inside)
+    _, Q = motion_bands(laid, inside, np.stack([problem.acceleration[:axes], scale[:axes]]))
+    one = np.ones(len(laid.fits))
+    goal = Goal(np.zeros_like(Q), Q, one, GAP * run_times(planned), 0.0, np.ones(axes))
+    kept = relax(shape.corridor, new, shape.runs, step.used, shape.left, goal, only_outside=True)
+    laid = laid._replace(control=kept.control)
+    used = np.minimum(kept.used, USED * laid.sites.radius)
+    found = dataclasses.replace(shape, laid=laid, used=used, left=kept.left)
+    return chosen(planned, found, kept.certified & ~cusps(laid)), step.gain
+
+
+def _bounds(planned: OnPath, on: Array) -> FloatArray:
+    """(I, 2) bounds of the feed [mm/s] and of the acceleration across the path [mm/s2] in the intervals `on`: programmed feed, and what
+    the bounds of the feed that go with the curvature allow."""
+    problem, samples = planned.problem, planned.samples
+    of_path = np.array([name == FEED.name or name.startswith(VELOCITY.name) for name in problem.bound_names])
+    kappa = np.maximum(samples.kappa_left, samples.kappa_right)
+    across = np.where(of_path[problem.feed_sq_bound], UNBOUNDED, kappa * problem.feed_sq_limit)
+    feed = np.minimum(planned.path.toolpath.feed[samples.segment[on]], UNBOUNDED)
+    return np.stack([feed, np.minimum(across[on], across[on + 1])], axis=1)
 
 
 def corridor_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
@@ -86,37 +124,46 @@ def corridor_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
     H, Q = price_bands(planned)
     corridor = shape.corridor
     corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
-    wider = dataclasses.replace(shape, corridor=corridor, used=shape.used + more, left=shape.left + more)
-    force = np.full(len(shape.laid.fits), FIRST_FORCE)
-    _, prices = reshape(dataclasses.replace(planned, shape=wider), force, H, Q)
-    return prices
+    goal = Goal(H, Q, np.full(len(shape.laid.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
+    relaxed = relax(corridor, shape.laid, shape.runs, shape.used + more, shape.left + more, goal)
+    return np.asarray(-relaxed.multiplier / relaxed.used, dtype=np.float64)
 
 
 def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives at the present shape
     (module text) [s/mm2], and Q, of the integral of the squared jerks over their limits."""
+    problem = planned.problem
+    axes = problem.machine_axes
+    motion, on = _motion(planned, _inside)
+    motion = motion._replace(price=_inside(*np.moveaxis(_prices(problem, planned.solution, on), 1, 0)))
+    limits = np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]])
+    H, Q = motion_bands(_shape(planned).laid, motion, limits)
+    return H, Q
+
+
+def _motion(
+    planned: OnPath, places: Callable[[FloatArray, FloatArray], FloatArray]
+) -> tuple[SplineMotion, Array]:
+    """The motion on the splines, which pays nothing, at `places` of each interval, and the intervals of the grid (I,) that are on
+    them."""
     samples, problem, solution = planned.samples, planned.problem, planned.solution
     laid = _shape(planned).laid
     span = samples.element - len(samples.table.legs)
     on = np.flatnonzero((span >= 0) & problem.interval)
     kept = np.flatnonzero(laid.fits)
     row = np.searchsorted(planned.path.spline.first, span[on], side="right") - 1
-    within = span[on] - planned.path.spline.first[row]
-    interval = np.searchsorted(kept[row], np.arange(len(laid.fits) + 1))
     duration, jerk = solution.duration[on], solution.jerk_s[on]
-    axes = problem.machine_axes
     motion = SplineMotion(
-        interval=interval,
-        span=within,
-        tau=_inside(samples.w0[on], samples.w1[on]),
-        feed=np.sqrt(_inside(solution.feed_sq[on], solution.feed_sq[on + 1])),
-        acc=_inside(solution.acc_s[on], solution.acc_s[on] + jerk * duration),
+        interval=np.searchsorted(kept[row], np.arange(len(laid.fits) + 1)),
+        span=span[on] - planned.path.spline.first[row],
+        tau=places(samples.w0[on], samples.w1[on]),
+        feed=np.sqrt(places(solution.feed_sq[on], solution.feed_sq[on + 1])),
+        acc=places(solution.acc_s[on], solution.acc_s[on] + jerk * duration),
         jerk=jerk,
         duration=duration,
-        price=_inside(*np.moveaxis(_prices(problem, solution, on), 1, 0)),
+        price=np.zeros((len(on), 2, problem.machine_axes, 3)),
     )
-    H, Q = motion_bands(laid, motion, np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]]))
-    return H, Q
+    return motion, on
 
 
 def _inside(start: FloatArray, end: FloatArray) -> FloatArray:
@@ -124,6 +171,11 @@ def _inside(start: FloatArray, end: FloatArray) -> FloatArray:
     ends stand for what the limits cost along the interval, and a shape that is only paid for at grid points bends between them (after
     16 rounds on the bracket 8e-4 of the time, on a zig-zag 2e-3)."""
     return np.stack([start + GAUSS * (end - start), end + GAUSS * (start - end)], axis=1)
+
+
+def _ends(start: FloatArray, end: FloatArray) -> FloatArray:
+    """(I, 2) the values at the ends."""
+    return np.column_stack([start, end])
 
 
 def _shape(planned: OnPath) -> SplineShape:

@@ -86,7 +86,7 @@ class ControlWindow(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _next_window(attempt, done, site, fixed_first, end, span, ratio_site):
+def next_window(attempt, done, site, fixed_first, end, span, ratio_site):
     """Control points lo, hi of the next window to relax, and the first site after those that it is for; lo = end if there is none.
     At first windows of `WINDOW` after each other, the last of which ended at `done`; then around sites from `site` on whose bound is
     too large."""
@@ -191,17 +191,22 @@ def _put_points(values, first, into):
 
 
 @njit(cache=True, error_model="numpy")
-def _relax_run(run, start, goal, gap):
-    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites; returns whether the result
-    has a certificate, and the rest of `Relaxed`."""
+def _relax_run(run, start, goal, gap, only_outside):
+    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites, or only in windows around the
+    sites where it has no certificate; returns whether the result has a certificate, and the rest of `Relaxed`."""
     control, radius = start.copy(), run.sites.radius.copy()
     multiplier, ratio_site = np.zeros(len(radius)), np.zeros(len(radius))
     left = np.empty(len(run.knots.breaks) - 1)
     end = len(control) - run.fixed_last
-    for attempt in range(ROUNDS):
+    if only_outside:
+        certificate = certify(run.corridor, run.knots, run.sites.place, control)
+        ratio_site, left = certificate.site, certificate.left
+        if certificate.span.max() <= 1.0:
+            return True, control, radius, left, multiplier
+    for attempt in range(int(only_outside), ROUNDS):
         done, site = run.fixed_first, 0
         while True:
-            lo, hi, site = _next_window(attempt, done, site, run.fixed_first, end, run.sites.span, ratio_site)
+            lo, hi, site = next_window(attempt, done, site, run.fixed_first, end, run.sites.span, ratio_site)
             if lo == end:
                 break
             window = _window(run, lo, hi)
@@ -242,7 +247,7 @@ def _run(q, corridor, splines, runs, used, goal):
 
 
 @njit(cache=True, error_model="numpy")
-def _relax(corridor, splines, runs, used, left, goal):
+def _relax(corridor, splines, runs, used, left, goal, only_outside):
     """Columns of `Relaxed`."""
     certified, multiplier = np.zeros(len(splines.fits), np.bool_), np.zeros(len(used))
     control, radius, left = splines.control.copy(), used.copy(), left.copy()
@@ -250,10 +255,11 @@ def _relax(corridor, splines, runs, used, left, goal):
         if not splines.fits[q]:
             continue
         run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
-        for i in range(len(start)):
-            for k in range(start.shape[1]):
-                start[i, k] += (1.0 - AGAIN) * (run.middle[i, k] - start[i, k])
-        certified[q], moved, smaller, kept, prices = _relax_run(run, start, goal, goal.gap[q])
+        if not only_outside:
+            for i in range(len(start)):
+                for k in range(start.shape[1]):
+                    start[i, k] += (1.0 - AGAIN) * (run.middle[i, k] - start[i, k])
+        certified[q], moved, smaller, kept, prices = _relax_run(run, start, goal, goal.gap[q], only_outside)
         if certified[q]:
             _put_points(moved, control_first(splines, q), control)
             _put(smaller, splines.site_first[q], radius)
@@ -263,11 +269,18 @@ def _relax(corridor, splines, runs, used, left, goal):
 
 
 def relax(
-    corridor: Corridor, splines: Splines, runs: SplineRuns, used: FloatArray, left: FloatArray, goal: Goal
+    corridor: Corridor,
+    splines: Splines,
+    runs: SplineRuns,
+    used: FloatArray,
+    left: FloatArray,
+    goal: Goal,
+    only_outside: bool = False,
 ) -> Relaxed:
     """Relax the splines that fit (`Relaxed`).
 
     used : (J,) radius that each site may use [mm], the present splines strictly inside
     left : (S,) what the certificate leaves of the tolerance, of runs that do not fit [mm]
+    only_outside : only where they have no certificate
     """
-    return Relaxed(*_relax(corridor, splines, runs, used, left, goal))
+    return Relaxed(*_relax(corridor, splines, runs, used, left, goal, only_outside))

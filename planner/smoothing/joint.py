@@ -1,0 +1,207 @@
+"""Path and feed improved together: a convex step, the time-optimal motion's limits linearised in the control points and in the time.
+
+Let p(u(t)) be a motion along a spline. Its control points move by dc, and what took dt takes (1 + theta) dt. To first order, with v, a
+and j what the motion has now, velocity, acceleration and jerk of an axis are then
+
+    v + B1.dc - v theta
+    a + B2.dc - 2 a theta - v theta'
+    j + B3.dc - 3 j theta - 3 a theta' - v theta'',
+
+B1, B2 and B3 the time derivatives of the basis functions along the motion, and the time changes by the integral of theta. The feed is
+(v.e) + e.(B1.dc) - (v.e) theta with its direction e, and the acceleration across the path likewise. With theta a spline over the same
+knots all that is linear in dc and theta. A step minimises
+
+    integral of theta + 1/2 |w|^2/v^2 + pull/2 (sum_k (B3.dc_k / jerk_k)^2 + SLOWER theta^2) dt
+
+subject to the limits and to the corridor, whose sites stay balls (sites.py). The second term counts where the motion goes at the
+programmed feed v: w is what B1.dc has across the path, and the speed with it is v + |w|^2/(2 v); without it a wavy path seems to cost
+nothing. The third keeps the step where the first order holds. Limits are kept at places inside the intervals of the grid, and a share
+may grow there by what the interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step
+must not promise what it cannot have there.
+
+Long runs are improved window by window (joint_solver.py).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.base.search import first_not_before
+from planner.smoothing.basis import DEGREE, ORDER, Knots
+from planner.smoothing.certificate import certify
+from planner.smoothing.corridor import Corridor, run_corridor
+from planner.smoothing.forms import SplineMotion
+from planner.smoothing.joint_rows import Places, gain_of_step, places_of_run, pull_of_window, rows_of_window
+from planner.smoothing.joint_solver import JointProblem, improve_window
+from planner.smoothing.relax import TIGHTENED, next_window
+from planner.smoothing.runs import SplineRuns
+from planner.smoothing.sites import Sites, with_radius
+from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
+
+WINDOW = 400  # control points improved at a time ...
+OVERLAP = 40  # ... and of them again with the next window
+ITERATIONS = 40  # per window; 10 to 25 are the rule
+HELD = (
+    3  # control points of theta that stay 0 where a run ends on a straight leg: speed and acceleration go on
+)
+
+
+class Limits(NamedTuple):
+    """What the motion of A axes keeps."""
+
+    axes: FloatArray  # (3, A) velocity, acceleration and jerk
+    pulled: FloatArray  # (A,) jerks that the pull counts in [mm/s3]
+
+
+class Improved(NamedTuple):
+    """All runs after a step; what does not fit has its control points from before."""
+
+    control: FloatArray  # (n, A) [mm]
+    used: FloatArray  # (J,) radius that each site may use, smaller where the certificate asked for it [mm]
+    gain: FloatArray  # (Q,) of the time of each run, to first order [s]
+    iterations: FloatArray  # (Q,) of its windows together
+
+
+class Run(NamedTuple):
+    """One run that is improved: n control points."""
+
+    corridor: Corridor
+    knots: Knots
+    sites: Sites
+    control: FloatArray  # (n, A)
+    places: Places
+    free: Array  # (n, A+1) False for what stays
+    pulled: FloatArray  # (A,)
+    pull: float
+    gap: float  # share of a window's time [-]
+    again: int  # times at most in windows around sites that are tightened
+
+
+@njit(cache=True, error_model="numpy")
+def _sites_of_window(sites, lo, hi, spans):
+    """The sites that the control points lo .. hi - 1 move, their spans counted from the control point lo - DEGREE, or 0."""
+    a, b = (
+        first_not_before(sites.span, max(lo - DEGREE, 0)),
+        first_not_before(sites.span, min(hi, spans)),
+    )
+    return Sites(
+        sites.span[a:b] - max(lo - DEGREE, 0), sites.place[a:b], sites.weights[a:b], sites.target[a:b], sites.along[a:b],
+        sites.slide[a:b], sites.radius[a:b],
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _free(n, axes, fixed):
+    """(n, A+1) True for what a step may change; fixed : control points that stay at the first and at the last end."""
+    free = np.ones((n, axes + 1), np.bool_)
+    for end in range(2):
+        held = 0 if fixed[end] == 1 else HELD
+        for i in range(max(fixed[end], held)):
+            at = i if end == 0 else n - 1 - i
+            if i < fixed[end]:
+                free[at, :axes] = False
+            if i < held:
+                free[at, axes] = False
+    return free
+
+
+@njit(cache=True, error_model="numpy")
+def _improve_window(run, radius, lo, hi, y):
+    """The step y (n, A+1) of a run's control points lo .. hi - 1 while the others stay, overwritten; returns the iterations.
+
+    radius : (J,) of the sites
+    """
+    (n, axes), spans, places = run.control.shape, len(run.knots.breaks) - 1, run.places
+    a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
+    first, last = first_not_before(places.span, a), first_not_before(places.span, min(hi, spans))
+    free = np.zeros((b - a, axes + 1), np.bool_)
+    free[lo - a : hi - a] = run.free[lo:hi]
+    band, linear = np.zeros(((b - a) * (axes + 1), ORDER * (axes + 1))), np.zeros((b - a, axes + 1))
+    pull_of_window(places, first, last, run.pull, run.pulled, a, band, linear)
+    rows = rows_of_window(places, first, last, a)
+    sites = _sites_of_window(with_radius(run.sites, radius), lo, hi, spans)
+    problem = JointProblem(band, linear, free, rows, run.control[a:b], sites)
+    time = places.weight[first:last].sum()
+    found, iterations = improve_window(problem, y[a:b], time, run.gap * time, ITERATIONS)
+    y[a:b] = found
+    return iterations
+
+
+@njit(cache=True, error_model="numpy")
+def _improve_run(run):
+    """One run, window by window, and again around sites where the curve leaves the tolerance beside them, which are tightened: the step
+    (n, A+1), the radii (J,), and the iterations."""
+    n, axes = run.control.shape
+    y, radius, total = np.zeros((n, axes + 1)), run.sites.radius.copy(), 0
+    lo = 0
+    while True:
+        hi = n if n - lo <= WINDOW + OVERLAP else lo + WINDOW
+        total += _improve_window(run, radius, lo, hi, y)
+        if hi == n:
+            break
+        lo = hi - OVERLAP
+    for _ in range(run.again):
+        certificate = certify(run.corridor, run.knots, run.sites.place, run.control + y[:, :axes])
+        if certificate.span.max() <= 1.0:
+            break
+        for j in range(len(radius)):
+            if certificate.site[j] > 1.0:
+                radius[j] *= TIGHTENED / certificate.site[j]
+        done, site = 0, 0
+        while True:
+            lo, hi, site = next_window(1, done, site, 0, n, run.sites.span, certificate.site)
+            if lo == n:
+                break
+            total += _improve_window(run, radius, lo, hi, y)
+            done = hi
+    return y, radius, total
+
+
+@njit(cache=True, error_model="numpy")
+def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, again):
+    """Columns of `Improved`."""
+    count, radius = len(splines.fits), used.copy()
+    control, gain, iterations = splines.control.copy(), np.zeros(count), np.zeros(count)
+    for q in range(count):
+        if not splines.fits[q]:
+            continue
+        knots, own, begin = run_knots(splines, q), run_control(splines, q), control_first(splines, q)
+        first, last = motion.interval[q], motion.interval[q + 1]
+        places = places_of_run(knots, own, motion, bound, limits.axes, first, last)
+        sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
+        free = _free(len(own), own.shape[1], (runs.fixed_first[q], runs.fixed_last[q]))
+        run = Run(
+            run_corridor(corridor, q), knots, sites, own, places, free, limits.pulled, pull[q], gap, again
+        )
+        y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)
+        for i in range(len(own)):
+            for k in range(own.shape[1]):
+                control[begin + i, k] += y[i, k]
+        gain[q] = gain_of_step(places, y)
+    return control, radius, gain, iterations
+
+
+def improve(
+    corridor: Corridor,
+    splines: Splines,
+    runs: SplineRuns,
+    used: FloatArray,
+    motion: SplineMotion,
+    bound: FloatArray,
+    limits: Limits,
+    pull: FloatArray,
+    gap: float,
+    again: int,
+) -> Improved:
+    """One step of all splines that fit (module text).
+
+    used   : (J,) radius that each site may use [mm]
+    bound  : (I, 2) of the feed [mm/s], and of the acceleration across the path [mm/s2], in each interval of the motion
+    pull   : (Q,) of each run
+    gap    : of the convex problem, share of the time [-]
+    """
+    return Improved(*_improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, again))

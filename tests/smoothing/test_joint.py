@@ -1,0 +1,180 @@
+"""A step of path and feed together: its rows are derivatives, its problem is solved to the optimum, and its promise comes true."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner.constraints.assemble import feedrate_problem
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.grid import refine_for_jerk
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.geometry.build import toolpath_from_program
+from planner.optimal.on_path import OnPath
+from planner.optimal.reshape import reshape, run_times
+from planner.path.samples import sample_path
+from planner.smoothing.basis import knots_at
+from planner.smoothing.forms import SplineMotion
+from planner.smoothing.joint_matrix import EVERY
+from planner.smoothing.joint_rows import places_of_run, rows_of_window
+from planner.smoothing.joint_solver import JointProblem, improve_window
+from planner.smoothing.sites import Sites
+from planner.smoothing.spline_path import spline_shape, with_spline
+
+MACHINE = problems.machine()
+SOLVER = JerkLimited(tol=1e-7)
+AXES, SPANS = 2, 8
+LIMITS = np.array([[1.5, 1.0], [4.0, 5.0], [50.0, 60.0]])
+BOUNDS = 2.0, 3.0  # of the feed, and of the acceleration across the path
+
+
+def planned(rounded, shape):
+    path = with_spline(rounded, shape)
+    samples = refine_for_jerk(sample_path(path, MACHINE, 2e-3, third_order=True), MACHINE)
+    problem = feedrate_problem(samples, MACHINE, measured=True)
+    problem = dataclasses.replace(problem, margin=np.zeros(len(samples)))
+    return OnPath(path=path, samples=samples, problem=problem, solution=SOLVER.solve(problem), shape=shape)
+
+
+@pytest.fixture(scope="module")
+def pentagon():
+    toolpath = toolpath_from_program(problems.all_jobs()["pentagon"], MACHINE)
+    rounded = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    shape = spline_shape(rounded, MACHINE)
+    return rounded, shape, planned(rounded, shape)
+
+
+def motion(rng, control, knots):
+    """Some motion over the middle of the spline, two intervals in each span."""
+    n = 2 * SPANS
+    tau = np.column_stack([np.tile([0.0, 0.5], SPANS), np.tile([0.5, 1.0], SPANS)])
+    return SplineMotion(
+        interval=np.array([0, n]),
+        span=np.repeat(np.arange(SPANS), 2),
+        tau=tau,
+        feed=rng.uniform(1.0, 3.0, (n, 2)),
+        acc=rng.uniform(-9.0, 9.0, (n, 2)),
+        jerk=rng.uniform(-90.0, 90.0, n),
+        duration=rng.uniform(0.05, 0.1, n),
+        price=np.zeros((n, 2, AXES, 3)),
+    )
+
+
+def some_places(seed=1):
+    rng = np.random.default_rng(seed)
+    knots = knots_at(np.cumsum(np.append(0.0, rng.uniform(0.5, 1.5, SPANS))))
+    n = SPANS + 5
+    control = np.column_stack([np.arange(n), rng.normal(size=n)]) * 0.7
+    bound = np.full((2 * SPANS, 2), BOUNDS)
+    places = places_of_run(knots, control, motion(rng, control, knots), bound, LIMITS, 0, 2 * SPANS)
+    return rng, control, places
+
+
+def test_rows_are_the_derivatives_of_what_a_slower_motion_on_another_shape_does():
+    """v/(1+theta), and what comes of it by the chain rule in time, against the rows, by central differences."""
+    rng, _, places = some_places()
+    rows = rows_of_window(places, 0, len(places.span), 0)
+    y = rng.normal(size=(SPANS + 5, AXES + 1))
+    r = 0
+    seen = set()
+    for p in range(len(places.span)):
+        own = slice(places.span[p], places.span[p] + 6)
+        shift = places.basis[p] @ y[own]  # (4, A+1): values and three time derivatives
+        theta, rate, bend = shift[:3, AXES]
+
+        def shares(h, p=p, shift=shift, theta=theta, rate=rate, bend=bend):
+            velocity, acceleration, jerk = places.jet[p] + h * shift[1:, :AXES]
+            # d/dt' = 1/(1 + theta) d/dt, three times
+            s, ds, dds = 1.0 / (1.0 + h * theta), h * rate, h * bend
+            ds, dds = -(s**2) * ds, 2.0 * s**3 * ds**2 - s**2 * dds
+            first = velocity * s
+            second = (acceleration * s + velocity * ds) * s
+            third = (
+                jerk * s**2
+                + 2 * acceleration * s * ds
+                + velocity * s * dds
+                + acceleration * s * ds
+                + velocity * ds**2
+            ) * s
+            across = places.along[p, 1] @ (acceleration * s**2)
+            ways = [places.along[p, 0] @ first / BOUNDS[0], across / BOUNDS[1]]
+            return np.concatenate([(np.stack([first, second, third]) / LIMITS).ravel(), ways])
+
+        slope = (shares(1e-5) - shares(-1e-5)) / 2e-5
+        while r < len(rows.upper) and rows.span[r] == places.span[p]:
+            value = (rows.factor[r] * y[own].T).sum()
+            match = np.flatnonzero(np.isclose(slope, value, rtol=1e-5, atol=1e-7))
+            kinds = [
+                k
+                for k in match
+                if (k < 3 * AXES and k % AXES == rows.axis[r]) or (k >= 3 * AXES and rows.axis[r] == EVERY)
+            ]
+            if not kinds:
+                break
+            seen.add(int(kinds[0]))
+            r += 1
+    assert r == len(rows.upper)
+    assert seen == set(range(3 * AXES + 2))
+
+
+def test_a_window_ends_at_the_optimum_of_its_problem():
+    """Stationary, with multipliers that are found again by least squares over the rows that are active."""
+    scipy = pytest.importorskip("scipy.optimize")
+    rng, control, places = some_places(2)
+    rows = rows_of_window(places, 0, len(places.span), 0)
+    n, columns = control.shape[0], AXES + 1
+    band = np.zeros((n * columns, 6 * columns))
+    band[:, 0] = rng.uniform(1.0, 2.0, n * columns)
+    linear = rng.normal(size=(n, columns))
+    empty = np.zeros((0, AXES))
+    sites = Sites(
+        np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 6)), empty, empty, np.zeros(0), np.zeros(0)
+    )
+    free = np.ones((n, columns), bool)
+    free[0, :AXES] = free[-1, :AXES] = False
+    y, _ = improve_window(
+        JointProblem(band, linear, free, rows, control, sites), np.zeros((n, columns)), 1.0, 1e-7, 60
+    )
+    dense = np.zeros((len(rows.upper), n, columns))
+    for r in range(len(rows.upper)):
+        dense[r, rows.span[r] : rows.span[r] + 6] = rows.factor[r].T
+    dense = dense.reshape(len(dense), -1)[:, free.ravel()]
+    at = dense @ y.ravel()[free.ravel()]
+    assert (at <= rows.upper + 1e-4).all()
+    assert (at >= -rows.lower - 1e-4).all()
+    assert not y[~free].any()
+    found = scipy.minimize(
+        lambda z: (0.5 * band[free.ravel(), 0] * z**2 + linear.ravel()[free.ravel()] * z).sum(),
+        np.zeros(free.sum()),
+        jac=lambda z: band[free.ravel(), 0] * z + linear.ravel()[free.ravel()],
+        constraints=[
+            {"type": "ineq", "fun": lambda z: rows.upper - dense @ z, "jac": lambda z: -dense},
+            {"type": "ineq", "fun": lambda z: rows.lower + dense @ z, "jac": lambda z: dense},
+        ],
+        method="SLSQP",
+        options={"maxiter": 500, "ftol": 1e-12},
+    )
+    own = (0.5 * band[:, 0] * y.ravel() ** 2 + linear.ravel() * y.ravel()).sum()
+    assert own == pytest.approx(found.fun, abs=2e-3 * (1.0 + abs(found.fun)))
+
+
+def test_what_a_short_step_promises_comes_true(pentagon):
+    """To first order the time changes by the promise: against the motion solved again on the new shape."""
+    rounded, _, before = pentagon
+    shape, promised = reshape(before, np.full(len(before.shape.laid.fits), 20.0), 1e-6)
+    gained = run_times(before).sum() - run_times(planned(rounded, shape)).sum()
+    assert promised.sum() > 2e-4 * before.solution.cycle_time
+    assert gained == pytest.approx(promised.sum(), rel=0.25)
+
+
+def test_a_shape_keeps_its_certificate(pentagon):
+    _, _, before = pentagon
+    shape, promised = reshape(before, np.full(len(before.shape.laid.fits), 0.5), 1e-4)
+    assert shape.laid.fits.all()
+    assert (shape.left >= 0.0).all()
+    assert (shape.used < shape.laid.sites.radius).all()
+    assert promised.sum() > 0.0

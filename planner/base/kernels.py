@@ -5,8 +5,8 @@ then on it comes from there without numba, which takes longer to import than a s
 is in compiling.py.
 
 A kernel that cannot be kept, because no directory can be written or the disk is full, is compiled again by the next run, which takes a
-minute for all of them, and is nothing to fail for: one warning says so. With a version of numba or on a system that the tests have not run
-with, kernels are numba's own, and kept where numba keeps them.
+minute for all of them, and is nothing to fail for: one warning says so. With a version of numba or on a system that the tests have not
+run with, kernels are numba's own, and kept where numba keeps them.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
   geometry  round the corners; lay splines over the runs between full stops                       corners/, smoothing/
   solve     the time-optimal feed on that path, all limits at grid points                         order.py, feedrate/
-  reshape   the multipliers of that motion say where the path should give way, inside the
+  reshape   path and feed improved together, all limits linearised, inside the
             tolerance; solve on the new path; in turns                                            reshape.py, smoothing/
   compare   single corners between the full stops, where they may be faster                       compare_corners.py
   tighten   where the motion exceeds a limit between grid points, allow less and solve again      tighten.py

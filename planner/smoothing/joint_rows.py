@@ -21,8 +21,7 @@ NONE = 1e12  # stands for a bound that there is none of
 NEAR = np.array([0.8, 0.6, 0.2, 0.8])
 
 
-# Places at which the limits are kept: so many in each interval of the grid at least, and in each span. With two in long intervals the
-# jerk grows between them, and the motion gains a quarter of what the step promises.
+# Places at which the limits are kept: so many in each interval of the grid at least, and in each span.
 PER_INTERVAL, PER_SPAN = 2, 5.0
 EDGE = 0.5 - np.sqrt(3.0) / 6.0  # of them from the ends of the interval [-]: Gauss's rule of two points
 

@@ -201,5 +201,5 @@ def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
 
 
 def way_felt(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """(n,) the same for x (n,), and much of the way a^3/j^2 on which a motion from rest builds up its acceleration and takes it back."""
+    """(n,) the same, x (n,), and much of the way a^3/j^2 on which a motion from rest builds up its acceleration and takes it back."""
     return way_to_brake(x, acceleration, jerk) + BUILDING * acceleration**3 / jerk**2

@@ -82,7 +82,9 @@ _FRONTS = {
         linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
     ),
     FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
-    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, Asked, HeidenhainParser, lambda name: frozenset()),
+    HEIDENHAIN: _Front(
+        heidenhain_text.LANGUAGE, heidenhain_text.HeidenhainAsked, HeidenhainParser, lambda name: frozenset()
+    ),
     SIEMENS: _Front(
         siemens_text.LANGUAGE, siemens_text.SiemensAsked, SiemensParser, lambda name: frozenset()
     ),

@@ -1,4 +1,5 @@
-"""Drilling cycles: 200 drilling, 201 reaming, 203 universal drilling without a decrement, 240 centring to a depth.
+"""Drilling cycles: 200 drilling, 201 reaming, 203 universal drilling without a decrement, 240 centring to a depth; and cycle 1, pecking
+on older controls, for which the tool stands at the clearance above the surface.
 
     Q200 set-up clearance    Q201 depth (its sign does not matter: into the part)    Q202 infeed    Q206 feed    Q208 feed out (201)
     Q203 surface    Q204 second set-up clearance    Q210 dwell above    Q211 dwell at the bottom
@@ -14,8 +15,9 @@ from planner.nc.language.heidenhain.moves import ONE, ZERO, Moves, Z, word
 from planner.nc.language.heidenhain.text import Block, minus, of, own, parameter, plus
 from planner.nc.language.tree import Expression, If, Line, Loop, Number, Statement
 
-CYCLES = (200, 201, 203, 240)
+CYCLES = (1, 200, 201, 203, 240)
 _CLEARANCE, _DEPTH, _INFEED, _SURFACE, _SECOND, _FEED = 200, 201, 202, 203, 204, 206
+PECKING = (_CLEARANCE, _DEPTH, _INFEED, 211, _FEED)  # what the lines 1.1 to 1.5 of cycle 1 give
 _FEED_OUT, _DWELL_ABOVE, _DWELL_BELOW = 208, 210, 211
 _BEFORE = 0.2  # mm above the depth already drilled, where feed begins again
 
@@ -40,6 +42,8 @@ def drill(block: Block, cycle: int, moves: Moves, unit: float) -> list[Statement
         return If(place, ((of("GT", parameter(seconds), ZERO), [row]),), [])
 
     found: list[Statement] = [go(clear)]
+    if cycle == 1:
+        found = [Line(place, (), ((surface, minus(Z, parameter(_CLEARANCE))), (parameter(_SECOND), ZERO)))]
     bottom = minus(surface, depth)
     if cycle in (201, 240):
         out = If(

@@ -14,9 +14,21 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from planner.nc.language.heidenhain.text import POSITION as POSITION_OF_CONTROL
 from planner.nc.language.heidenhain.text import Block, minus, of, over, own, plus, times, value
 from planner.nc.language.spelling import NEGATIVE
-from planner.nc.language.tree import Expression, If, Line, Named, Number, Parameter, Place, Statement, Word
+from planner.nc.language.tree import (
+    Expression,
+    If,
+    Line,
+    Named,
+    Number,
+    Numbered,
+    Parameter,
+    Place,
+    Statement,
+    Word,
+)
 
 _ITEM = re.compile(
     r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
@@ -320,6 +332,12 @@ def _unit(place: Place, vector: tuple[Named, Named]) -> Line:
     """Divide a vector by its length."""
     length = of("LEN", *vector)
     return Line(place, (), ((vector[0], over(vector[0], length)), (vector[1], over(vector[1], length))))
+
+
+def looked_up(block: Block) -> Line:
+    """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
+    where = [Numbered(Number(float(POSITION_OF_CONTROL + k))) for k in range(3)]
+    return Line(block.place, (), tuple(zip((X, Y, Z), where, strict=True)))
 
 
 def refuse_arc_axes(block: Block, given: Items) -> None:

@@ -1,7 +1,7 @@
 """A conversational program as statements.
 
     BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP RND CHF    LBL, CALL LBL [REP]    Q1 = formula, FN 0-14
-    CYCL DEF 200 201 203 240 7 (datum shift) 9 (dwell) 32 (tolerance)    CYCL CALL [POS], M99    STOP, M codes
+    CYCL DEF 1 200 201 203 240 7 (datum shift) 9 (dwell) 32 (tolerance)    CYCL CALL [POS], M99    STOP, M codes
 
 LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
 LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.
@@ -29,11 +29,12 @@ from planner.nc.language.heidenhain.moves import (
     Y,
     Z,
     items,
+    looked_up,
     refuse_arc_axes,
     target,
     word,
 )
-from planner.nc.language.heidenhain.text import Block, blocks, of, own, plus, value
+from planner.nc.language.heidenhain.text import Block, blocks, of, own, parameter, plus, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
     Expression,
@@ -50,7 +51,7 @@ from planner.nc.language.tree import (
 )
 
 _FUNCTION = re.compile(
-    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCL DEF|CYCL CALL|LBL|FN|STOP|PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
+    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCLE? DEF|CYCL CALL|LBL|FN|STOP|PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
@@ -103,7 +104,7 @@ class Parser(Flow):
     def _find_labels(self) -> None:
         for k, block in enumerate(self.blocks):
             if not block.text.upper().startswith("LBL"):
-                if number := re.match(r"CYCL DEF\s+(\d+)", block.text, re.IGNORECASE):
+                if number := re.match(r"CYCLE? DEF\s+(\d+)", block.text, re.IGNORECASE):
                     self.cycles.add(int(number.group(1)))
                 continue
             try:
@@ -195,6 +196,8 @@ class Parser(Flow):
         if feed and feed.upper() != "MAX":
             self.moves.automatic, _ = value(block, column + found.start(4))
             rows.append(Line(block.place, (word("F", at, self.moves.scaled(self.moves.automatic)),)))
+        if tool:
+            rows.append(looked_up(block))
         return rows
 
     # --- moves ------------------------------------------------------------------------------------------------------------------
@@ -220,7 +223,7 @@ class Parser(Flow):
             self.skip = True
         else:
             lines += self.moves.straight(block, given, ends, machine)
-        return [*lines, *after]
+        return [*lines, *([looked_up(block)] if machine else []), *after]
 
     def _corner(self, k: int, last: int) -> tuple[Block, Expression, bool] | None:
         """RND or CHF in block k, with its number."""
@@ -346,6 +349,8 @@ class Parser(Flow):
             found = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
             seconds, _ = value(block, column + (found.end() if found else 0))
             return [Line(block.place, (word("G", at, Number(4.0)), word("P", at, seconds)))]
+        if cycle == 1:
+            return self._pecking(block, part, column)
         if cycle == 7:
             given = items(block, column)
             words = [word("G", at, Number(52.0))]
@@ -354,10 +359,21 @@ class Parser(Flow):
                 raise block.fault(
                     "a datum shift by X, Y or Z is read, not incremental and not from a table", column
                 )
-            return [Line(block.place, tuple(words))]
+            return [Line(block.place, tuple(words)), looked_up(block)]
         raise block.fault(
             f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}", column
         )
+
+    def _pecking(self, block: Block, part: int, column: int) -> list[Statement]:
+        """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
+        cycle: list[tuple[Parameter, Expression]] = [(own("cycle"), Number(1.0))]
+        if part == 0:
+            return [Line(block.place, (), tuple(cycle))]
+        found = _PECKING.match(block.text, column)
+        if found is None or not 1 <= part <= len(drilling.PECKING):
+            raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
+        number, _ = value(block, found.end())
+        return [Line(block.place, (), ((parameter(drilling.PECKING[part - 1]), number),))]
 
     def _cycle_call(self, block: Block, column: int) -> list[Statement]:
         rest = re.match(r"\s*POS\b", block.text[column:], re.IGNORECASE)
@@ -387,6 +403,7 @@ class Parser(Flow):
         return [If(block.place, branches, nothing)]
 
 
+_PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
 _REMEDY = "let the CAM system write the moves out as L, C and CC"
 _READ: dict[str, Callable[[Parser, Block, int], list[Statement]]] = {
     "BEGIN PGM": Parser._begin,
@@ -401,7 +418,7 @@ _READ: dict[str, Callable[[Parser, Block, int], list[Statement]]] = {
     "CALL LBL": Parser._call,
     "Q": Parser._parameter,
     "FN": Parser._fn,
-    "CYCL DEF": Parser._define,
+    **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), Parser._define),
     "CYCL CALL": Parser._cycle_call,
     "STOP": Parser._stop,
     "M": Parser._code,

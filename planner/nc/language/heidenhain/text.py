@@ -14,6 +14,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from planner.nc.language.asked import Asked
 from planner.nc.language.linuxcnc import ARITHMETIC, DEGREES
 from planner.nc.language.spelling import NEGATIVE
 from planner.nc.language.tree import (
@@ -28,8 +29,22 @@ from planner.nc.language.tree import (
 )
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
+POSITION = (
+    PARAMETERS + 1
+)  # parameters of the tree that hold the position in the program's coordinates: x, y, z
 NESTED_MAX = 40  # brackets in brackets
 OPERATIONS_MAX = 80  # in a row
+
+
+class HeidenhainAsked(Asked):
+    """Positions of the axes."""
+
+    numbers = frozenset((POSITION, POSITION + 1, POSITION + 2))
+
+    def get(self, parameter: int | str, depth: int) -> float:
+        """The position of an axis in the program's coordinates and unit."""
+        return self.here(int(parameter) - POSITION)
+
 
 LANGUAGE = Language(
     name="heidenhain",
@@ -59,9 +74,9 @@ LANGUAGE = Language(
         "ceil": math.ceil,
     },
     locals=0,
-    largest=PARAMETERS,
+    largest=POSITION + 2,
     vacant=0.0,
-    asked=frozenset(),
+    asked=HeidenhainAsked.numbers,
 )
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
@@ -150,7 +165,7 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
         body = text.split(";", 1)[0].rstrip()
         numbered = _NUMBERED.match(body)
         first = numbered.end() if numbered else len(body) - len(body.lstrip())
-        content = body[first:]
+        content = "" if body.strip().isdigit() else body[first:]  # a number alone stands before a comment
         ends_open = content.endswith("~")
         content = content.rstrip("~ \t\r\x1a")
         cycle = waiting is not None and waiting[1].upper().startswith("CYCL DEF") and not numbered

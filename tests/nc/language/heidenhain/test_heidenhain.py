@@ -36,6 +36,7 @@ def test_a_program_with_moves_arcs_and_tool() -> None:
 5 L X+10 Y+5 R0 FMAX
 6 L Z-5 R0 F AUTO
 * - contour
+7 ;(a number before a comment)
 7 L X+30 IY+10 R0 F800
 8 CC X+30 Y+25
 9 C X+40 Y+25 DR+
@@ -62,7 +63,7 @@ M30""",
         MILL,
     )
     same(found, expected)
-    assert found.line.tolist()[-1] == 15
+    assert found.line.tolist()[-1] == 16
 
 
 def test_polar_moves_and_helices() -> None:
@@ -158,6 +159,25 @@ def test_drilling_reaches_depth_by_infeeds() -> None:
     assert set(found.feed[found.kind == Kind.LINE].tolist()) == {2.5}
     assert len(found) == 1 + 3 * (1 + len(one))
     assert read(DRILL.format(second=2)).end[:, 2].max() == pytest.approx(50)
+
+
+def test_pecking_of_older_controls_begins_where_the_tool_stands() -> None:
+    found = read(
+        "L Z+25 FMAX\nCYCLE DEF 1.0 PECKING\nCYCL DEF 1.1 DIST20\nCYCL DEF 1.2 DEPTH-9\nCYCL DEF 1.3 PLNGNG5\n"
+        "CYCL DEF 1.4 DWELL0.2\nCYCL DEF 1.5 F120\nL X+3 FMAX M99"
+    )
+    assert found.end[1:, 2].tolist() == pytest.approx([25, 0, 25, 0.2, -4, -4, 25])
+    assert found.dwell.sum() == pytest.approx(0.2)
+    assert set(found.feed[found.kind == Kind.LINE].tolist()) == {2.0}
+
+
+def test_incremental_moves_after_what_changes_the_coordinates() -> None:
+    found = read(
+        "L X+10 Y+0 FMAX\nCYCL DEF 7.0 DATUM\nCYCL DEF 7.1 X+4\nCYCL DEF 7.2 Y+1\nL IX+1 IY+1 F600\nL X+0 Y+0"
+    )
+    assert found.end[1:, :2].tolist() == [[11, 1], [4, 1]]
+    found = read("CYCL DEF 7.0 DATUM\nCYCL DEF 7.1 X+4\nL X+0 FMAX\nL X+20 FMAX M91\nL IX+1 F600\nL X+1")
+    assert found.end[:, 0].tolist() == [4, 20, 21, 5]
 
 
 def test_tolerance_datum_shift_and_inches() -> None:

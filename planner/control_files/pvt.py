@@ -4,8 +4,8 @@ With p0, v0 at the start of an interval of length h and p1, v1 at its end, u = (
 
     p(u) = (1 + 2u)(1 - u)^2 p0 + u (1 - u)^2 h v0 + u^2 (3 - 2u) p1 - u^2 (1 - u) h v1
 
-which is the motion itself where its jerk is constant in the interval. So a few rows are enough: `thinned` takes the longest interval, a
-whole number of interpolation periods, with which the cubics stay within a given distance of every setpoint on every axis.
+which is the motion itself where its jerk is constant in the interval. So a few rows are enough: `longest_interval` finds the longest
+interval, a whole number of interpolation periods, with which the cubics stay within a given distance of every setpoint on every axis.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def write_pvt(
         raise InputError(f"--within must be above 0 mm, found {within:g}")
     linear = 1.0 / MM_PER_INCH if unit == "inch" else 1.0
     rotary = np.array([axis in ROTARY_AXES for axis in trajectory.axes])
-    periods, miss = thinned(trajectory, np.where(rotary, within * RAD_PER_DEG, within))
+    periods, miss = longest_interval(trajectory, np.where(rotary, within * RAD_PER_DEG, within))
     rows = _rows(len(trajectory), periods)
     scale = np.where(rotary, 1.0 / RAD_PER_DEG, linear)
     names = [f"{kind}{axis}" for axis in trajectory.axes for kind in ("", "v")]
@@ -55,7 +55,7 @@ def write_pvt(
     return periods, miss
 
 
-def thinned(trajectory: Trajectory, within: FloatArray) -> tuple[int, float]:
+def longest_interval(trajectory: Trajectory, within: FloatArray) -> tuple[int, float]:
     """Interpolation periods between two rows, and by how much the cubics then miss the setpoints at most.
 
     within : (A,) allowed miss of each axis [mm, rad]

@@ -23,7 +23,7 @@ from planner.base.names import known_name
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine, machine_from_dict
 from planner.machine_import import grbl, klipper, linuxcnc, marlin
 from planner.machine_import.ini_file import read_settings
-from planner.machine_import.settings import ControlSettings, Found
+from planner.machine_import.settings import ControlSettings, Sourced
 
 RAMP_TIME = 0.04  # [s]
 TOLERANCE = {
@@ -74,10 +74,10 @@ def import_machine(
     text, source = read_settings(Path(path)), str(path)
     found = _settings_of(text, source, control)
     axes, assumed = _axes(found, ramp_time, given or {}, source)
-    eps = found.tolerance or Found(TOLERANCE[found.control], "assumed")
+    eps = found.tolerance or Sourced(TOLERANCE[found.control], "assumed")
     if tolerance is not None:
-        eps = Found(tolerance, "given")
-    dt = found.dt or Found(DT, "assumed")
+        eps = Sourced(tolerance, "given")
+    dt = found.dt or Sourced(DT, "assumed")
     if eps.place == "assumed":
         assumed.append(f"tolerance {eps.value:g} mm: {found.control} has none; --tolerance gives another")
     if dt.place == "assumed":
@@ -101,7 +101,7 @@ def _settings_of(text: str, source: str, control: str | None) -> ControlSettings
 
 def _axes(
     found: ControlSettings, ramp_time: float, given: Mapping[str, float], source: str
-) -> tuple[dict[str, dict[str, Found]], list[str]]:
+) -> tuple[dict[str, dict[str, Sourced]], list[str]]:
     """Limits by axis and quantity, and what of them is assumed. Raises InputError for what is missing."""
     if not 0.0 < ramp_time < float("inf"):
         raise InputError(f"the ramp time must be above 0 s, found {ramp_time:g}")
@@ -115,8 +115,8 @@ def _axes(
         letter, _, quantity = name.partition(".")
         if letter not in letters or quantity not in limits:
             raise InputError(f"'{name}' is no limit of an axis; write e.g. x.acceleration=500")
-        limits[quantity][letter] = Found(value, "given")
-    axes: dict[str, dict[str, Found]] = {}
+        limits[quantity][letter] = Sourced(value, "given")
+    axes: dict[str, dict[str, Sourced]] = {}
     missing, no_jerk = [], []
     for letter in letters:
         velocity, acceleration = limits["velocity"].get(letter), limits["acceleration"].get(letter)
@@ -132,7 +132,7 @@ def _axes(
         jerk = limits["jerk"].get(letter)
         if jerk is None:
             no_jerk.append(letter)
-            jerk = Found(acceleration.value / ramp_time, "assumed")
+            jerk = Sourced(acceleration.value / ramp_time, "assumed")
         axes[letter] = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
     if missing:
         raise InputError(
@@ -148,9 +148,9 @@ def _axes(
 def _text(
     found: ControlSettings,
     path: Path,
-    axes: Mapping[str, Mapping[str, Found]],
-    tolerance: Found,
-    dt: Found,
+    axes: Mapping[str, Mapping[str, Sourced]],
+    tolerance: Sourced,
+    dt: Sourced,
     said: Sequence[str],
 ) -> str:
     """The text of the machine file."""
@@ -173,5 +173,5 @@ def _text(
     return "\n".join(lines) + "\n"
 
 
-def _line(key: str, found: Found) -> str:
+def _line(key: str, found: Sourced) -> str:
     return f"{key} = {float(f'{found.value:.12g}')!r}  # {found.place}"

@@ -6,8 +6,8 @@ import re
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, ROTARY_AXES
-from planner.machine_import.numbers import number, positive
-from planner.machine_import.settings import ControlSettings, Found
+from planner.machine_import.numbers import finite_number, positive
+from planner.machine_import.settings import ControlSettings, Sourced
 
 _SETTING = re.compile(r"^\s*(\$\d+)\s*=\s*([^\s(;]+)", re.MULTILINE)
 _RATE, _ACCELERATION = 110, 120  # + axis
@@ -25,8 +25,8 @@ def settings(text: str, source: str) -> ControlSettings:
         found.group(1): (found.group(2), text.count("\n", 0, found.start(1)) + 1)
         for found in _SETTING.finditer(text)
     }
-    velocity: dict[str, Found] = {}
-    acceleration: dict[str, Found] = {}
+    velocity: dict[str, Sourced] = {}
+    acceleration: dict[str, Sourced] = {}
     for k, letter in enumerate((*LINEAR_AXES, *ROTARY_AXES)):
         for first, scale, found in (
             (_RATE, 1.0 / SECONDS_PER_MINUTE, velocity),
@@ -35,11 +35,11 @@ def settings(text: str, source: str) -> ControlSettings:
             key = f"${first + k}"
             if key in given:
                 value, line = given[key]
-                found[letter] = Found(positive(value, key, source, line) * scale, key)
+                found[letter] = Sourced(positive(value, key, source, line) * scale, key)
     notes = []
     if _JUNCTION_DEVIATION in given:
         value, line = given[_JUNCTION_DEVIATION]
-        deviation = number(value, _JUNCTION_DEVIATION, source, line)
+        deviation = finite_number(value, _JUNCTION_DEVIATION, source, line)
         notes.append(
             f"$11, a junction deviation of {deviation:g} mm, sets corner speeds in grbl and is no tolerance: grbl stays on the path"
         )

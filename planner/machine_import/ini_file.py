@@ -14,7 +14,7 @@ from pathlib import Path
 from planner.base.errors import InputError
 from planner.base.files import require_ending
 from planner.machine_import.numbers import positive
-from planner.machine_import.settings import Found
+from planner.machine_import.settings import Sourced
 
 INCLUDES_MAX = 100  # files that one file may include, with those that they include: a circle ends here
 
@@ -23,7 +23,7 @@ _SETTING = re.compile(r"^([^=:\s][^=:]*?)\s*[=:]\s*(.*)$")
 
 
 @dataclass(frozen=True)
-class Setting:
+class IniSetting:
     """The text of one setting and its place."""
 
     text: str
@@ -36,10 +36,10 @@ class IniFile:
 
     def __init__(self, source: str):
         self.source = source
-        self._settings: dict[tuple[str, str], Setting] = {}
+        self._settings: dict[tuple[str, str], IniSetting] = {}
         self.names: set[str] = set()
 
-    def add(self, table: str, key: str, setting: Setting, *, first_counts: bool) -> None:
+    def add(self, table: str, key: str, setting: IniSetting, *, first_counts: bool) -> None:
         """Take in a setting; one that is there already stays if the first counts."""
         if not (first_counts and (table, key) in self._settings):
             self._settings[table, key] = setting
@@ -49,13 +49,13 @@ class IniFile:
         found = self._settings.get((table.lower(), key.lower()))
         return found.text if found else None
 
-    def positive(self, table: str, key: str, scale: float = 1.0) -> Found | None:
+    def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
         """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above 0."""
         found = self._settings.get((table.lower(), key.lower()))
         if found is None or not found.text:
             return None
         place = f"[{table}] {key}"
-        return Found(positive(found.text, place, found.source, found.line) * scale, place)
+        return Sourced(positive(found.text, place, found.source, found.line) * scale, place)
 
 
 def read_ini(
@@ -110,7 +110,10 @@ def read_ini(
             if setting and table:
                 key = setting.group(1).lower()
                 ini.add(
-                    table, key, Setting(setting.group(2).strip(), source, number), first_counts=first_counts
+                    table,
+                    key,
+                    IniSetting(setting.group(2).strip(), source, number),
+                    first_counts=first_counts,
                 )
     return ini
 

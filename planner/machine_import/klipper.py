@@ -10,7 +10,7 @@ import re
 
 from planner.base.errors import InputError
 from planner.machine_import.ini_file import read_ini
-from planner.machine_import.settings import ControlSettings, Found, FoundMode
+from planner.machine_import.settings import ControlSettings, FoundMode, Sourced
 
 _INCLUDE = re.compile(r"^\[include\s+([^\]]+?)\s*\]", re.IGNORECASE)
 _PER_AXIS = ("cartesian", "corexy", "hybrid_corexy", "corexz", "hybrid_corexz", "generic_cartesian")
@@ -44,7 +44,7 @@ def settings(text: str, source: str) -> ControlSettings:
     modes: list[FoundMode] = []
     for letter in "xy":
         frequency = config.positive("input_shaper", f"shaper_freq_{letter}")
-        damping = config.positive("input_shaper", f"damping_ratio_{letter}") or Found(_DAMPING, "")
+        damping = config.positive("input_shaper", f"damping_ratio_{letter}") or Sourced(_DAMPING, "")
         if frequency and all(mode.frequency != frequency.value for mode in modes):
             modes.append(FoundMode(frequency.value, damping.value, frequency.place))
     notes = ["velocity and acceleration are limits along the path in Klipper and of each axis here"]

@@ -14,7 +14,7 @@ from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.machine_import.ini_file import IniFile, read_ini
-from planner.machine_import.settings import ControlSettings, Found, least
+from planner.machine_import.settings import ControlSettings, Sourced, least
 
 _MM = {"mm": 1.0, "metric": 1.0, "inch": MM_PER_INCH, "in": MM_PER_INCH, "imperial": MM_PER_INCH}
 _NANOSECOND = 1e-9
@@ -54,7 +54,7 @@ def settings(text: str, source: str) -> ControlSettings:
 
 def _limits(
     ini: IniFile, key: str, along: str | None, letters: str, trivial: bool, unit: float
-) -> dict[str, Found]:
+) -> dict[str, Sourced]:
     """The smallest limit of each axis: its own, those of its joints with trivial kinematics, and that along the path."""
     limits = {}
     for letter in LINEAR_AXES + ROTARY_AXES:
@@ -100,7 +100,7 @@ def _other_axes(letters: str) -> str:
     return f"axes left out, which a machine file does not have: {', '.join(other)}" if other else ""
 
 
-def _startup(code: str, unit: float) -> tuple[Found | None, str | None]:
+def _startup(code: str, unit: float) -> tuple[Sourced | None, str | None]:
     """Tolerance and path control of the start-up codes."""
     place = "[RS274NGC] RS274NGC_STARTUP_CODE"
     scale = MM_PER_INCH if re.search(r"G20(?!\d)", code) else 1.0 if re.search(r"G21(?!\d)", code) else unit
@@ -108,5 +108,5 @@ def _startup(code: str, unit: float) -> tuple[Found | None, str | None]:
     path_control = {"64": "blend", "61": "exact_path", "61.1": "exact_stop"}[modes[-1]] if modes else None
     given = re.search(r"G64\s*P\s*([\d.]+)", code)
     if given and float(given.group(1)) > 0:
-        return Found(float(given.group(1)) * scale, f"{place}, G64 P"), path_control
+        return Sourced(float(given.group(1)) * scale, f"{place}, G64 P"), path_control
     return None, path_control

@@ -8,7 +8,7 @@ import re
 from planner.base.units import MM_PER_INCH
 from planner.machine import LINEAR_AXES
 from planner.machine_import.numbers import positive
-from planner.machine_import.settings import ControlSettings, Found, FoundMode, least
+from planner.machine_import.settings import ControlSettings, FoundMode, Sourced, least
 
 _COMMAND = re.compile(r"^(?:\s*echo:)?\s*([GM]\d+)\b([^;\n]*)", re.MULTILINE)
 _WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)")
@@ -37,11 +37,11 @@ def settings(text: str, source: str) -> ControlSettings:
             given[code] = {**given.get(code, {}), **words}
             lines[code] = line
 
-    def length(code: str, letter: str) -> Found | None:
+    def length(code: str, letter: str) -> Sourced | None:
         if letter not in given.get(code, {}):
             return None
         place = f"{code} {letter}"
-        return Found(positive(str(given[code][letter]), place, source, lines[code]) * unit, place)
+        return Sourced(positive(str(given[code][letter]), place, source, lines[code]) * unit, place)
 
     along = least(length("M204", "T"), length("M204", "P"))
     velocity, acceleration = {}, {}

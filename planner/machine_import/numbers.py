@@ -7,7 +7,7 @@ import math
 from planner.base.errors import InputError
 
 
-def number(text: str, place: str, source: str, line: int | None = None) -> float:
+def finite_number(text: str, place: str, source: str, line: int | None = None) -> float:
     """The number that a setting holds. Raises InputError for anything else, with the setting's name and place."""
     try:
         value = float(text.strip())
@@ -22,7 +22,7 @@ def number(text: str, place: str, source: str, line: int | None = None) -> float
 
 def positive(text: str, place: str, source: str, line: int | None = None) -> float:
     """A number above zero. Raises InputError for anything else."""
-    value = number(text, place, source, line)
+    value = finite_number(text, place, source, line)
     if value <= 0:
         raise InputError(f"{place}: must be above 0, found {text.strip()}", source=source, line=line)
     return value

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 
-class Found(NamedTuple):
+class Sourced(NamedTuple):
     """A number and where it stands in the settings, such as "$120" or "[AXIS_X] MAX_ACCELERATION"."""
 
     value: float
@@ -39,18 +39,18 @@ class ControlSettings:
     """
 
     control: str
-    velocity: Mapping[str, Found]
-    acceleration: Mapping[str, Found]
-    jerk: Mapping[str, Found] = field(default_factory=dict)
-    feed_max: Found | None = None
-    dt: Found | None = None
-    tolerance: Found | None = None
+    velocity: Mapping[str, Sourced]
+    acceleration: Mapping[str, Sourced]
+    jerk: Mapping[str, Sourced] = field(default_factory=dict)
+    feed_max: Sourced | None = None
+    dt: Sourced | None = None
+    tolerance: Sourced | None = None
     path_control: str | None = None
     modes: tuple[FoundMode, ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def least(*found: Found | None) -> Found | None:
+def least(*found: Sourced | None) -> Sourced | None:
     """The smallest of some numbers; None where there is none."""
     known = [one for one in found if one is not None]
     return min(known, key=lambda one: one.value) if known else None

@@ -86,7 +86,7 @@ def write_plan(
         if report:
             from planner.report.html.page import REPORT, report_page
 
-            page = report_page(plan, program_text(plan), {**summary(plan), "notes": [*plan.notes, *notes]})
+            page = report_page(plan, source_text(plan), {**summary(plan), "notes": [*plan.notes, *notes]})
             (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])
@@ -128,7 +128,7 @@ def check_places(
 def summary(plan: Plan) -> dict[str, Any]:
     """The plan in numbers, ready for JSON: what `planner plan --json` prints."""
     verdict = plan.verdict
-    return plain(
+    return json_ready(
         {
             "program": plan.program.source,
             "machine": plan.machine.name,
@@ -156,12 +156,12 @@ def summary(plan: Plan) -> dict[str, Any]:
 
 def verdict_summary(verdict: Verdict) -> dict[str, Any]:
     """A verdict in numbers: the largest ratio to each limit, errors, faults."""
-    return plain({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
+    return json_ready({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
 
 
 def corner_summary(corners: CornerCheck) -> dict[str, Any]:
     """Eq. 18-20 at the programmed corners in numbers."""
-    return plain(corners.summary())
+    return json_ready(corners.summary())
 
 
 def _not_limited(verdict: Verdict) -> list[str]:
@@ -178,14 +178,14 @@ def info_summary(info: ProgramInfo) -> dict[str, Any]:
     fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
     fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
     fields["unsupported_places"] = len(info.unsupported)
-    return plain(fields)
+    return json_ready(fields)
 
 
 def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
     """The metadata of a trajectory file. `planner verify` reads machine, tolerance and `not_limited` from it."""
     trajectory = plan.trajectory
     assert trajectory is not None
-    return plain(
+    return json_ready(
         {
             "format": 1,
             "run_id": run_id,
@@ -221,7 +221,7 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
         return None, [f"{PLANNED} is left out: {why}"]
 
 
-def program_text(plan: Plan) -> bytes | None:
+def source_text(plan: Plan) -> bytes | None:
     """The text of the program, if it was read from a file that is still there."""
     try:
         return Path(plan.program.source).read_bytes()
@@ -239,12 +239,12 @@ def _uniform(tolerance: FloatArray) -> float | None:
     return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
 
 
-def plain(value: Any) -> Any:
+def json_ready(value: Any) -> Any:
     """Numbers, strings, lists and dictionaries only; NaN and infinity, which JSON lacks, become None."""
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): json_ready(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(item) for item in value]
+        return [json_ready(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):

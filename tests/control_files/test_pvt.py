@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from planner.base.errors import InputError
-from planner.control_files.pvt import PERIODS_MAX, thinned, write_pvt
+from planner.control_files.pvt import PERIODS_MAX, longest_interval, write_pvt
 from planner.machine import load_machine
 from planner.methods.stop import StopMethod
 from planner.motion.trajectory import Trajectory
@@ -47,7 +47,7 @@ def test_cubics_between_rows_stay_within_the_distance(
 
 
 def test_a_longer_distance_takes_fewer_rows(tmp_path: Path, motion: Trajectory) -> None:
-    counts = [thinned(motion, np.full(3, within))[0] for within in (1e-6, 1e-4, 1e-2, 1.0)]
+    counts = [longest_interval(motion, np.full(3, within))[0] for within in (1e-6, 1e-4, 1e-2, 1.0)]
     assert counts == sorted(counts)
     assert counts[0] < counts[-1] <= PERIODS_MAX
 

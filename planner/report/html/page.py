@@ -19,7 +19,7 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.machine import LINEAR_AXES, ROTARY_AXES
-from planner.report.export import plain, summary
+from planner.report.export import json_ready, summary
 from planner.report.html.data import in_degrees, lines_of, programmed_path, samples_of
 from planner.report.replace import check_file
 
@@ -107,7 +107,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "machine": {axis: machine.axes[axis].model_dump() for axis in axes},
-        "corners": plain(_corners(plan)),
+        "corners": json_ready(_corners(plan)),
     }
     return columns, about
 

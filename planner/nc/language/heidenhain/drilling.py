@@ -12,7 +12,7 @@ clearance above the depth already drilled, but not deeper than 0.2 mm above it.
 from __future__ import annotations
 
 from planner.nc.language.heidenhain.moves import ONE, ZERO, Moves, Z, word
-from planner.nc.language.heidenhain.text import Block, minus, of, own, parameter, plus
+from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, parameter, plus
 from planner.nc.language.tree import Expression, If, Line, Loop, Number, Statement
 
 CYCLES = (1, 200, 201, 203, 240)
@@ -22,7 +22,7 @@ _FEED_OUT, _DWELL_ABOVE, _DWELL_BELOW = 208, 210, 211
 _BEFORE = 0.2  # mm above the depth already drilled, where feed begins again
 
 
-def drill(block: Block, cycle: int, moves: Moves, unit: float) -> list[Statement]:
+def drilled(block: ConversationalBlock, cycle: int, moves: Moves, unit: float) -> list[Statement]:
     """A cycle at the present place; the parameters have been assigned before.
 
     unit : mm per unit of the program

@@ -6,7 +6,16 @@ import re
 from collections.abc import Sequence
 
 from planner.nc.language.heidenhain.moves import ONE, ZERO
-from planner.nc.language.heidenhain.text import PARAMETERS, Block, Formula, of, own, parameter, plus, value
+from planner.nc.language.heidenhain.text import (
+    PARAMETERS,
+    ConversationalBlock,
+    Formula,
+    of,
+    own,
+    parameter,
+    plus,
+    value,
+)
 from planner.nc.language.tree import (
     Call,
     Expression,
@@ -41,13 +50,13 @@ class Flow:
     """
 
     def __init__(self) -> None:
-        self.blocks: Sequence[Block] = ()
+        self.blocks: Sequence[ConversationalBlock] = ()
         self.names: dict[str, int] = {}
         self.known: dict[int, int] = {}
         self.called: set[int] = set()
         self.repeats = 0
 
-    def _label(self, block: Block, column: int) -> tuple[int, int]:
+    def _label(self, block: ConversationalBlock, column: int) -> tuple[int, int]:
         found = _LABEL.match(block.text, column)
         if found is None:
             raise block.fault('a label is a number or a name: LBL 5, LBL "holes"', column)
@@ -55,7 +64,7 @@ class Flow:
             return int(found.group(1)), found.end()
         return self.names.setdefault(found.group(2), _NAMED + len(self.names)), found.end()
 
-    def _label_here(self, block: Block, column: int) -> list[Statement]:
+    def _label_here(self, block: ConversationalBlock, column: int) -> list[Statement]:
         label, _ = self._label(block, column)
         if label == 0:
             return []
@@ -63,7 +72,7 @@ class Flow:
             raise block.fault(f"label {block.text[column:].strip()} is set twice")
         return [Label(block.place, label)]
 
-    def _call(self, block: Block, column: int) -> list[Statement]:
+    def _call(self, block: ConversationalBlock, column: int) -> list[Statement]:
         label, column = self._label(block, column)
         if label not in self.known:
             raise block.fault(f"there is no LBL {block.text[8:].split('REP')[0].strip()} to call")
@@ -80,7 +89,7 @@ class Flow:
         end: list[Statement] = [Line(block.place, (), ((counter, ZERO),))]
         return [If(block.place, ((of("LT", counter, Number(float(repeat.group(1)))), again),), end)]
 
-    def _parameter(self, block: Block, column: int) -> list[Statement]:
+    def _parameter(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
         if found is None:
             raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
@@ -90,12 +99,12 @@ class Flow:
             )
         ]
 
-    def _q(self, block: Block, number: int) -> Parameter:
+    def _q(self, block: ConversationalBlock, number: int) -> Parameter:
         if number >= PARAMETERS:
             raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}")
         return parameter(number)
 
-    def _fn(self, block: Block, column: int) -> list[Statement]:
+    def _fn(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
         number = int(found.group(1)) if found else -1
         column += found.end() if found else 0
@@ -120,7 +129,7 @@ class Flow:
             raise block.fault("nothing may follow here", column)
         return [Line(block.place, (), ((q, operation),))]
 
-    def _jump(self, block: Block, column: int, number: int) -> list[Statement]:
+    def _jump(self, block: ConversationalBlock, column: int, number: int) -> list[Statement]:
         start = _IF.match(block.text, column)
         left, column = value(block, start.end() if start else column)
         compare = re.match(r"\s*(EQU|NE|GT|LT)\b", block.text[column:], re.IGNORECASE)

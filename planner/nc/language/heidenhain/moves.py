@@ -15,7 +15,16 @@ import re
 from dataclasses import dataclass, field
 
 from planner.nc.language.heidenhain.text import POSITION as POSITION_OF_CONTROL
-from planner.nc.language.heidenhain.text import Block, minus, of, over, own, plus, times, value
+from planner.nc.language.heidenhain.text import (
+    ConversationalBlock,
+    minus,
+    of,
+    own,
+    plus,
+    quotient,
+    times,
+    value,
+)
 from planner.nc.language.spelling import NEGATIVE
 from planner.nc.language.tree import (
     Expression,
@@ -67,7 +76,7 @@ class Items:
     codes: list[tuple[int, int]] = field(default_factory=list)
 
 
-def items(block: Block, column: int) -> Items:
+def items(block: ConversationalBlock, column: int) -> Items:
     """Read what stands behind the function. Raises ProgramFault for what a path function does not take here."""
     found, text = Items(), block.text
     while text[column:].strip():
@@ -111,7 +120,7 @@ def items(block: Block, column: int) -> Items:
     return found
 
 
-def target(axis: str, given: tuple[Expression, bool]) -> Expression:
+def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
     """The absolute coordinate."""
     return plus(POSITION[axis], given[0]) if given[1] else given[0]
 
@@ -132,7 +141,7 @@ class Moves:
         self.automatic: Expression | None = None  # F of the tool call
         self.cut = False  # a corner was cut off before: the next move names x and y
 
-    def feed_words(self, block: Block, given: Items) -> list[Word]:
+    def feed_words(self, block: ConversationalBlock, given: Items) -> list[Word]:
         """The F word of a block, if it has one. Raises ProgramFault for F AUTO without a feed in the tool call."""
         feed = given.feed
         if given.automatic:
@@ -148,7 +157,7 @@ class Moves:
         return feed if self.feed_scale == 1.0 else times(feed, Number(self.feed_scale))
 
     def straight(
-        self, block: Block, given: Items, ends: dict[str, Expression], machine: bool = False
+        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression], machine: bool = False
     ) -> list[Statement]:
         """L and LP: a straight move to absolute coordinates."""
         at = block.place.at
@@ -170,7 +179,9 @@ class Moves:
             ]
         return [Line(block.place, tuple(words), tuple(assigned))] if named else []
 
-    def circle(self, block: Block, given: Items, ends: dict[str, Expression]) -> list[Statement]:
+    def circle(
+        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression]
+    ) -> list[Statement]:
         """C: an arc about the pole."""
         self._no_cut(block)
         if not given.turn:
@@ -179,7 +190,7 @@ class Moves:
 
     def _arc(
         self,
-        block: Block,
+        block: ConversationalBlock,
         given: Items,
         ends: dict[str, Expression],
         code: Expression,
@@ -199,7 +210,9 @@ class Moves:
         assigned += [(DIRECTION[0], of(NEGATIVE, times(sign, out[1]))), (DIRECTION[1], times(sign, out[0]))]
         return Line(block.place, tuple(words), tuple(assigned))
 
-    def radius_arc(self, block: Block, given: Items, ends: dict[str, Expression]) -> list[Statement]:
+    def radius_arc(
+        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression]
+    ) -> list[Statement]:
         """CR: an arc of a given radius."""
         self._no_cut(block)
         if given.radius is None or not given.turn:
@@ -211,18 +224,20 @@ class Moves:
         assigned += [(DIRECTION[0], ZERO), (DIRECTION[1], ZERO)]
         return [Line(block.place, tuple(words), tuple(assigned))]
 
-    def tangent_arc(self, block: Block, given: Items, ends: dict[str, Expression]) -> list[Statement]:
+    def tangent_arc(
+        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression]
+    ) -> list[Statement]:
         """CT: the arc that goes on in the direction of the last move."""
         self._no_cut(block)
         v = minus(ends.get("X", X), X), minus(ends.get("Y", Y), Y)
         length = of("LEN", *DIRECTION)
-        normal = over(of(NEGATIVE, DIRECTION[1]), length), over(DIRECTION[0], length)
+        normal = quotient(of(NEGATIVE, DIRECTION[1]), length), quotient(DIRECTION[0], length)
         squared = plus(times(v[0], v[0]), times(v[1], v[1]))
         radius, centre = own("r"), (own("tx"), own("ty"))
         first = Line(
             block.place,
             (),
-            ((radius, over(squared, times(TWO, plus(times(normal[0], v[0]), times(normal[1], v[1]))))),),
+            ((radius, quotient(squared, times(TWO, plus(times(normal[0], v[0]), times(normal[1], v[1]))))),),
         )
         second = Line(
             block.place,
@@ -234,7 +249,9 @@ class Moves:
         third = Line(block.place, (), ((turn, minus(times(TWO, left), ONE)),))
         return [first, second, third, self._arc(block, given, ends, plus(TWO, left), centre, turn)]
 
-    def polar_ends(self, block: Block, given: Items) -> tuple[list[Statement], dict[str, Expression]]:
+    def polar_ends(
+        self, block: ConversationalBlock, given: Items
+    ) -> tuple[list[Statement], dict[str, Expression]]:
         """LP: the statement that finds the polar coordinates, and the coordinates from them."""
         radius, angle = POLAR
         change: list[tuple[Parameter, Expression]] = []
@@ -248,10 +265,10 @@ class Moves:
             "Y": plus(POLE[1], times(radius, of("SIN", angle))),
         }
         if "Z" in given.axes:
-            ends["Z"] = target("Z", given.axes["Z"])
+            ends["Z"] = absolute("Z", given.axes["Z"])
         return [Line(block.place, (), tuple(change))] if change else [], ends
 
-    def polar_arc(self, block: Block, given: Items) -> list[Statement]:
+    def polar_arc(self, block: ConversationalBlock, given: Items) -> list[Statement]:
         """CP: an arc or a helix about the pole to a polar angle, or by an angle of any number of turns."""
         self._no_cut(block)
         if not given.turn:
@@ -261,7 +278,7 @@ class Moves:
         turns: Expression | None = None
         if "IPA" in given.polar:
             to = plus(now, given.polar["IPA"])
-            turns = of("UP", minus(over(of("ABS", given.polar["IPA"]), Number(360.0)), Number(1e-9)))
+            turns = of("UP", minus(quotient(of("ABS", given.polar["IPA"]), Number(360.0)), Number(1e-9)))
         elif "PA" in given.polar:
             to = given.polar["PA"]
         else:
@@ -275,10 +292,10 @@ class Moves:
 
     def cut_corner(
         self,
-        first: Block,
+        first: ConversationalBlock,
         given: Items,
         ends: dict[str, Expression],
-        corner: tuple[Block, Expression, bool],
+        corner: tuple[ConversationalBlock, Expression, bool],
         after: dict[str, Expression],
     ) -> list[Statement]:
         """A straight move, and the rounding or chamfer at its end.
@@ -304,7 +321,9 @@ class Moves:
             _unit(block.place, b),
             Line(block.place, (), ((turn, minus(times(a[0], b[1]), times(a[1], b[0]))),)),
         ]
-        half = of("TAN", over(of("ACOS", of("MIN", plus(times(a[0], b[0]), times(a[1], b[1])), ONE)), TWO))
+        half = of(
+            "TAN", quotient(of("ACOS", of("MIN", plus(times(a[0], b[0]), times(a[1], b[1])), ONE)), TWO)
+        )
         lines.append(
             Line(block.place, (), ((size, number), (cut, times(number, half) if rounded else number)))
         )
@@ -323,7 +342,7 @@ class Moves:
         self.cut = True
         return lines
 
-    def _no_cut(self, block: Block) -> None:
+    def _no_cut(self, block: ConversationalBlock) -> None:
         if self.cut:
             raise block.fault("after RND or CHF a straight move is expected; write the tangent points out")
 
@@ -331,16 +350,18 @@ class Moves:
 def _unit(place: Place, vector: tuple[Named, Named]) -> Line:
     """Divide a vector by its length."""
     length = of("LEN", *vector)
-    return Line(place, (), ((vector[0], over(vector[0], length)), (vector[1], over(vector[1], length))))
+    return Line(
+        place, (), ((vector[0], quotient(vector[0], length)), (vector[1], quotient(vector[1], length)))
+    )
 
 
-def looked_up(block: Block) -> Line:
+def looked_up(block: ConversationalBlock) -> Line:
     """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
     where = [Numbered(Number(float(POSITION_OF_CONTROL + k))) for k in range(3)]
     return Line(block.place, (), tuple(zip((X, Y, Z), where, strict=True)))
 
 
-def refuse_arc_axes(block: Block, given: Items) -> None:
+def refuse_arc_axes(block: ConversationalBlock, given: Items) -> None:
     """Arcs of C, CR and CT lie in the plane. Raises ProgramFault."""
     if "Z" in given.axes:
         raise block.fault("an arc with Z; a helix is written as CP with IPA")

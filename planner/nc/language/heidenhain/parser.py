@@ -28,13 +28,13 @@ from planner.nc.language.heidenhain.moves import (
     X,
     Y,
     Z,
+    absolute,
     items,
     looked_up,
     refuse_arc_axes,
-    target,
     word,
 )
-from planner.nc.language.heidenhain.text import Block, blocks, of, own, parameter, plus, value
+from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, of, own, parameter, plus, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
     Expression,
@@ -154,20 +154,20 @@ class Parser(Flow):
             return self._straight(k, last, found.end(), name)
         return read(self, block, found.end())
 
-    def _nothing(self, block: Block, column: int) -> list[Statement]:
+    def _nothing(self, block: ConversationalBlock, column: int) -> list[Statement]:
         return []
 
-    def _begin(self, block: Block, column: int) -> list[Statement]:
+    def _begin(self, block: ConversationalBlock, column: int) -> list[Statement]:
         inch = block.text.upper().split()[-1] == "INCH"
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         at = block.place.at
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
         return [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
 
-    def _end(self, block: Block, column: int) -> list[Statement]:
+    def _end(self, block: ConversationalBlock, column: int) -> list[Statement]:
         return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
 
-    def _tool(self, block: Block, column: int) -> list[Statement]:
+    def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(
             r"\s*(?:(\d+)(?:\.\d+)?|\"[^\"]*\")?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?((?:\s*(?:D[LR]2?|D[LR])[-+=\d.]+)*)\s*$",
             block.text[column:],
@@ -202,10 +202,10 @@ class Parser(Flow):
 
     # --- moves ------------------------------------------------------------------------------------------------------------------
 
-    def _ends(self, block: Block, given: Items) -> dict[str, Expression]:
+    def _ends(self, block: ConversationalBlock, given: Items) -> dict[str, Expression]:
         if given.polar:
             raise block.fault("polar coordinates belong to LP and CP")
-        return {axis: target(axis, found) for axis, found in given.axes.items()}
+        return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
     def _straight(self, k: int, last: int, column: int, name: str) -> list[Statement]:
         block = self.blocks[k]
@@ -225,7 +225,7 @@ class Parser(Flow):
             lines += self.moves.straight(block, given, ends, machine)
         return [*lines, *([looked_up(block)] if machine else []), *after]
 
-    def _corner(self, k: int, last: int) -> tuple[Block, Expression, bool] | None:
+    def _corner(self, k: int, last: int) -> tuple[ConversationalBlock, Expression, bool] | None:
         """RND or CHF in block k, with its number."""
         if k >= last:
             return None
@@ -244,7 +244,7 @@ class Parser(Flow):
             )
         return block, number, rounded
 
-    def _after(self, k: int, last: int, corner: Block) -> dict[str, Expression]:
+    def _after(self, k: int, last: int, corner: ConversationalBlock) -> dict[str, Expression]:
         """Where the straight move behind a corner leads."""
         block = self.blocks[k] if k < last else corner
         found = _FUNCTION.match(block.text)
@@ -256,10 +256,10 @@ class Parser(Flow):
             axis: plus(place[axis], end) if relative else end for axis, (end, relative) in given.axes.items()
         }
 
-    def _lonely_corner(self, block: Block, column: int) -> list[Statement]:
+    def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
         raise block.fault("RND and CHF stand between two straight moves (L); write other corners out")
 
-    def _arc(self, block: Block, column: int) -> list[Statement]:
+    def _arc(self, block: ConversationalBlock, column: int) -> list[Statement]:
         name = block.text[:column].upper()
         given = items(block, column)
         before, after, _ = self._codes(block, given)
@@ -269,7 +269,7 @@ class Parser(Flow):
         how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
         return [*before, *how(block, given, self._ends(block, given)), *after]
 
-    def _pole(self, block: Block, column: int) -> list[Statement]:
+    def _pole(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
         ends = self._ends(block, given) if given.axes else {"X": X, "Y": Y}
         named: list[tuple[Parameter, Expression]] = [
@@ -277,7 +277,9 @@ class Parser(Flow):
         ]
         return [Line(block.place, (), tuple(named))]
 
-    def _codes(self, block: Block, given: Items) -> tuple[list[Statement], list[Statement], bool]:
+    def _codes(
+        self, block: ConversationalBlock, given: Items
+    ) -> tuple[list[Statement], list[Statement], bool]:
         """What the M codes of a block do before its move and after it, and whether it goes in machine coordinates."""
         before: list[Statement] = []
         after: list[Statement] = []
@@ -304,18 +306,18 @@ class Parser(Flow):
                 before.append(row)
         return before, after, machine
 
-    def _code(self, block: Block, column: int) -> list[Statement]:
+    def _code(self, block: ConversationalBlock, column: int) -> list[Statement]:
         before, after, _ = self._codes(block, items(block, 0))
         return [*before, *after]
 
-    def _stop(self, block: Block, column: int) -> list[Statement]:
+    def _stop(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
         before, after, _ = self._codes(block, given)
         return [*before, Line(block.place, (word("M", block.place.at, ZERO),)), *after]
 
     # --- cycles -----------------------------------------------------------------------------------------------------------------
 
-    def _define(self, block: Block, column: int) -> list[Statement]:
+    def _define(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
         if found is None:
             raise block.fault("CYCL DEF needs the number of a cycle", column)
@@ -335,7 +337,7 @@ class Parser(Flow):
             given.append((self._q(block, int(entry.group(1))), number))
         return [Line(block.place, (), (*given, (own("cycle"), Number(float(cycle)))))]
 
-    def _old_cycle(self, block: Block, cycle: int, part: int, column: int) -> list[Statement]:
+    def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
         at = block.place.at
         if cycle in (7, 9, 32) and part == 0:
             return []
@@ -364,7 +366,7 @@ class Parser(Flow):
             f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}", column
         )
 
-    def _pecking(self, block: Block, part: int, column: int) -> list[Statement]:
+    def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[Statement]:
         """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
         cycle: list[tuple[Parameter, Expression]] = [(own("cycle"), Number(1.0))]
         if part == 0:
@@ -375,7 +377,7 @@ class Parser(Flow):
         number, _ = value(block, found.end())
         return [Line(block.place, (), ((parameter(drilling.PECKING[part - 1]), number),))]
 
-    def _cycle_call(self, block: Block, column: int) -> list[Statement]:
+    def _cycle_call(self, block: ConversationalBlock, column: int) -> list[Statement]:
         rest = re.match(r"\s*POS\b", block.text[column:], re.IGNORECASE)
         if rest is None:
             given = items(block, column)
@@ -386,14 +388,14 @@ class Parser(Flow):
         ends = {axis: end for axis, end in self._ends(block, given).items() if axis != "Z"}
         return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
 
-    def _call_cycle(self, block: Block) -> list[Statement]:
+    def _call_cycle(self, block: ConversationalBlock) -> list[Statement]:
         known = [cycle for cycle in drilling.CYCLES if cycle in self.cycles]
         if not known:
             raise block.fault("there is no drilling cycle to call; write CYCL DEF 200 before")
         branches = tuple(
             (
                 of("EQ", own("cycle"), Number(float(cycle))),
-                drilling.drill(block, cycle, self.moves, self.unit),
+                drilling.drilled(block, cycle, self.moves, self.unit),
             )
             for cycle in known
         )
@@ -405,7 +407,7 @@ class Parser(Flow):
 
 _PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
 _REMEDY = "let the CAM system write the moves out as L, C and CC"
-_READ: dict[str, Callable[[Parser, Block, int], list[Statement]]] = {
+_READ: dict[str, Callable[[Parser, ConversationalBlock, int], list[Statement]]] = {
     "BEGIN PGM": Parser._begin,
     "END PGM": Parser._end,
     **dict.fromkeys(("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), Parser._nothing),

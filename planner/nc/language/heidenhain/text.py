@@ -119,13 +119,13 @@ def times(a: Expression, b: Expression) -> Expression:
     return of("*", a, b)
 
 
-def over(a: Expression, b: Expression) -> Expression:
+def quotient(a: Expression, b: Expression) -> Expression:
     """The quotient."""
     return of("/", a, b)
 
 
 @dataclass(frozen=True)
-class Block:
+class ConversationalBlock:
     """A block of the program: its place, and its text without number and comment, parts of continued lines joined by blanks.
 
     at : byte offset of the first character of each part, and where the part begins in `text`
@@ -150,7 +150,7 @@ _CONTINUED = re.compile(r"\s*Q\d+\s*=", re.IGNORECASE)
 _NUMBERED = re.compile(r"\s*(\d+)\s+(?=\S)")
 
 
-def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
+def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
     """The blocks of a program.
 
     file, begin : its number among the files, and where its bytes begin in the words' data
@@ -177,14 +177,14 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
             )
         elif content:
             if waiting is not None:
-                yield Block(waiting[0], waiting[1], tuple(waiting[2]))
+                yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
             waiting = (Place(file, number, start + first), content, [(start + first, 0)])
         open_end = ends_open or (open_end and not content)
     if waiting is not None:
-        yield Block(waiting[0], waiting[1], tuple(waiting[2]))
+        yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
 
 
-def value(block: Block, column: int) -> tuple[Expression, int]:
+def value(block: ConversationalBlock, column: int) -> tuple[Expression, int]:
     """The number or parameter at a column of the block's text, and the column after it. Raises ProgramFault."""
     while block.text[column : column + 1] == " ":
         column += 1
@@ -204,7 +204,7 @@ def value(block: Block, column: int) -> tuple[Expression, int]:
 class Formula:
     """Reads a formula from a column of a block's text to its end."""
 
-    def __init__(self, block: Block, column: int):
+    def __init__(self, block: ConversationalBlock, column: int):
         self.block = block
         self.tokens: list[tuple[str, int]] = []
         text, at = block.text, column

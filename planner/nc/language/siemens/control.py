@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.nc.language.siemens.text import Reader, of, variable
+from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.tree import (
     Expression,
     Goto,
@@ -56,7 +56,7 @@ class Control:
     def _number_of(self, label: str) -> int:
         return self.labels.setdefault(label, len(self.labels) + 1)
 
-    def _begin(self, kind: str, reader: Reader, condition: Expression | None) -> _Open:
+    def _begin(self, kind: str, reader: TokenReader, condition: Expression | None) -> _Open:
         if len(self.open) >= _NESTED_MAX:
             raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
         opened = _Open(kind, reader.place, condition, [], [])
@@ -64,14 +64,14 @@ class Control:
         self.body = opened.body
         return opened
 
-    def _close(self, kind: str, reader: Reader) -> _Open:
+    def _close(self, kind: str, reader: TokenReader) -> _Open:
         if not self.open or self.open[-1].kind != kind:
             raise reader.fault(f"there is no {kind} open that this ends", 0)
         closed = self.open.pop()
         self.body = self.open[-1].body if self.open else self.main
         return closed
 
-    def _if(self, reader: Reader) -> None:
+    def _if(self, reader: TokenReader) -> None:
         condition = reader.expression()
         if reader.peek().startswith("GOTO"):
             reader.next += 1
@@ -81,7 +81,7 @@ class Control:
         else:
             self._begin("IF", reader, condition)
 
-    def _else(self, reader: Reader) -> None:
+    def _else(self, reader: TokenReader) -> None:
         if not self.open or self.open[-1].kind != "IF" or self.open[-1].condition is None:
             raise reader.fault("there is no IF open that this belongs to", 0)
         top = self.open[-1]
@@ -90,20 +90,20 @@ class Control:
         top.condition, top.body = None, []
         self.body = top.body
 
-    def _end_if(self, reader: Reader) -> None:
+    def _end_if(self, reader: TokenReader) -> None:
         closed = self._close("IF", reader)
         if closed.condition is not None:
             self.body.append(If(closed.place, ((closed.condition, closed.body),), []))
         else:
             self.body.append(If(closed.place, tuple(closed.branches), closed.body))
 
-    def _while(self, reader: Reader) -> None:
+    def _while(self, reader: TokenReader) -> None:
         self._begin("WHILE", reader, reader.expression())
 
-    def _loop(self, reader: Reader) -> None:
+    def _loop(self, reader: TokenReader) -> None:
         self._begin("LOOP", reader, ONE)
 
-    def _end_loop(self, reader: Reader) -> None:
+    def _end_loop(self, reader: TokenReader) -> None:
         kind = {"ENDWHILE": "WHILE", "ENDLOOP": "LOOP"}[reader.peek(-1)]
         closed = self._close(kind, reader)
         assert closed.condition is not None
@@ -111,7 +111,7 @@ class Control:
             Loop(closed.place, "while", f"{kind} {closed.place.at}", closed.condition, closed.body)
         )
 
-    def _for(self, reader: Reader) -> None:
+    def _for(self, reader: TokenReader) -> None:
         target = reader.parameter(reader.tokens[reader.next]) if not reader.ended else None
         if target is None:
             raise reader.fault("FOR needs a variable that is declared")
@@ -123,16 +123,16 @@ class Control:
         self.body.append(Line(reader.place, (), ((target, first),)))
         self._begin("FOR", reader, None).count = (target, last)
 
-    def _end_for(self, reader: Reader) -> None:
+    def _end_for(self, reader: TokenReader) -> None:
         closed = self._close("FOR", reader)
         assert closed.count is not None
         target, last = closed.count
-        closed.body.append(Line(closed.place, (), ((target, of("+", target, ONE)),)))
+        closed.body.append(Line(closed.place, (), ((target, operation("+", target, ONE)),)))
         self.body.append(
-            Loop(closed.place, "while", f"FOR {closed.place.at}", of("<=", target, last), closed.body)
+            Loop(closed.place, "while", f"FOR {closed.place.at}", operation("<=", target, last), closed.body)
         )
 
-    def _repeat(self, reader: Reader) -> None:
+    def _repeat(self, reader: TokenReader) -> None:
         """REPEAT ... UNTIL, or REPEAT label P=n: the lines from the label to here, n times more."""
         if reader.ended:
             self._begin("REPEAT", reader, None)
@@ -149,22 +149,28 @@ class Control:
         self.counters += 1
         place = reader.place
         again: list[Statement] = [
-            Line(place, (), ((counter, of("+", counter, ONE)),)),
+            Line(place, (), ((counter, operation("+", counter, ONE)),)),
             Goto(place, Number(float(self.labels[label]))),
         ]
         end: list[Statement] = [Line(place, (), ((counter, ZERO),))]
-        self.body.append(If(place, ((of("<", counter, times), again),), end))
+        self.body.append(If(place, ((operation("<", counter, times), again),), end))
 
-    def _until(self, reader: Reader) -> None:
+    def _until(self, reader: TokenReader) -> None:
         closed = self._close("REPEAT", reader)
         self.body.append(
-            Loop(closed.place, "do", f"REPEAT {closed.place.at}", of("NOT", reader.expression()), closed.body)
+            Loop(
+                closed.place,
+                "do",
+                f"REPEAT {closed.place.at}",
+                operation("NOT", reader.expression()),
+                closed.body,
+            )
         )
 
-    def _goto(self, reader: Reader) -> None:
+    def _goto(self, reader: TokenReader) -> None:
         self._jump(reader, self.body)
 
-    def _jump(self, reader: Reader, body: list[Statement]) -> None:
+    def _jump(self, reader: TokenReader, body: list[Statement]) -> None:
         label = reader.peek()
         if not label:
             raise reader.fault("a label is expected here")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planner.nc.language.siemens.text import of, variable
+from planner.nc.language.siemens.text import operation, variable
 from planner.nc.language.tree import Expression, If, Line, Loop, Number, Place, Statement, Word
 
 ARGUMENTS = {
@@ -25,7 +25,7 @@ _BEFORE = 1.0  # mm above the depth already drilled, where feed begins again
 ZERO, ONE = Number(0.0), Number(1.0)
 
 
-def drill(place: Place, name: str, given: Sequence[Expression | None], unit: float) -> list[Statement]:
+def drilled_rows(place: Place, name: str, given: Sequence[Expression | None], unit: float) -> list[Statement]:
     """A cycle with its arguments.
 
     unit : mm per unit of the program
@@ -37,11 +37,11 @@ def drill(place: Place, name: str, given: Sequence[Expression | None], unit: flo
     for key in ("RTP", "RFP", "SDIS"):
         if key not in known:
             raise ValueError(f"{name} needs {key}")
-    clear = of("+", known["RFP"], of("ABS", known["SDIS"]))
+    clear = operation("+", known["RFP"], operation("ABS", known["SDIS"]))
     if "DP" in known:
         bottom: Expression = known["DP"]
     elif "DPR" in known:
-        bottom = of("-", known["RFP"], of("ABS", known["DPR"]))
+        bottom = operation("-", known["RFP"], operation("ABS", known["DPR"]))
     else:
         raise ValueError(f"{name} needs DP or DPR")
 
@@ -52,7 +52,7 @@ def drill(place: Place, name: str, given: Sequence[Expression | None], unit: flo
         if key not in known:
             return []
         row = Line(place, (Word(ord("G"), place.at, Number(4.0)), Word(ord("P"), place.at, known[key])))
-        return [If(place, ((of(">", known[key], ZERO), [row]),), [])]
+        return [If(place, ((operation(">", known[key], ZERO), [row]),), [])]
 
     found: list[Statement] = [go(clear, 0.0)]
     if name == "CYCLE83":
@@ -67,27 +67,29 @@ def _by_infeeds(place, known, clear, bottom, unit, go, dwell) -> list[Statement]
     if "FDEP" in known:
         first = known["FDEP"]
     elif "FDPR" in known:
-        first = of("-", known["RFP"], of("ABS", known["FDPR"]))
+        first = operation("-", known["RFP"], operation("ABS", known["FDPR"]))
     else:
         raise ValueError("CYCLE83 needs FDEP or FDPR")
-    less = of("ABS", known.get("DAM", ZERO))
+    less = operation("ABS", known.get("DAM", ZERO))
     out = known.get("VARI", ZERO)
-    above = [go(clear, 0.0), *dwell("DTS"), go(of("+", depth, Number(_BEFORE / unit)), 0.0)]
-    chip = [go(of("+", depth, Number(_BREAK / unit)), 0.0)]
-    smaller = of("MAX", of("-", step, less), less)
+    above = [go(clear, 0.0), *dwell("DTS"), go(operation("+", depth, Number(_BEFORE / unit)), 0.0)]
+    chip = [go(operation("+", depth, Number(_BREAK / unit)), 0.0)]
+    smaller = operation("MAX", operation("-", step, less), less)
     return [
-        Line(place, (), ((depth, of("MAX", first, bottom)), (step, of("-", known["RFP"], first)))),
+        Line(
+            place, (), ((depth, operation("MAX", first, bottom)), (step, operation("-", known["RFP"], first)))
+        ),
         go(depth, 1.0),
         Loop(
             place,
             "while",
             f"holes {place.at}",
-            of(">", depth, bottom),
+            operation(">", depth, bottom),
             [
                 *dwell("DTB"),
-                If(place, ((of("<>", out, ZERO), above),), chip),
-                If(place, ((of(">", less, ZERO), [Line(place, (), ((step, smaller),))]),), []),
-                Line(place, (), ((depth, of("MAX", of("-", depth, step), bottom)),)),
+                If(place, ((operation("<>", out, ZERO), above),), chip),
+                If(place, ((operation(">", less, ZERO), [Line(place, (), ((step, smaller),))]),), []),
+                Line(place, (), ((depth, operation("MAX", operation("-", depth, step), bottom)),)),
                 go(depth, 1.0),
             ],
         ),

@@ -22,7 +22,7 @@ import numpy as np
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.siemens import drilling
 from planner.nc.language.siemens.control import ONE, ZERO, Control
-from planner.nc.language.siemens.text import Reader, of, position, variable
+from planner.nc.language.siemens.text import TokenReader, operation, position, variable
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
     Expression,
@@ -177,7 +177,7 @@ class Parser(Control):
         while label := _LABEL.match(text, at):
             self._label(label.group(1).upper(), line.place)
             at = label.end()
-        reader = Reader(" " * at + text[at:], line.place, line.start, self.names)
+        reader = TokenReader(" " * at + text[at:], line.place, line.start, self.names)
         if reader.ended:
             return
         read = _STATEMENTS.get(reader.peek())
@@ -191,7 +191,7 @@ class Parser(Control):
 
     # --- words ------------------------------------------------------------------------------------------------------------------
 
-    def _words(self, reader: Reader) -> None:
+    def _words(self, reader: TokenReader) -> None:
         """A row of words, commands that move nothing, and assignments."""
         words: list[Word] = []
         assigned: list[tuple[Parameter, Expression]] = []
@@ -256,7 +256,7 @@ class Parser(Control):
         if moved and self.cycle is not None:
             self.body += self.cycle
 
-    def _word(self, reader: Reader, name: str, at: int) -> list[Word]:
+    def _word(self, reader: TokenReader, name: str, at: int) -> list[Word]:
         """The words of RS274NGC for one word. Raises ProgramFault."""
         number = float(name[1:]) if reader.tokens[reader.next - 1].kind == "word" else None
         letter = name[0] if number is not None else re.sub(r"\d+\Z", "", name)
@@ -269,7 +269,7 @@ class Parser(Control):
                 _word(
                     {"CR": "R", "TURN": "P", "ADIS": "P"}[name],
                     at,
-                    of("+", value, ONE) if name == "TURN" else value,
+                    operation("+", value, ONE) if name == "TURN" else value,
                 )
             ]
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
@@ -278,7 +278,7 @@ class Parser(Control):
         # Offsets D belong to the control: lengths come from [tools]. A tool by its name has no number.
         return [] if given is None or letter == "D" else [_word(letter, at, given)]
 
-    def _given(self, reader: Reader, letter: str, at: int) -> Expression | None:
+    def _given(self, reader: TokenReader, letter: str, at: int) -> Expression | None:
         """The value behind an equals sign; None for a text, such as T="DRILL"."""
         reader.expect("=")
         if not reader.ended and reader.tokens[reader.next].kind == "text":
@@ -293,19 +293,19 @@ class Parser(Control):
         return reader.expression()
 
     def _coordinate(
-        self, letter: str, value: Expression, absolute: bool, reader: Reader, at: int
+        self, letter: str, value: Expression, absolute: bool, reader: TokenReader, at: int
     ) -> Expression:
         if letter in "IJK":
-            return of("-", value, position("XYZ"["IJK".index(letter)])) if absolute else value
+            return operation("-", value, position("XYZ"["IJK".index(letter)])) if absolute else value
         if letter not in "XYZ":
             raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
         if absolute == self.absolute:
             return value
-        return of(
+        return operation(
             "-" if absolute else "+", *((value, position(letter)) if absolute else (position(letter), value))
         )
 
-    def _code(self, reader: Reader, code: int, at: int) -> list[Word]:
+    def _code(self, reader: TokenReader, code: int, at: int) -> list[Word]:
         if code in (90, 91):
             self.absolute = code == 90
             if reader.peek() == "(":
@@ -324,7 +324,7 @@ class Parser(Control):
 
     # --- commands ---------------------------------------------------------------------------------------------------------------
 
-    def _cycle(self, reader: Reader, name: str) -> None:
+    def _cycle(self, reader: TokenReader, name: str) -> None:
         place = reader.place
         given = self._arguments(reader)
         if name == "CYCLE800":
@@ -338,13 +338,13 @@ class Parser(Control):
         else:
             self.body += self._drilled(reader, name, given)
 
-    def _drilled(self, reader: Reader, name: str, given: list[Expression | None]) -> list[Statement]:
+    def _drilled(self, reader: TokenReader, name: str, given: list[Expression | None]) -> list[Statement]:
         try:
-            return drilling.drill(reader.place, name, given, self.unit)
+            return drilling.drilled_rows(reader.place, name, given, self.unit)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
 
-    def _arguments(self, reader: Reader) -> list[Expression | None]:
+    def _arguments(self, reader: TokenReader) -> list[Expression | None]:
         """What stands in the brackets behind a cycle; None for what is left out or a text."""
         given: list[Expression | None] = []
         if not reader.take("("):
@@ -361,7 +361,7 @@ class Parser(Control):
                 raise reader.fault(") is missing")
         return given
 
-    def _modal_call(self, reader: Reader) -> None:
+    def _modal_call(self, reader: TokenReader) -> None:
         if reader.ended:
             self.cycle = None
             return
@@ -371,7 +371,7 @@ class Parser(Control):
             raise reader.fault(f"MCALL {name} is not read; read are {', '.join(drilling.ARGUMENTS)}", 0)
         self.cycle = self._drilled(reader, name, self._arguments(reader))
 
-    def _shift(self, reader: Reader) -> None:
+    def _shift(self, reader: TokenReader) -> None:
         """TRANS: an origin; ATRANS: one beside the one before."""
         more = reader.peek(-1) == "ATRANS"
         place = reader.place
@@ -390,14 +390,14 @@ class Parser(Control):
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
         assigned: list[tuple[Parameter, Expression]] = [
-            (ends[axis], of("+", ends[axis], given.get(axis, ZERO)) if more else given.get(axis, ZERO))
+            (ends[axis], operation("+", ends[axis], given.get(axis, ZERO)) if more else given.get(axis, ZERO))
             for axis in ends
         ]
         self.body.append(Line(place, (), tuple(assigned)))
         words = [_word("G", place.at, Number(52.0)), *(_word(axis, place.at, ends[axis]) for axis in ends)]
         self.body.append(Line(place, tuple(words)))
 
-    def _define(self, reader: Reader) -> None:
+    def _define(self, reader: TokenReader) -> None:
         kind = reader.peek()
         reader.next += 1
         if kind not in _TYPES:
@@ -415,16 +415,16 @@ class Parser(Control):
 
     # --- other commands -------------------------------------------------------------------------------------------------------
 
-    def _message(self, reader: Reader) -> None:
+    def _message(self, reader: TokenReader) -> None:
         found = re.search(r'"([^"]*)"', reader.text)
         reader.next = len(reader.tokens)
         if found and found.group(1):
             self.body.append(Message(reader.place, (found.group(1),)))
 
-    def _refused(self, reader: Reader) -> None:
+    def _refused(self, reader: TokenReader) -> None:
         raise reader.fault(f"{reader.peek(-1)} is not read; {_REMEDY}", reader.tokens[reader.next - 1].at)
 
-    def _idle(self, reader: Reader) -> None:
+    def _idle(self, reader: TokenReader) -> None:
         reader.next = len(reader.tokens)
 
 
@@ -432,7 +432,7 @@ def _word(letter: str, at: int, value: Expression) -> Word:
     return Word(ord(letter), at, value)
 
 
-def _skip(reader: Reader) -> None:
+def _skip(reader: TokenReader) -> None:
     """Go past what stands in brackets behind a command, or behind its equals sign."""
     if reader.take("="):
         reader.expression()
@@ -451,7 +451,7 @@ def _without_comment(text: str) -> str:
 
 
 _REMEDY = "let the CAM system write the moves out"
-_STATEMENTS: dict[str, Callable[[Parser, Reader], None]] = {
+_STATEMENTS: dict[str, Callable[[Parser, TokenReader], None]] = {
     "DEF": Parser._define,
     "IF": Parser._if,
     "ELSE": Parser._else,

@@ -103,7 +103,7 @@ _TOKEN = re.compile(
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
 
 
-def of(name: str, *operands: Expression) -> Operation:
+def operation(name: str, *operands: Expression) -> Operation:
     """An operation of the language."""
     return Operation(name, operands)
 
@@ -132,7 +132,7 @@ class Token:
     at: int
 
 
-class Reader:
+class TokenReader:
     """Reads one line of a program from left to right.
 
     names : variables that the program has declared
@@ -190,7 +190,7 @@ class Reader:
         while (its := _RANKS.get(self.peek(), -1)) >= rank:
             operator = self.peek()
             self.next += 1
-            left = of(operator, left, self.expression(its + 1))
+            left = operation(operator, left, self.expression(its + 1))
             count += 1
             if count > OPERATIONS_MAX:
                 raise self.fault(
@@ -218,9 +218,9 @@ class Reader:
             operand = self.value()
             if token.text == "+":
                 return operand
-            return Number(-operand.value) if isinstance(operand, Number) else of(NEGATIVE, operand)
+            return Number(-operand.value) if isinstance(operand, Number) else operation(NEGATIVE, operand)
         if token.text == "NOT":
-            return of("NOT", self.value())
+            return operation("NOT", self.value())
         if token.text == "(":
             inner = self.expression()
             self.expect(")")
@@ -252,7 +252,7 @@ class Reader:
                 self.expect(",")
                 operands = (first, self.expression())  # type: ignore[assignment]
             self.expect(")")
-            return of(name, *operands)
+            return operation(name, *operands)
         if name in _CONSTANTS:
             return Number(_CONSTANTS[name])
         if _SYSTEM.match(name) and self.take("["):
@@ -272,7 +272,7 @@ class Reader:
         if token.text == "R" and self.take("["):
             index = self.expression()
             self.expect("]")
-            return Numbered(of("+", index, Number(1.0)))
+            return Numbered(operation("+", index, Number(1.0)))
         if re.fullmatch(r"R\d+", token.text):
             number = int(token.text[1:])
             if number >= PARAMETERS:

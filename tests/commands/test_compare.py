@@ -186,7 +186,7 @@ def test_a_bug_is_not_a_row(answers: Callable[..., list[str]], job: Path) -> Non
     assert "oops" in result.stderr
 
 
-@pytest.mark.parametrize("content", [None, "G41 D1\nG1 X5 F100\n", ""])
+@pytest.mark.parametrize("content", [None, "G38.2 Z-1 F10\nG1 X5 F100\n", ""])
 def test_a_bad_program_is_said_once_and_not_per_method(
     answers: Callable[..., list[str]], tmp_path: Path, content: str | None
 ) -> None:

@@ -35,8 +35,8 @@ PYTHON = "/usr/bin/python3"
 NOWHERE = 1e-9  # [mm]
 END_OF_FILE = "File ended with no percent sign"  # LinuxCNC wants M2, M30 or %; a file that just ends has moved all the same
 
-# Programs that LinuxCNC refuses and the reader accepts, with the reason. (None so far.)
-ONLY_HERE: dict[str, str] = {}
+# Programs that LinuxCNC refuses and the reader accepts, with the reason.
+ONLY_HERE = {"aamorim1913__AptPostProcessor__Interface-glue-11.h": "a conversational Heidenhain program"}
 
 # Programs that cut threads: the oracle does not say at which feed.
 THREADS = ("LinuxCNC__linuxcnc__lathe-g76.ngc",)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
 
-SAMPLES_MAX = 200_000
+SAMPLES_MAX = 150_000
 PROGRAMMED_MAX = 60_000  # points of the programmed path that are shown
 ARC_POINTS = 24  # of every arc and curve that are shown
 NO_LIMIT = "none"

@@ -201,6 +201,20 @@ def _linuxcnc_number(asked: Asked, number: int) -> float:
     return 0.0
 
 
+# Parameters of the tree that hold the position, behind those that programs of Heidenhain and Siemens can name: x, y, z.
+FIRST_POSITION = 2001
+
+
+class PositionAsked(Asked):
+    """Positions of the axes alone, for languages whose parameters do not hold the state of the control."""
+
+    numbers = frozenset((FIRST_POSITION, FIRST_POSITION + 1, FIRST_POSITION + 2))
+
+    def get(self, parameter: int | str, depth: int) -> float:
+        """The position of an axis in the program's coordinates and unit."""
+        return self.here(int(parameter) - FIRST_POSITION)
+
+
 class LinuxcncAsked(Asked):
     """Numbers 5161 to 5428 and the predefined names of LinuxCNC 2.9."""
 

@@ -13,7 +13,7 @@ from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import fanuc, linuxcnc
-from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked
+from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, PositionAsked
 from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.heidenhain import text as heidenhain_text
 from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
@@ -82,12 +82,8 @@ _FRONTS = {
         linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
     ),
     FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
-    HEIDENHAIN: _Front(
-        heidenhain_text.LANGUAGE, heidenhain_text.HeidenhainAsked, HeidenhainParser, lambda name: frozenset()
-    ),
-    SIEMENS: _Front(
-        siemens_text.LANGUAGE, siemens_text.SiemensAsked, SiemensParser, lambda name: frozenset()
-    ),
+    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
+    SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, lambda name: frozenset()),
 }
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from planner.nc.language.heidenhain.text import POSITION as POSITION_OF_CONTROL
+from planner.nc.language.asked import FIRST_POSITION
 from planner.nc.language.heidenhain.text import (
     ConversationalBlock,
     minus,
@@ -357,7 +357,7 @@ def _unit(place: Place, vector: tuple[Named, Named]) -> Line:
 
 def looked_up(block: ConversationalBlock) -> Line:
     """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
-    where = [Numbered(Number(float(POSITION_OF_CONTROL + k))) for k in range(3)]
+    where = [Numbered(Number(float(FIRST_POSITION + k))) for k in range(3)]
     return Line(block.place, (), tuple(zip((X, Y, Z), where, strict=True)))
 
 

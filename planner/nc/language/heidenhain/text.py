@@ -14,9 +14,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.language.asked import Asked
+from planner.nc.language.asked import FIRST_POSITION, PositionAsked
 from planner.nc.language.linuxcnc import ARITHMETIC, DEGREES
-from planner.nc.language.spelling import NEGATIVE
+from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
 from planner.nc.language.tree import (
     Expression,
     Language,
@@ -29,21 +29,6 @@ from planner.nc.language.tree import (
 )
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
-POSITION = (
-    PARAMETERS + 1
-)  # parameters of the tree that hold the position in the program's coordinates: x, y, z
-NESTED_MAX = 40  # brackets in brackets
-OPERATIONS_MAX = 80  # in a row
-
-
-class HeidenhainAsked(Asked):
-    """Positions of the axes."""
-
-    numbers = frozenset((POSITION, POSITION + 1, POSITION + 2))
-
-    def get(self, parameter: int | str, depth: int) -> float:
-        """The position of an axis in the program's coordinates and unit."""
-        return self.here(int(parameter) - POSITION)
 
 
 LANGUAGE = Language(
@@ -74,9 +59,9 @@ LANGUAGE = Language(
         "ceil": math.ceil,
     },
     locals=0,
-    largest=POSITION + 2,
+    largest=FIRST_POSITION + 2,
     vacant=0.0,
-    asked=HeidenhainAsked.numbers,
+    asked=PositionAsked.numbers,
 )
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")

@@ -15,9 +15,9 @@ import math
 import re
 from dataclasses import dataclass
 
-from planner.nc.language.asked import Asked
+from planner.nc.language.asked import FIRST_POSITION, PositionAsked
 from planner.nc.language.linuxcnc import ARITHMETIC, DEGREES, nearest
-from planner.nc.language.spelling import NEGATIVE
+from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
 from planner.nc.language.tree import (
     Expression,
     Language,
@@ -30,19 +30,6 @@ from planner.nc.language.tree import (
 )
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
-POSITION = 2001  # parameters of the tree that hold the position in the program's coordinates: x, y, z
-NESTED_MAX = 40  # brackets in brackets
-OPERATIONS_MAX = 80  # in a row
-
-
-class SiemensAsked(Asked):
-    """Positions of the axes."""
-
-    numbers = frozenset((POSITION, POSITION + 1, POSITION + 2))
-
-    def get(self, parameter: int | str, depth: int) -> float:
-        """The position of an axis in the program's coordinates and unit."""
-        return self.here(int(parameter) - POSITION)
 
 
 LANGUAGE = Language(
@@ -79,9 +66,9 @@ LANGUAGE = Language(
         "nearest": nearest,
     },
     locals=0,
-    largest=POSITION + 2,
+    largest=FIRST_POSITION + 2,
     vacant=0.0,
-    asked=SiemensAsked.numbers,
+    asked=PositionAsked.numbers,
 )
 
 _RANKS = {
@@ -110,7 +97,7 @@ def operation(name: str, *operands: Expression) -> Operation:
 
 def position(axis: str) -> Numbered:
     """Where the axis is, in the program's coordinates."""
-    return Numbered(Number(float(POSITION + "XYZ".index(axis))))
+    return Numbered(Number(float(FIRST_POSITION + "XYZ".index(axis))))
 
 
 def variable(name: str) -> Named:

@@ -68,7 +68,7 @@ class Frame:
 class Expansion:
     """What was expanded to make a program of one that computes.
 
-    dialect : whose language it is: "linuxcnc" or "fanuc"
+    dialect : whose language it is: "linuxcnc", "fanuc", "heidenhain" or "siemens"
     calls   : subprograms in the order of their first call, and how often each was called
     turns   : turns of loops, jumps and calls
     rows    : lines executed, each as often as it was

@@ -18,6 +18,7 @@ import re
 
 from planner.base.units import MILLISECOND
 from planner.nc.language.fanuc import calls
+from planner.nc.language.fanuc.control import Control
 from planner.nc.language.fanuc.text import SPELLING
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader, Unspelled
@@ -28,7 +29,6 @@ from planner.nc.language.tree import (
     If,
     Label,
     Line,
-    Loop,
     Message,
     Named,
     Number,
@@ -47,22 +47,18 @@ _LINE_NUMBER = re.compile(r"N(\d+)", re.IGNORECASE)
 _PROGRAM = re.compile(r"[O:](\d+)", re.IGNORECASE)
 _KEYWORD = re.compile(r"(IF|WHILE|GOTO|DO|END|POPEN|PCLOS|DPRNT|BPRNT)(?![A-Z])", re.IGNORECASE)
 _GOTO = re.compile(r"GOTO(\d+)?")
-_ALARM, _STOP = 3000.0, 3006.0  # parameters: raise an alarm, stop with a message
-_LOOPS_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
+_STOP = 3006.0  # parameter: stop with a message
 _CALLS = ("M98", "M97", "M99", "G65", "G66")
 
 
-class Parser:
+class Parser(Control):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
+        super().__init__()
         self.source = source
         self.faults: list[ProgramFault] = []
         self.procedures: list[Procedure] = []
-        self.body: list[Statement] = []
-        self.open: list[
-            tuple[int, Place, Expression, list[Statement]]
-        ] = []  # DO number, its condition, the body around it
         self.modal: Call | None = None  # G66
         self.local: list[tuple[int, Place, Procedure]] = []  # M97
         self.numbers: frozenset[str] = frozenset()
@@ -205,41 +201,16 @@ class Parser:
         elif keyword == "IF":
             self._if(reader, line)
         elif keyword == "WHILE":
-            condition = reader.bracket()
-            at = reader.at
-            if reader.keyword() != "do":
-                raise reader.refused(at, "WHILE [condition] is followed by DO and a number")
-            self._do(reader, line, condition)
+            self._while(reader, line)
         elif keyword == "DO":
-            self._do(reader, line, Number(1.0))
+            self._do(reader, line)
         elif keyword == "END":
-            number = self._number(reader)
-            if not self.open or self.open[-1][0] != number:
-                raise ProgramFault(line.place, f"END {number} has no DO {number} before it")
-            _, place, condition, around = self.open.pop()
-            around.append(Loop(place, "while", f"DO {number}", condition, self.body))
-            self.body = around
+            self._end(reader, line)
         else:  # output to a file
             self.body.append(Message(line.place, (reader.text,)))
             return
         if not reader.ended:
             raise reader.refused(reader.at, f"nothing may follow {keyword} on its line")
-
-    def _number(self, reader: LineReader) -> int:
-        at = reader.at
-        value = reader.number()
-        if value is None or value != int(value):
-            raise reader.refused(at, "DO and END are followed by a whole number")
-        return int(value)
-
-    def _do(self, reader: LineReader, line: SourceLine, condition: Expression) -> None:
-        number = self._number(reader)
-        if any(number == known for known, _, _, _ in self.open) or len(self.open) >= _LOOPS_MAX:
-            raise ProgramFault(
-                line.place, f"DO {number} inside another DO {number}, or more than {_LOOPS_MAX} in each other"
-            )
-        self.open.append((number, line.place, condition, self.body))
-        self.body = []
 
     def _if(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()

@@ -18,7 +18,11 @@ from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.solution import FeedrateSolution
 
-SLOW = (slice(400, 1200), slice(1500, 2300), slice(2300, 2900))  # points with a bound of the feed of their own
+SLOW = (
+    slice(400, 1200),
+    slice(1500, 2300),
+    slice(2300, 2900),
+)  # points with a bound of the feed of their own
 
 
 @pytest.fixture(autouse=True)
@@ -88,7 +92,9 @@ def test_curves_that_need_more_than_half_of_a_limit_are_not_held(problem):
     stretches = held_stretches(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)
     assert not any(one.first <= middle <= one.last for one in stretches)
     bent[middle, 0] = 0.49 * problem.acceleration[0] / x
-    assert held_stretches(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)[0] == (
+    assert held_stretches(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)[
+        0
+    ] == (
         first,
         last,
         x,

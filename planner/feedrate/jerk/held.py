@@ -9,7 +9,7 @@ keeps all limits, and no motion takes less time by more than LESS/2 of it. What 
 brake. So a stretch is held from `WAYS` such ways behind its beginning up to as many before its end, if `POINTS` lie between. What lies
 between held stretches are problems of their own: from X or rest to X or rest.
 
-Multipliers: a change of x_i changes the intervals on both of its sides, of h = 2 ds/(v_i + v_{i+1}), and the bound alone answers for it,
+Multipliers: a change of x_i changes the intervals on both of its sides, of h = 2 ds/(v_i + v_{i+1}), for which the bound alone answers,
 
     lam_i = X (ds_{i-1} + ds_i) / (4 X^(3/2)),
 
@@ -30,7 +30,9 @@ from planner.feedrate.jerk.profile import Profile
 FREE = 0.5  # of accelerations and jerks [-]: what changes the speed needs them (path/calm.py)
 LESS = 1e-6  # of feed^2 [-]: the interior-point method needs room at the ends of what lies between
 POINTS = 100  # of a held stretch at least: with what lies between, two ways to brake are solved more for each
-EDGE = 8  # points at least from the ends of what could be held: on coarse grids few points lie on a way to brake
+EDGE = (
+    8  # points at least from the ends of what could be held: on coarse grids few points lie on a way to brake
+)
 EQUAL = 1e-9  # bounds of the feed that differ by less are the same [-]
 
 
@@ -55,7 +57,9 @@ def held_stretches(columns: ProblemColumns, first: int, last: int) -> list[Held]
         x = float(columns.x_max[before + 1 : end + 1].min())
         reach = BRAKING_WAYS * float(way_felt(x, a, j))
         begin = max(int(np.searchsorted(s[own], s[before] + reach)) + first, before + EDGE)
-        beyond = min(int(np.searchsorted(s[own], s[end + 1] - reach, side="right")) - 1 + first, end + 1 - EDGE)
+        beyond = min(
+            int(np.searchsorted(s[own], s[end + 1] - reach, side="right")) - 1 + first, end + 1 - EDGE
+        )
         if beyond - begin >= POINTS:
             found.append(Held(begin, beyond, x * (1.0 - LESS)))
     return found
@@ -91,4 +95,3 @@ def hold(profile: Profile, columns: ProblemColumns, held: Held) -> None:
     profile.x[points], profile.u[points] = held.x, 0.0
     profile.duration[inside] = ds[1:-1] / v
     profile.feed[points, 0] = (ds[:-1] + ds[1:]) / (4.0 * v)
-

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 from planner.feedrate.jerk.chain import Chain, Task
 from planner.feedrate.jerk.held import Held, held_stretches, hold
@@ -28,8 +29,7 @@ class Piece:
         self.held = held_stretches(task.columns, task.first, task.last)
         ends = [Held(task.first, task.first, 0.0), *self.held, Held(task.last, task.last, 0.0)]
         self.parts = [
-            Part(replace(task, first=a.last, last=b.first, start=a.x, end=b.x))
-            for a, b in zip(ends, ends[1:], strict=False)
+            Part(replace(task, first=a.last, last=b.first, start=a.x, end=b.x)) for a, b in pairwise(ends)
         ]
 
     @property
@@ -40,7 +40,7 @@ class Piece:
     def finish(self, room: Room) -> float:
         """Join what was found, and slow it down until it keeps every limit at the grid points; returns by what factor."""
         task = self._task
-        if not all([part.finish(room) for part in self.parts]):
+        if not all(part.finish(room) for part in self.parts):
             self.parts, self.held = [Part(task)], []
             for work in self.parts[0].work:
                 work(room)

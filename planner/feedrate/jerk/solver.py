@@ -16,8 +16,8 @@ says that more speed would help (chain.py). A start during hard braking into a b
 points, and multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window
 per thread.
 
-**Held stretches.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py): that divides a piece into
-parts with given feeds at their ends.
+**Held stretches.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py). That divides a piece
+into parts with given feeds at their ends.
 
 **Threads.** Parts are independent, and a long one is solved from both of its ends (part.py). What can be done side by side is, on as
 many cores as planner/base/threads.py says; the kernels let go of Python's lock. The solution is the same, byte by byte, on any number.

@@ -184,9 +184,7 @@ class ScaledWindow:
                 back, rate = self._joined(right, *_mirrored(x, u))
                 faster = back[::-1] > joined.x
                 faster[0], faster[-1] = False, True  # these states are given
-                joined = Way(
-                    np.where(faster, back[::-1], joined.x), np.where(faster, -rate[::-1], joined.u)
-                )
+                joined = Way(np.where(faster, back[::-1], joined.x), np.where(faster, -rate[::-1], joined.u))
             yield self._tracked(*joined) or joined
 
     def _from_rest(self) -> Iterator[Way]:

@@ -53,7 +53,7 @@ def held_stretches(columns: ProblemColumns, first: int, last: int) -> list[Held]
     free = _could_be_held(columns, first, last)
     edges = np.flatnonzero(free[1:] != free[:-1])  # the last point before, the last point of each
     found = []
-    for before, end in edges.reshape(-1, 2) + first:
+    for before, end in (edges.reshape(-1, 2) + first).tolist():
         x = float(columns.x_max[before + 1 : end + 1].min())
         reach = BRAKING_WAYS * float(way_felt(x, a, j))
         begin = max(int(np.searchsorted(s[own], s[before] + reach)) + first, before + EDGE)

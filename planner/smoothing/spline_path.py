@@ -132,9 +132,13 @@ def cusp_spans(splines: Splines) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _straight_on(poly, control, i, h):
-    """Whether the polynomial says at once that span i, of length h, has no cusp: its derivative by tau, sum_m m C_m tau^(m-1), is
-    never more than |C_1|/2 away from C_1, and that is more than twice of a cusp's."""
+def turns_little(poly, control, i, h):
+    """Whether a span has no cusp at first sight: its derivative by tau, sum_m m C_m tau^(m-1), is never more than |C_1|/2 away from
+    C_1, and that is more than twice of a cusp's.
+
+    poly    : (6, 6) basis polynomials of span i of length h [mm]
+    control : (n, A) control points of its spline [mm]
+    """
     first, others = 0.0, 0.0
     for m in range(1, ORDER):
         square = 0.0
@@ -160,7 +164,7 @@ def _cusp_spans(splines):
         cut, basis = run_knots(splines, q)
         control = run_control(splines, q)
         for i in range(len(cut) - 1):
-            if _straight_on(basis[i], control, i, cut[i + 1] - cut[i]):
+            if turns_little(basis[i], control, i, cut[i + 1] - cut[i]):
                 continue
             for place in range(CUSP_PLACES):
                 derivatives(basis[i], place / (CUSP_PLACES - 1.0), cut[i + 1] - cut[i], rows)

@@ -13,7 +13,7 @@ from planner.base.threads import use_threads
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import held, solver
 from planner.feedrate.jerk.columns import columns_of
-from planner.feedrate.jerk.held import held_stretches
+from planner.feedrate.jerk.held import held_ranges
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.solution import FeedrateSolution
@@ -70,12 +70,12 @@ def test_its_prices_are_those_of_the_whole_problem(found, whole):
         np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), rtol=0.02, atol=1e-12)
 
 
-def test_on_a_held_stretch_the_bound_has_the_price_of_all_its_time(problem, found):
+def test_on_a_held_range_the_bound_has_the_price_of_all_its_time(problem, found):
     """dT/d(ln X) = -T/2 there."""
     columns = columns_of(problem)
-    stretches = held_stretches(columns, 0, len(problem) - 1)
-    assert len(stretches) == len(SLOW)
-    for first, last, x in stretches:
+    ranges = held_ranges(columns, 0, len(problem) - 1)
+    assert len(ranges) == len(SLOW)
+    for first, last, x in ranges:
         assert x == pytest.approx(columns.x_max[first], rel=1e-5)
         inside = slice(first + 1, last)
         price = (found.prices.feed_sq_max[inside] * problem.feed_sq_max[inside]).sum()
@@ -84,17 +84,15 @@ def test_on_a_held_stretch_the_bound_has_the_price_of_all_its_time(problem, foun
 
 
 def test_curves_that_need_more_than_half_of_a_limit_are_not_held(problem):
-    """With a tenth less of what is free at one place of a held stretch it is divided there."""
-    first, last, x = held_stretches(columns_of(problem), 0, len(problem) - 1)[0]
+    """With a tenth less of what is free at one place of a held range it is divided there."""
+    first, last, x = held_ranges(columns_of(problem), 0, len(problem) - 1)[0]
     middle = (first + last) // 2
     bent = problem.d2_right.copy()
     bent[middle, 0] = 0.51 * problem.acceleration[0] / x
-    stretches = held_stretches(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)
-    assert not any(one.first <= middle <= one.last for one in stretches)
+    ranges = held_ranges(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)
+    assert not any(one.first <= middle <= one.last for one in ranges)
     bent[middle, 0] = 0.49 * problem.acceleration[0] / x
-    assert held_stretches(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)[
-        0
-    ] == (
+    assert held_ranges(columns_of(dataclasses.replace(problem, d2_right=bent)), 0, len(problem) - 1)[0] == (
         first,
         last,
         x,

@@ -26,7 +26,7 @@ from planner.smoothing.basis import derivatives, knots_at
 from planner.smoothing.initial import greville_control
 from planner.smoothing.relax import OVERLAP, ControlWindow, Relaxed, relax, tighten_window
 from planner.smoothing.sites import site_distance, used_share, with_radius
-from planner.smoothing.spline_path import CUSP, _straight_on, cusps, lost_joints, spline_shape, with_spline
+from planner.smoothing.spline_path import CUSP, cusps, lost_joints, spline_shape, turns_little, with_spline
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
@@ -179,7 +179,7 @@ def test_a_span_that_has_no_cusp_at_first_sight_has_none_at_any_place():
         rows = np.empty((4, DEGREE + 1))
         for i, poly in enumerate(knots.basis):
             h = knots.breaks[i + 1] - knots.breaks[i]
-            sure = bool(_straight_on(poly, control, i, h))
+            sure = bool(turns_little(poly, control, i, h))
             seen[sure] += 1
             tangents = []
             for tau in np.linspace(0.0, 1.0, 101):

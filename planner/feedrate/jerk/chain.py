@@ -218,10 +218,15 @@ def way_to_rest(columns: ProblemColumns, first: int, last: int, x: float) -> Way
     """A way that brakes from feed^2 x and no acceleration at the point `first`, as far as it is not beyond the point `last`, for the
     solver to start from: X (1 - q^2)^2 over the share q of some ways to brake."""
     own = slice(first, last + 1)
-    reach = BRAKING_WAYS * float(way_felt(x, columns.acceleration[own].min(), columns.jerk[own].min()))
+    reach = reach_of_end(x, columns.acceleration[own].min(), columns.jerk[own].min())
     s = columns.s[own] - columns.s[first]
     q = s[: max(int(np.searchsorted(s, reach)), 1)] / reach
     return Way(x * (1.0 - q * q) ** 2, -2.0 * q * (1.0 - q * q) * x / reach)
+
+
+def reach_of_end(x: float, acceleration: float, jerk: float) -> float:
+    """How far the end of a window, or of a part, is felt at feed^2 x."""
+    return BRAKING_WAYS * float(way_felt(np.array([x]), acceleration, jerk)[0])
 
 
 def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:

@@ -6,8 +6,8 @@ point, and these rows leave at least `FREE` of accelerations and jerks,
     x = X (1 - LESS),    u = 0,    j = 0
 
 keeps all limits, and no motion takes less time by more than LESS/2 of it. What comes before and after reaches in by about the way to
-brake. So a stretch is held from `WAYS` such ways behind its beginning up to as many before its end, if `POINTS` lie between. What lies
-between held stretches are problems of their own: from X or rest to X or rest.
+brake. So a range is held from `BRAKING_WAYS` such ways (chain.py) behind its beginning up to as many before its end, if `POINTS` lie
+between. What lies between held ranges are problems of their own: from X or rest to X or rest.
 
 Multipliers: a change of x_i changes the intervals on both of its sides, of h = 2 ds/(v_i + v_{i+1}), for which the bound alone answers,
 
@@ -23,13 +23,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.kernels import njit
-from planner.feedrate.jerk.chain import BRAKING_WAYS, way_felt
+from planner.feedrate.jerk.chain import reach_of_end
 from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.profile import Profile
 
 FREE = 0.5  # of accelerations and jerks [-]: what changes the speed needs them (path/calm.py)
 LESS = 1e-6  # of feed^2 [-]: the interior-point method needs room at the ends of what lies between
-POINTS = 100  # of a held stretch at least: with what lies between, two ways to brake are solved more for each
+POINTS = 100  # of a held range at least: with what lies between, two ways to brake are solved more for each
 EDGE = (
     8  # points at least from the ends of what could be held: on coarse grids few points lie on a way to brake
 )
@@ -37,15 +37,15 @@ EQUAL = 1e-9  # bounds of the feed that differ by less are the same [-]
 
 
 class Held(NamedTuple):
-    """A stretch from point `first` to point `last` on which feed^2 is x [mm2/s2]."""
+    """A range from point `first` to point `last` on which feed^2 is x [mm2/s2]."""
 
     first: int
     last: int
     x: float
 
 
-def held_stretches(columns: ProblemColumns, first: int, last: int) -> list[Held]:
-    """The held stretches between two full stops, at the points first and last."""
+def held_ranges(columns: ProblemColumns, first: int, last: int) -> list[Held]:
+    """The held ranges between two full stops, at the points first and last."""
     if last - first < POINTS:
         return []
     own = slice(first, last + 1)
@@ -55,7 +55,7 @@ def held_stretches(columns: ProblemColumns, first: int, last: int) -> list[Held]
     found = []
     for before, end in (edges.reshape(-1, 2) + first).tolist():
         x = float(columns.x_max[before + 1 : end + 1].min())
-        reach = BRAKING_WAYS * float(way_felt(x, a, j))
+        reach = reach_of_end(x, a, j)
         begin = max(int(np.searchsorted(s[own], s[before] + reach)) + first, before + EDGE)
         beyond = min(
             int(np.searchsorted(s[own], s[end + 1] - reach, side="right")) - 1 + first, end + 1 - EDGE
@@ -86,7 +86,7 @@ def _could_be_held(columns, first, last):
 
 
 def hold(profile: Profile, columns: ProblemColumns, held: Held) -> None:
-    """Write a held stretch and its multipliers into a profile; those of the states at its ends belong to it too."""
+    """Write a held range and its multipliers into a profile; those of the states at its ends belong to it too."""
     points, inside = slice(held.first, held.last + 1), slice(held.first, held.last)
     v = np.sqrt(held.x)
     ds = np.diff(columns.s[held.first - 1 : held.last + 2])

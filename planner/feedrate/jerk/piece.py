@@ -1,4 +1,4 @@
-"""A piece between two full stops: stretches on which the feed is held, known beforehand (held.py), and the parts between them.
+"""A piece between two full stops: ranges on which the feed is held, known beforehand (held.py), and the parts between them.
 
 The parts are solved side by side, each by itself. If one of them has no solution from feed to feed the piece is solved as one part.
 """
@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from planner.feedrate.jerk.chain import Chain, Task
-from planner.feedrate.jerk.held import Held, held_stretches, hold
+from planner.feedrate.jerk.held import Held, held_ranges, hold
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.part import Part
 from planner.feedrate.jerk.slowing import slower_by
@@ -26,7 +26,7 @@ class Piece:
     def __init__(self, task: Task):
         self._task = task
         self.first, self.last = task.first, task.last
-        self.held = held_stretches(task.columns, task.first, task.last)
+        self.held = held_ranges(task.columns, task.first, task.last)
         ends = [Held(task.first, task.first, 0.0), *self.held, Held(task.last, task.last, 0.0)]
         self.parts = [
             Part(replace(task, first=a.last, last=b.first, start=a.x, end=b.x)) for a, b in pairwise(ends)

@@ -16,7 +16,7 @@ says that more speed would help (chain.py). A start during hard braking into a b
 points, and multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window
 per thread.
 
-**Held stretches.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py). That divides a piece
+**Held ranges.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py). That divides a piece
 into parts with given feeds at their ends.
 
 **Threads.** Parts are independent, and a long one is solved from both of its ends (part.py). What can be done side by side is, on as

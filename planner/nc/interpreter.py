@@ -240,6 +240,7 @@ class Interpreter:
             state.spindle.surface_speed = block.g["spindle mode"] == 960
             if state.spindle.surface_speed and "S" not in block.value:
                 raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
+            state.spindle.speed_max = abs(block.value.get("D", 0.0))
         for code in block.g.values():
             if code in codes.G_EVENTS:
                 store.add_event("G", code / 10, line)
@@ -398,11 +399,29 @@ class Interpreter:
             return
         if kind == Kind.LINE:
             feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+        if kind == Kind.LINE and feeds.on_surface(state):
+            radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
+            state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
+            if cutter is None:
+                self._on_surface(block, target, *radii)
+                return
         if cutter is not None:
             cutter.line(target, kind, block.line)
             return
         state.position[:], state.actual = target, None
         self.store.add(kind, block.line, state)
+
+    def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
+        """A straight move in parts, each with the feed of its larger radius."""
+        state, start, at = self.state, self.state.place.copy(), begin
+        parts = feeds.surface_parts(state, begin, end)
+        self.store.make_room(len(parts))
+        for part in parts:
+            there = begin + part * (end - begin)
+            state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
+            state.position[:] = target if part == 1.0 else start + part * (target - start)
+            state.actual, at = None, there
+            self.store.add(Kind.LINE, block.line, state)
 
     def _arc(self, block: Block, target: FloatArray) -> None:
         state = self.state
@@ -413,6 +432,10 @@ class Interpreter:
             )
         try:
             arc, normal = moves.arc(state, block, target)
+            if feeds.on_surface(state):
+                centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
+                size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
+                state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
             feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
             if self._cutter is not None:
                 self._cutter.arc(target, arc, block.line)

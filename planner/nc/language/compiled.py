@@ -45,6 +45,7 @@ from planner.nc.language.tree import (
     ProgramFault,
     Return,
     Statement,
+    Turning,
 )
 
 # Turns of loops between two looks at the limits and at the length of what is pending.
@@ -367,6 +368,11 @@ class _Function:
     def _modes(self, modes: Modes) -> None:
         self._put(f"run.modes({modes.action!r},{tuple(modes.place)!r})", modes.place)
 
+    def _turning(self, turning: Turning) -> None:
+        self._put(
+            f"run.turning({turning.action!r},{turning.letters!r},{tuple(turning.place)!r})", turning.place
+        )
+
     # --- expressions ------------------------------------------------------------------------------------------------------
 
     def value(self, expression: Expression) -> str:
@@ -441,4 +447,5 @@ _WRITE: dict[type, Callable[..., None]] = {
     Return: _Function._return,
     Message: _Function._message,
     Modes: _Function._modes,
+    Turning: _Function._turning,
 }

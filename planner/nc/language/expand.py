@@ -17,6 +17,7 @@ from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, Position
 from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.heidenhain import text as heidenhain_text
 from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
+from planner.nc.language.lathe import LatheAsked, LatheParser
 from planner.nc.language.rows import Rows
 from planner.nc.language.run import Run
 from planner.nc.language.siemens import text as siemens_text
@@ -25,7 +26,7 @@ from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
-from planner.nc.reading import FANUC, HEIDENHAIN, LINUXCNC, SIEMENS
+from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS
 
 ENTRIES_MAX = 10_000  # files and folders that are looked at for a called file
 FILE_MAX = 100_000_000  # bytes of a called file
@@ -61,7 +62,10 @@ def expand(
     program = dataclasses.replace(
         interpreter.program(run.frames),
         expansion=Expansion(
-            dialect=dialect, calls=tuple(run.calls.items()), turns=run.turns, rows=run.executed
+            dialect=FANUC if dialect == LATHE else dialect,
+            calls=tuple(run.calls.items()),
+            turns=run.turns,
+            rows=run.executed,
         ),
     )
     return program, [*faults, *interpreter.faults()]
@@ -82,6 +86,7 @@ _FRONTS = {
         linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
     ),
     FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
+    LATHE: _Front(fanuc.LANGUAGE, LatheAsked, LatheParser, fanuc.files),
     HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, lambda name: frozenset()),
 }

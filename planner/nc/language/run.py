@@ -13,6 +13,7 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
@@ -29,6 +30,9 @@ DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
 ROWS_AT_ONCE = 100_000  # rows that are executed together
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
+
+if TYPE_CHECKING:
+    from planner.nc.language.lathe_cycles import LatheCycles
 
 Load = Callable[[str], bool]
 
@@ -69,6 +73,7 @@ class Run:
         self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
+        self._lathe: LatheCycles | None = None
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
@@ -220,6 +225,14 @@ class Run:
             self.flush()
         elif not self._restored_at_return[-1]:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
+
+    def turning(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
+        """Do a part of a lathe's cycle."""
+        if self._lathe is None:
+            from planner.nc.language.lathe_cycles import LatheCycles  # 3 ms, for lathes
+
+            self._lathe = LatheCycles(self)
+        self._lathe.act(action, letters, place)
 
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""

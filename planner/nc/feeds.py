@@ -4,9 +4,9 @@
     G95    feed = F S                 S in revolutions per minute
     G93    feed = length F            F on every line that moves at a feed
 
-A change of the mode forgets the feed. With G96 S is a surface speed v, in metres or feet per minute: the turns, and with them the feed of
-G95, depend on the radius r that is being cut, n = v / (2 pi r), up to D of G96. Straight moves are divided so that n changes by at most
-`SURFACE_STEP` in a part, and a part has the feed of its larger radius; an arc has that of its largest.
+A change of the mode forgets the feed. With G96 S is a surface speed v, in metres or feet per minute: the turns,
+and with them the feed of G95, depend on the radius r that is being cut, n = v / (2 pi r), up to D of G96. Straight moves are divided so
+that n changes by at most `SURFACE_STEP` in a part, and a part has the feed of its larger radius; an arc has that of its largest.
 """
 
 from __future__ import annotations
@@ -58,6 +58,15 @@ def set_feed(state: State, block: Block, note: Note) -> None:
             f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line",
             block.line,
         )
+
+
+def take_default(state: State, default: float | None, block: Block, note: Note) -> None:
+    """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
+    if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
+        return
+    state.feed = default
+    feed = default * SECONDS_PER_MINUTE / state.unit
+    note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 
 
 def check_feed(state: State, block: Block) -> None:

@@ -1,8 +1,8 @@
 """The threading cycle G76 of Fanuc and Haas lathes: from its words to passes.
 
-The thread runs from the start S = (z_S, x_S) to the root E = (z_E, x_E), x in radii; s = sign(x_S - x_E) points away from it, t =
-sign(z_E - z_S) along it. A pass of depth c below the crest, x_E + s k, cuts at x_E + s (k - c), from z_S + t c tan(a / 2): with the angle a
-of the tool it advances along the flank. A taper i moves the beginning of the cut by i. The depths are
+The thread runs from the start S = (z_S, x_S) to the root E = (z_E, x_E), x in radii; s = sign(x_S - x_E) points away from it and
+t = sign(z_E - z_S) along it. A pass of depth c below the crest, x_E + s k, cuts at x_E + s (k - c), from z_S + t c tan(a / 2): with the
+angle a of the tool it advances along the flank. A taper i moves the beginning of the cut by i. The depths are
 
     c_n = max(d sqrt(n), c_(n-1) + d_min)  while below k - r,    then k - r, then k, as often as the cycle says
 

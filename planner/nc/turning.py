@@ -3,8 +3,8 @@
 Points are complex numbers, z + i x in radii [mm]. The profile leads from A, where the tool stands, to its first point and along lines
 and arcs. Moved by the finishing allowance w + i u / 2 (not offset: its corners stay as they are) it is the last pass of every cycle.
 
-    G71    passes along z at the levels x = C - n d, n = 1, 2 ..., as long as they lie outside of the profile's first point; C is A moved by
-           the allowance. Each runs to where the moved profile crosses its level, leaves by (e, e) at 45 degrees and goes back fast
+    G71    passes along z at the levels x = C - n d, n = 1, 2 ..., while they lie outside of the profile's first point; C is A moved
+           by the allowance. Each runs to where the moved profile crosses its level, leaves by (e, e) at 45 degrees and goes back fast
     G72    the same with x and z exchanged
     G73    the profile itself, n times, moved by the allowance + (i, k) (n - pass) / (n - 1): from the full (i, k) to nothing
 
@@ -19,6 +19,7 @@ import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 PASSES_MAX = 10_000  # of a cycle: more are a mistake in its depth
 SAME = 1e-9  # lengths below this are none [mm]: the rounding of coordinates around 1e3 mm
@@ -196,7 +197,7 @@ def _directions(start: complex, leg: Leg) -> list[complex]:
         if 0.0 < turned < sweep:
             cuts.append(turned)
     cuts.sort()
-    middles = [(a + b) / 2.0 for a, b in zip(cuts, cuts[1:], strict=False) if b - a > SAME]
+    middles = [(a + b) / 2.0 for a, b in pairwise(cuts) if b - a > SAME]
     return [1j * leg.turning * from_centre * cmath.exp(1j * leg.turning * m) for m in middles]
 
 

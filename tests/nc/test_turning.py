@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -203,7 +204,7 @@ def test_passes_of_a_thread_take_the_same_section() -> None:
 
 def test_a_thread_is_cut_along_its_flank() -> None:
     found = list(thread_passes(LatheThread(**{**vars(M20), "angle": 60.0, "chamfer": 2.0})))
-    cut = [(before.end, one) for before, one in zip(found, found[1:], strict=False) if one.pitch]
+    cut = [(before.end, one) for before, one in pairwise(found) if one.pitch]
     for (begin, straight), (_, out) in zip(cut[::2], cut[1::2], strict=True):
         depth = 8.466 + 1.534 - begin.imag
         assert 5 - begin.real == pytest.approx(depth * math.tan(math.radians(30)))
@@ -217,7 +218,7 @@ def test_a_thread_is_cut_along_its_flank() -> None:
 
 def test_a_taper_keeps_the_lead_along_z() -> None:
     found = list(thread_passes(LatheThread(**{**vars(M20), "taper": -0.9375})))
-    for before, one in zip(found, found[1:], strict=False):
+    for before, one in pairwise(found):
         if one.pitch:
             along = one.end - before.end
             assert before.end.imag == pytest.approx(one.end.imag - 0.9375)

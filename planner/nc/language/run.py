@@ -32,7 +32,7 @@ FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
 
 if TYPE_CHECKING:
-    from planner.nc.language.lathe_cycles import LatheCycles
+    from planner.nc.language.fanuc.lathe_cycles import LatheCycles
 
 Load = Callable[[str], bool]
 
@@ -229,7 +229,7 @@ class Run:
     def turning(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
         """Do a part of a lathe's cycle."""
         if self._lathe is None:
-            from planner.nc.language.lathe_cycles import LatheCycles  # 3 ms, for lathes
+            from planner.nc.language.fanuc.lathe_cycles import LatheCycles  # 3 ms, for lathes
 
             self._lathe = LatheCycles(self)
         self._lathe.act(action, letters, place)

@@ -63,8 +63,10 @@ CASES = {
     ),
     "facing": (
         "G72 W2. R0.5\nG72 P10 Q20 U0 W0.5\nN10 G0 Z-6\nG1 X30\nN20 X20 Z1\nM30",
-        "G0 X40 Z2.5\nG0 Z0.5\nG1 X21.4285714285714286\nG0 X22.4285714285714286 Z1\nG0 X40\nG0 Z-1.5\nG1 X24.2857142857142857\nG0 X25.2857142857142857 Z-1\n"
-        "G0 X40\nG0 Z-3.5\nG1 X27.1428571428571429\nG0 X28.1428571428571429 Z-3\nG0 X40\nG0 Z-5.5\nG1 X30\nX20 Z1.5\nG0 Z2.5\nG0 X40 Z2\n",
+        "G0 X40 Z2.5\nG0 Z0.5\nG1 X21.4285714285714286\nG0 X22.4285714285714286 Z1\nG0 X40\n"
+        "G0 Z-1.5\nG1 X24.2857142857142857\nG0 X25.2857142857142857 Z-1\n"
+        "G0 X40\nG0 Z-3.5\nG1 X27.1428571428571429\nG0 X28.1428571428571429 Z-3\n"
+        "G0 X40\nG0 Z-5.5\nG1 X30\nX20 Z1.5\nG0 Z2.5\nG0 X40 Z2\n",
     ),
 }  # fmt: skip
 
@@ -166,7 +168,8 @@ def test_blocks_of_a_cycle_say_where_they_come_from() -> None:
 @needs_oracle
 def test_linuxcnc_reads_the_flat_program(tmp_path: Path) -> None:
     source = (
-        HEAD + G71 + PROFILE + "G70 P10 Q20\nT0101\nG97 S800 M3\nG0 X24 Z5\nG76 P020560 Q50 R0.02\nG76 X16.932 Z-25. R-0.5 P1534 Q485 F2.5\n"
+        HEAD + G71 + PROFILE + "G70 P10 Q20\nT0101\nG97 S800 M3\nG0 X24 Z5\n"
+        "G76 P020560 Q50 R0.02\nG76 X16.932 Z-25. R-0.5 P1534 Q485 F2.5\n"
         "G0 U6. W2.\nG73 U4. W2. R3\nG73 P30 Q40 U1. W0.2\nN30 G0 X20 Z0\nN40 G1 X30 Z-5\nM30\n"
     )  # fmt: skip
     program = parse_program(source, MACHINE)

@@ -45,8 +45,8 @@ class LatheCycles:
     def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
         """Do a part of a cycle; its values by letter stand in the run's shared names. Raises ValueError.
 
-        action : "start" keeps where the tool is, "profile" reads the blocks that follow aside, "back" leads to where the tool was, and the
-                 name of a cycle makes its passes
+        action : "start" keeps where the tool is, "profile" reads the blocks that follow aside, "back" leads to where the tool was, and
+                 the name of a cycle makes its passes
         """
         self.run.flush()
         self._line = place[1]

@@ -45,6 +45,7 @@ class Interpreter:
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
     open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
+    by_word : rows that were executed word by word, not by the compiled loop
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -58,6 +59,7 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
+        self.by_word = 0
         self._cutter: Cutter | None = None
         self._words: Words | None = None  # of the last chunk
         self._splines = SplineReader()
@@ -95,6 +97,7 @@ class Interpreter:
             after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
+                self.by_word += 1
                 self.store.frame = int(words.frame[after])
                 block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:

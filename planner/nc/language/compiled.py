@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from planner.nc.language.basic_blocks import Blocks
+from planner.nc.language.endless import never_ends
 from planner.nc.language.expressions import Expressions
 from planner.nc.language.rows import Rows
 from planner.nc.language.tree import (
@@ -192,6 +193,8 @@ class _Function:
         self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", loop.place)
         if loop.kind == "repeat":
             self.blocks.put(f"{left}-=1", loop.place)
+        elif never_ends(loop, self.language):
+            self.blocks.put(f"if {condition}:run.goes_on()", loop.place)
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 

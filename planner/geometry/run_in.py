@@ -27,7 +27,7 @@ def run_in(toolpath: Toolpath, machine: Machine) -> FloatArray:
     with np.errstate(divide="ignore"):
         a, j = (
             (machine.limits(name, toolpath.axes) / along).min(axis=1) for name in ("acceleration", "jerk")
-        )  # type: ignore[arg-type]
+        )
     feed = toolpath.feed[held]
     time = np.where(feed >= a * a / j, feed / a + a / j, 2.0 * np.sqrt(feed / j))
     found[held] = 0.5 * feed * time
@@ -58,8 +58,8 @@ def require_room(toolpath: Toolpath, machine: Machine) -> None:
             raise _refusal(
                 toolpath,
                 longest,
-                f"run-in and run-out take {need[longest]:.6g} mm of its {toolpath.length[longest]:.6g} mm; start further away, or take a "
-                "smaller S",
+                f"run-in and run-out take {need[longest]:.6g} mm of its {toolpath.length[longest]:.6g} mm; start further away, "
+                "or take a smaller S",
             )
 
 

@@ -1,9 +1,9 @@
 """Motion in step with the spindle: G33, G33.1 and the threading cycle G76 (thread_cycle.py).
 
-The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan starts and ends at rest: with
-full stops at both ends of the cut the feed is reached behind the run-in and held up to the run-out, whose lengths the machine's acceleration
-and jerk give (geometry/run_in.py, which refuses a cut without room for them; the verdict looks at the feed between). LinuxCNC accelerates in
-the synchronised move, too. G33.1 taps: along the thread and back to its start.
+The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan starts and ends at rest:
+with full stops at both ends of the cut the feed is reached behind the run-in and held up to the run-out, whose lengths the machine's
+acceleration and jerk give (geometry/run_in.py, which refuses a cut without room for them; the verdict looks at the feed between).
+LinuxCNC accelerates in the synchronised move, too. G33.1 taps: along the thread and back to its start.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ def _rapid(state: State, store: Store, line: int, place: FloatArray) -> None:
 
 def _say(state: State, block: Block, note: Note) -> None:
     note(
-        f"G{codes.number(state.motion)} is in step with the spindle: its feed is pitch times S, between a run-in and a run-out that begin "
-        "and end with full stops",
+        f"G{codes.number(state.motion)} is in step with the spindle: its feed is pitch times S, between a run-in and a run-out "
+        "that begin and end with full stops",
         block.line,
     )
 

@@ -38,8 +38,8 @@ def held_faults(
     worst = np.argsort(-off / allowed)
     bad = worst[off[worst] > allowed[worst] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING]
     said = [
-        f"thread: {off[k]:.6g} mm out of step with the spindle, {allowed[k]:.6g} mm allowed, at the feed {toolpath.feed[held[k]]:.6g} mm/s, "
-        f"line {toolpath.line[held[k]]}"
+        f"thread: {off[k]:.6g} mm out of step with the spindle, {allowed[k]:.6g} mm allowed, at the feed "
+        f"{toolpath.feed[held[k]]:.6g} mm/s, line {toolpath.line[held[k]]}"
         for k in bad[:FAULTS_OF_A_KIND]
     ]
     return said + ([f"thread: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])

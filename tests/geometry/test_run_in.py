@@ -54,7 +54,7 @@ def test_a_thread_needs_room_for_run_in_and_run_out() -> None:
         if length > need:
             built(cut)
             continue
-        with pytest.raises(InputError, match="run-in and run-out take .* start further away") as found:
+        with pytest.raises(InputError, match=r"run-in and run-out take .* start further away") as found:
             built(cut)
         assert found.value.line == 3
 

@@ -1,4 +1,4 @@
-"""Threads: motions in step with the spindle between run-in and run-out pass, those that are not are named, with how far they are off."""
+"""Threads: motions in step with the spindle between run-in and run-out pass; others are named, with how far they are off."""
 
 from __future__ import annotations
 

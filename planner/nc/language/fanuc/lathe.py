@@ -33,10 +33,10 @@ from planner.nc.language.tree import (
     Number,
     Numbered,
     Operation,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
+    SourcePlace,
     Statement,
     Turning,
     Word,
@@ -55,7 +55,7 @@ class LatheParser(LatheWords):
         self.pairs: set[tuple[int, int]] = set()  # P and Q of the cycles
         self.called: set[tuple[int, int]] = set()  # so far
         self.profiles: dict[tuple[int, int], tuple[list[Statement], int, int]] = {}
-        self.cycles: list[tuple[tuple[int, int], Place]] = []
+        self.cycles: list[tuple[tuple[int, int], SourcePlace]] = []
         self.waiting: dict[str, dict[str, Expression]] = {}  # words of the first blocks of cycles
 
     def parse(self) -> list[Procedure]:

@@ -21,7 +21,7 @@ from planner.nc.store import Store
 from planner.nc.turning import SAME, Contour, ContourFault, Leg, Roughing, Step, pattern, stock_removal
 
 if TYPE_CHECKING:
-    from planner.nc.language.run import Run
+    from planner.nc.language.run import ProgramRun
 
 RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
 _WRONG = {
@@ -36,7 +36,7 @@ Given = Mapping[str, float]
 class LatheCycles:
     """What the cycles of one run need: where the tool stood, and what is set aside while a profile is read."""
 
-    def __init__(self, run: Run):
+    def __init__(self, run: ProgramRun):
         self.run = run
         self._start = np.zeros(3)
         self._aside: tuple[State, Store, Callable[[LexedWords], None]] | None = None

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from planner.nc.language.asked import FanucAsked
 from planner.nc.language.fanuc.calls import code_of
-from planner.nc.language.fanuc.parser import Parser
+from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
     Expression,
@@ -46,7 +46,7 @@ class LatheAsked(FanucAsked):
         return 2.0 * found if axis == 0 and self.interpreter.state.diameters else found
 
 
-class LatheWords(Parser):
+class LatheWords(FanucParser):
     """Statements of a lathe's program without cycles."""
 
     def __init__(self, source: Source):

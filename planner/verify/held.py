@@ -33,7 +33,7 @@ def held_faults(
     held = np.flatnonzero(toolpath.held)
     if not len(held):
         return []
-    off = _out_of_step(trajectory, looks[0], toolpath, pieces, held, _room(toolpath, machine, held))
+    off = _out_of_step(trajectory, looks[0], toolpath, pieces, held, room_of(toolpath, machine, held))
     allowed = np.minimum(toolpath.tolerance[held], toolpath.tolerance[held + 1])
     worst = np.argsort(-off / allowed)
     bad = worst[off[worst] > allowed[worst] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING]
@@ -45,7 +45,7 @@ def held_faults(
     return said + ([f"thread: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])
 
 
-def _room(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:
+def room_of(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:
     """(H,) d of the moves `held` (H,) [mm]."""
     along = np.abs(toolpath.end[held] - toolpath.start[held]) / toolpath.length[held, None]
     with np.errstate(divide="ignore"):

@@ -10,7 +10,7 @@ from motions import along, rest_to_rest
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.run_in import run_in
 from planner.nc.reader import parse_program
-from planner.verify.held import _room
+from planner.verify.held import room_of
 
 LENGTH, FEED = 30.0, 25.0
 
@@ -80,4 +80,4 @@ def test_the_verifier_finds_the_same_run_in_as_the_planner() -> None:
         text = f"G21 G90 M3 S{60 * feed}\nG33 X-5 Z-20 K1\nG33 Z-60 K1\nM2"
         path = toolpath_from_program(parse_program(text), M)
         held = np.flatnonzero(path.held)
-        np.testing.assert_allclose(_room(path, M, held), run_in(path, M)[held], rtol=1e-12)
+        np.testing.assert_allclose(room_of(path, M, held), run_in(path, M)[held], rtol=1e-12)

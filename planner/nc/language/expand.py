@@ -12,11 +12,15 @@ from pathlib import Path
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
-from planner.nc.language import fanuc, linuxcnc
 from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, PositionAsked
 from planner.nc.language.compiled import ProgramFault, compile_procedures
+from planner.nc.language.fanuc import text as fanuc_text
+from planner.nc.language.fanuc.calls import files as fanuc_files
+from planner.nc.language.fanuc.parser import Parser as FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
 from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
+from planner.nc.language.linuxcnc import text as linuxcnc_text
+from planner.nc.language.linuxcnc.parser import Parser as LinuxcncParser
 from planner.nc.language.rows import Rows
 from planner.nc.language.run import Run
 from planner.nc.language.siemens import text as siemens_text
@@ -79,9 +83,9 @@ class _Front:
 
 _FRONTS = {
     LINUXCNC: _Front(
-        linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
+        linuxcnc_text.LANGUAGE, LinuxcncAsked, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
     ),
-    FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
+    FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
     HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, lambda name: frozenset()),
 }

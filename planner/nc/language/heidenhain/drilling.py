@@ -11,7 +11,8 @@ clearance above the depth already drilled, but not deeper than 0.2 mm above it.
 
 from __future__ import annotations
 
-from planner.nc.language.heidenhain.moves import ONE, ZERO, Moves, Z, word
+from planner.nc.language.heidenhain.items import ONE, ZERO, Z, word
+from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, parameter, plus
 from planner.nc.language.tree import Expression, If, Line, Loop, Number, Statement
 

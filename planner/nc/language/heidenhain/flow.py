@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from planner.nc.language.heidenhain.moves import ONE, ZERO
+from planner.nc.language.heidenhain.items import ONE, ZERO
 from planner.nc.language.heidenhain.text import (
     PARAMETERS,
     ConversationalBlock,

@@ -14,8 +14,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from planner.nc.language.arithmetic import ARITHMETIC, DEGREES
 from planner.nc.language.asked import FIRST_POSITION, PositionAsked
-from planner.nc.language.linuxcnc import ARITHMETIC, DEGREES
 from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
 from planner.nc.language.tree import (
     Expression,

@@ -15,8 +15,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from planner.nc.language.arithmetic import ARITHMETIC, DEGREES, nearest
 from planner.nc.language.asked import FIRST_POSITION, PositionAsked
-from planner.nc.language.linuxcnc import ARITHMETIC, DEGREES, nearest
 from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
 from planner.nc.language.tree import (
     Expression,

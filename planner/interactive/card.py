@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
 from planner.base.units import MICROMETRE
-from planner.machine import LINEAR_AXES
-from planner.report.colours import CIVIDIS, LIGHT, limit_colours
+from planner.report.colours import LIGHT, limit_colours
+from planner.report.html.picture import path_picture
 from planner.report.optimum import price_rows
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
 
-POINTS = 1500  # of the motion in the picture: two for each pixel of its width
 SIZE = 320.0  # of the picture, its longer side [px]
 NOTES, HELD = 4, 5  # notes, and limits with the largest shares of the time, that are shown
 
@@ -39,7 +37,7 @@ def plan_card(plan: Plan) -> str:
     listed = f'<ul style="opacity:.65;margin:4px 0;padding-left:18px">{notes}</ul>' if notes else ""
     return (
         '<div style="display:flex;flex-wrap:wrap;gap:20px;align-items:center">'
-        f"{path_picture(plan)}<div style='flex:1;min-width:340px'>"
+        f"{path_picture(plan, SIZE) if plan.solved else ''}<div style='flex:1;min-width:340px'>"
         f"<div>{head}</div><table>{rows}</table>{_held(plan)}{listed}</div></div>"
     )
 
@@ -77,44 +75,3 @@ def _held(plan: Plan) -> str:
         words.append(f'<span style="color:{colour}">■</span> {html.escape(name)} {100 * share:.0f} %')
     bar = f'<div style="display:flex;height:8px;max-width:420px;margin:6px 0 2px">{"".join(parts)}</div>'
     return f"{bar}<small>held by {' &nbsp; '.join(words)}</small>"
-
-
-def path_picture(plan: Plan) -> str:
-    """The motion seen along its thinnest direction, coloured by feed, as SVG; empty for a plan without a motion."""
-    if plan.trajectory is None:
-        return ""
-    trajectory = plan.trajectory
-    rows = np.unique(np.linspace(0, len(trajectory) - 1, min(POINTS, len(trajectory))).astype(np.int64))
-    shown = trajectory.rows(rows)
-    position = shown.position[:, [k for k, axis in enumerate(shown.axes) if axis in LINEAR_AXES]]
-    across = np.sort(np.argsort(-np.ptp(position, axis=0), kind="stable")[:2])
-    points = position[:, across] * [1.0, -1.0]  # the picture's y goes down
-    extent = np.ptp(points, axis=0)
-    scale = SIZE / max(float(extent.max()), 1e-9)
-    points = (points - points.min(axis=0)) * scale + 4.0
-    width, height = extent * scale + 8.0
-    asked = np.isfinite(
-        plan.program.feed[shown.block]
-    )  # rapids have the colour of the fastest move with a feed
-    highest = float(shown.feed[asked].max() if asked.any() else shown.feed.max())
-    colour = np.minimum(shown.feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
-    lines = "".join(
-        f'<polyline points="{_points(points[first : last + 1])}" stroke="{CIVIDIS[colour[first]]}"/>'
-        for first, last in _runs(colour)
-    )
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" role="img" '
-        f'aria-label="path coloured by feed" fill="none" stroke-width="1.6" stroke-linecap="round">{lines}</svg>'
-    )
-
-
-def _runs(colour: Array) -> list[tuple[int, int]]:
-    """First and last point of the lines of one colour, each up to the first point of the next."""
-    starts = np.flatnonzero(np.append(True, np.diff(colour) != 0))
-    ends = np.append(starts[1:], len(colour) - 1)
-    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
-
-
-def _points(points: FloatArray) -> str:
-    """Points (n, 2) as SVG writes them."""
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

@@ -2,6 +2,9 @@
 
 Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own DecompressionStream. Texts
 of the program and of names are data as well, and the page shows them as text, so that nothing in a program is ever run.
+
+The first picture needs none of that: it is in the page as SVG (picture.py), and the header is filled before plotly's script, some five
+megabytes, is run and the columns are unpacked.
 """
 
 from __future__ import annotations
@@ -19,16 +22,20 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.report.colours import limit_colours
 from planner.report.export import json_ready, summary
 from planner.report.html.data import in_degrees, lines_of, programmed_path, samples_of
+from planner.report.html.picture import path_picture
 from planner.report.replace import check_file
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
 
 REPORT = "report.html"
+PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
 CORNERS_MAX = 20_000  # corners that are listed, those closest to eq. 18-19
 _MARK = '<meta name="generator" content="feedrate-planner">'
+MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
 _LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
 
 
@@ -60,7 +67,8 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
     parts = {
         "TITLE": html.escape(Path(plan.program.source).name),
         "STYLE": _template("report.css"),
-        "PLOTLY": _plotly(),
+        "PICTURE": path_picture(plan, PICTURE),
+        "PLOTLY": _plotly().replace("</script", "<\\/script"),
         "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
         "COLUMNS": "\n".join(
             f'<script type="text/plain" id="column-{name}">{_packed(column)}</script>'
@@ -95,15 +103,20 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
     }
     for k, axis in enumerate(axes):
         columns[axis] = (shown.position[:, k] * scale[k]).astype(np.float32)
-        columns[f"v{axis}"] = (shown.velocity[:, k] * scale[k]).astype(np.float32)
         columns[f"a{axis}"] = (shown.acceleration[:, k] * scale[k]).astype(np.float32)
         columns[f"j{axis}"] = (shown.jerk[:, k] * scale[k]).astype(np.float32)
+    if samples.price is not None:
+        columns["price"] = (samples.price * MICROSECONDS_PER_MICROMETRE).astype(np.float32)
+    if lines.more_feed is not None and lines.more is not None:
+        columns["line_more_feed"] = lines.more_feed.astype(np.float32)
+        columns["line_more"] = lines.more.astype(np.float32)
     machine = plan.machine
     about = {
         "axes": [*axes],
         "linear": [axis for axis in axes if axis in LINEAR_AXES],
         "rotary": [axis for axis in axes if axis in ROTARY_AXES],
         "limits": list(samples.limits),
+        "colours": limit_colours(samples.limits),
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "machine": {axis: machine.axes[axis].model_dump() for axis in axes},

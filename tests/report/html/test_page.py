@@ -262,3 +262,40 @@ def test_page_answers_to_clicks(browser: Any, plan: Plan) -> None:
     browser.find_element(By.ID, "play").click()
     _wait(browser, "return report.state().now > 0")
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def test_lines_and_places_have_their_prices(page: str, plan: Plan) -> None:
+    assert plan.prices is not None
+    assert plan.prices.places is not None
+    places, lines = plan.prices.places, lines_of(plan, samples_of(plan))
+    assert lines.more_feed is not None
+    assert lines.more is not None
+    assert lines.more_feed.sum() == pytest.approx(places.feed.sum())
+    assert lines.more.sum() == pytest.approx(places.limits.sum())
+    assert np.array_equal(column(page, "line_more", "<f4"), lines.more.astype(np.float32))
+    assert places.tolerance is not None
+    price = column(page, "price", "<f4")
+    assert price.max() == pytest.approx(-1e3 * places.tolerance.min(), rel=1e-6)
+    assert (price == 0).any(), "far from joints there is none"
+
+
+def test_the_first_picture_needs_no_script(page: str) -> None:
+    before = page.partition('id="plotly"')[0]
+    assert before.count("<polyline") > 1
+    assert page.index("<svg") < page.index('<script type="text/plain" id="plotly">') < page.index('id="column-t"')
+
+
+@pytest.mark.slow
+def test_the_picture_stands_there_before_plotly(browser: Any) -> None:
+    marks = browser.execute_script("return performance.getEntriesByType('mark').map((one) => one.name)")
+    assert marks == ["first picture", "plotly", "columns", "path", "ready"]
+
+
+@pytest.mark.slow
+def test_prices_are_a_colour_and_columns(browser: Any, plan: Plan) -> None:
+    from selenium.webdriver.common.by import By
+
+    browser.find_element(By.CSS_SELECTOR, "[data-colour=price]").click()
+    assert browser.execute_script("return report.state().colouring") == "price"
+    heads = browser.find_elements(By.CSS_SELECTOR, "#lines-head button")
+    assert [head.text for head in heads[-2:]] == ["10 % more F saves [ms]", "10 % more of all limits saves [ms]"]

@@ -20,7 +20,7 @@ _REFUSED_GROUPS = ("plane", "work offset", "tool length", "path control", "retra
 _REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)
 
 
-def check_words(state: State, block: Block) -> None:
+def check_unchanged(state: State, block: Block) -> None:
     """What must not change while compensation is on. Raises WordFault."""
     for group in _REFUSED_GROUPS:
         code = block.g.get(group)

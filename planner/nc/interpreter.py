@@ -159,7 +159,7 @@ class Interpreter:
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
         if self._cutter is not None:
-            compensation.check_words(self.state, block)
+            compensation.check_unchanged(self.state, block)
         feeds.set_feed(self.state, block, self.note)
         auxiliary.events(self.state, self.store, block, self.note)
         if block.g.get("one-shot") == 40:

@@ -81,7 +81,7 @@ class Expansion:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Splines:
+class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
 
     block   : (K,) block of each, not decreasing: a block has one after the other
@@ -105,9 +105,9 @@ class Splines:
         return len(self.block)
 
 
-def no_splines(axes: int) -> Splines:
+def no_splines(axes: int) -> SplineTable:
     """The splines of a program that has none, over `axes` axes."""
-    return Splines(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
+    return SplineTable(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -152,7 +152,7 @@ class Program:
     arc_center: FloatArray
     arc_normal: Array
     arc_sweep: FloatArray
-    splines: Splines = field(default_factory=lambda: no_splines(0))
+    splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))

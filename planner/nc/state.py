@@ -69,7 +69,7 @@ class Spindle:
 
 
 @dataclass(slots=True)
-class Series:
+class CycleSeries:
     """Canned cycles one after the other: the motion code, the words of that code in force, and the level before the first of them,
     all as programmed."""
 
@@ -132,7 +132,7 @@ class State:
     tool_loaded: int = 0
     to_level: bool = False
     retract_given: bool = False
-    series: Series | None = None
+    series: CycleSeries | None = None
     cycle_dwell: float = 0.0
     actual: FloatArray | None = None
     in_thread: bool = False

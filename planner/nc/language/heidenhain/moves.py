@@ -43,7 +43,7 @@ from planner.nc.language.tree import (
     Named,
     Number,
     Parameter,
-    Place,
+    SourcePlace,
     Statement,
     Word,
 )
@@ -268,7 +268,7 @@ class Moves:
             raise block.fault("after RND or CHF a straight move is expected; write the tangent points out")
 
 
-def _unit(place: Place, vector: tuple[Named, Named]) -> Line:
+def _unit(place: SourcePlace, vector: tuple[Named, Named]) -> Line:
     """Divide a vector by its length."""
     length = of("LEN", *vector)
     return Line(

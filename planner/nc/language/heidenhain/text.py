@@ -24,8 +24,8 @@ from planner.nc.language.tree import (
     Number,
     Numbered,
     Operation,
-    Place,
     ProgramFault,
+    SourcePlace,
 )
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
@@ -116,7 +116,7 @@ class ConversationalBlock:
     at : byte offset of the first character of each part, and where the part begins in `text`
     """
 
-    place: Place
+    place: SourcePlace
     text: str
     at: tuple[tuple[int, int], ...]
 
@@ -140,7 +140,7 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
 
     file, begin : its number among the files, and where its bytes begin in the words' data
     """
-    waiting: tuple[Place, str, list[tuple[int, int]]] | None = None
+    waiting: tuple[SourcePlace, str, list[tuple[int, int]]] | None = None
     open_end = False
     at = 0
     for number, raw in enumerate(data.split(b"\n"), start=1):
@@ -163,7 +163,7 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
         elif content:
             if waiting is not None:
                 yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
-            waiting = (Place(file, number, start + first), content, [(start + first, 0)])
+            waiting = (SourcePlace(file, number, start + first), content, [(start + first, 0)])
         open_end = ends_open or (open_end and not content)
     if waiting is not None:
         yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from planner.nc.language.siemens import codes, drilling
-from planner.nc.language.siemens.control import ZERO, Control
+from planner.nc.language.siemens.control import ZERO, SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
 from planner.nc.language.tree import (
     Expression,
@@ -20,7 +20,7 @@ from planner.nc.language.tree import (
 _TYPES = frozenset(("REAL", "INT", "BOOL"))
 
 
-class Commands(Control):
+class Commands(SiemensControl):
     """What commands have set.
 
     names    : of the variables

@@ -64,7 +64,8 @@ def _points(points: ArrayLike) -> FloatArray:
         ) from None
     if given.ndim != 2 or given.shape[1] not in (2, 3) or len(given) < 2:
         raise InputError(f"points: shape {given.shape}; it must be (n, 2) or (n, 3) with at least two points")
-    _refuse("points: row", ~np.isfinite(given).all(axis=1), given, "every coordinate must be finite")
+    bad: Array = ~np.isfinite(given).all(axis=1)
+    _refuse("points: row", bad, given, "every coordinate must be finite")
     return np.pad(given, ((0, 0), (0, len(AXES) - given.shape[1])))
 
 

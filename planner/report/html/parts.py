@@ -23,7 +23,7 @@ def filled(page: str, parts: Mapping[str, str]) -> str:
 
 
 def columns_text(columns: Mapping[str, Array]) -> str:
-    """Columns of numbers (n,) as elements of a page."""
+    """The `columns` of numbers, each (n,), as elements of a page."""
     return "\n".join(
         f'<script type="text/plain" id="column-{name}">{packed(column)}</script>'
         for name, column in columns.items()
@@ -36,7 +36,7 @@ def json_text(value: Any) -> str:
 
 
 def packed(column: Array) -> str:
-    """Bytes of a column, compressed, as base64."""
+    """Bytes of a `column` (n,), compressed, as base64."""
     data = np.ascontiguousarray(column)
     little = data.astype(data.dtype.newbyteorder("<"), copy=False)
     return base64.b64encode(gzip.compress(little.tobytes(), LEVEL, mtime=0)).decode("ascii")

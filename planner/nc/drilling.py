@@ -21,8 +21,9 @@ Note = Callable[[str, int], None]
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _BY_HAND = 880  # G88
 _PER_HOLE = 16  # steps of a hole without pecks, at most
-_PER_PECK = 3
+_PER_PECK = 3  # down, out and back in
 _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
+# How the spindle turns after M3, M4 and M5.
 _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 

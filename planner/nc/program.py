@@ -27,8 +27,9 @@ class Kind(IntEnum):
     SPLINE = 5  # along a spline (G5, G5.1, G5.2, G6.2)
 
 
+# Kinds of blocks that move the machine.
 MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.SPLINE)
-FEED_MOVES = MOVES[1:]
+FEED_MOVES = MOVES[1:]  # without rapids
 
 
 class PathControl(IntEnum):

@@ -22,6 +22,7 @@ DECIMALS = 7  # of a flat_number
 _LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
 _LENGTHS = "".join(map(chr, sorted(LENGTHS)))
 _ENDS = ("M2", "M02", "M30")
+# Characters that must not stand in a comment, and what stands there instead.
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 
 

@@ -28,6 +28,9 @@ class Number(NamedTuple):
     value: float
 
 
+ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
+
+
 class Numbered(NamedTuple):
     """A parameter by its number, which may be computed."""
 

@@ -14,12 +14,9 @@ from __future__ import annotations
 from planner.nc.language.heidenhain.items import (
     CORNER,
     DIRECTION,
-    ONE,
     POLAR,
     POLE,
     POSITION,
-    TWO,
-    ZERO,
     Items,
     X,
     Y,
@@ -37,6 +34,9 @@ from planner.nc.language.heidenhain.text import (
 )
 from planner.nc.language.spelling import NEGATIVE
 from planner.nc.language.tree import (
+    ONE,
+    TWO,
+    ZERO,
     Expression,
     If,
     Line,

@@ -21,7 +21,6 @@ from planner.nc.language.heidenhain.items import (
     CORNER,
     POLAR,
     POLE,
-    ZERO,
     Items,
     X,
     Y,
@@ -35,6 +34,7 @@ from planner.nc.language.heidenhain.items import (
 from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, plus, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
+    ZERO,
     Expression,
     Line,
     Number,
@@ -51,8 +51,8 @@ _FUNCTION = re.compile(
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
-_TILTED = (128, 129, 144)
-_AT_END = (2, 30)
+_TILTED = (128, 129, 144)  # M codes that follow or leave the tilt of the tool
+_AT_END = (2, 30)  # M codes that end the program
 
 
 class HeidenhainParser(Definitions):

@@ -30,7 +30,7 @@ from planner.nc.language.tree import (
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
 
-
+# What operators and functions mean.
 LANGUAGE = Language(
     name="heidenhain",
     operations=ARITHMETIC
@@ -67,6 +67,7 @@ LANGUAGE = Language(
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
 _Q = re.compile(r"([+-]?)\s*Q(\d+)(?!\d)", re.IGNORECASE)
 _TOKEN = re.compile(r"\s*(?:(\d+(?:\.\d*)?|\.\d+)|(Q[LRS]?\d*|[A-Z]+)|(.))", re.IGNORECASE)
+# Operators of a higher rank bind first.
 _RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 3}
 _NAMES = {"^": "**"}
 _FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SQRT", "ABS", "INT", "FRAC", "LN", "LOG", "EXP")

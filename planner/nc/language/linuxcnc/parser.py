@@ -36,6 +36,7 @@ from planner.nc.language.tree import (
     SourcePlace,
 )
 
+# What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _PROGRAM = ""
 

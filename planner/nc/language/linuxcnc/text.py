@@ -9,7 +9,7 @@ from planner.nc.language.asked import LinuxcncAsked
 from planner.nc.language.spelling import Spelling
 from planner.nc.language.tree import Language
 
-ARGUMENTS_MAX = 30
+ARGUMENTS_MAX = 30  # #1 to #30 are a call's own
 EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
 _FUNCTIONS = (
     "ABS",
@@ -27,6 +27,7 @@ _FUNCTIONS = (
     "SQRT",
     "TAN",
 )
+# Operators of a higher rank bind first.
 _RANKS = {
     "**": 5,
     **dict.fromkeys(("*", "/", "MOD"), 4),

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Expression,
     Goto,
     If,
@@ -18,7 +20,6 @@ from planner.nc.language.tree import (
     Statement,
 )
 
-ZERO, ONE = Number(0.0), Number(1.0)
 _NESTED_MAX = 100  # loops and branches in each other
 
 

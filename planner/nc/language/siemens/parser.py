@@ -22,10 +22,11 @@ import numpy as np
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.siemens import codes, drilling
 from planner.nc.language.siemens.commands import Commands, as_word
-from planner.nc.language.siemens.control import ONE, ZERO
 from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Expression,
     Line,
     Number,

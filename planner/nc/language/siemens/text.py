@@ -31,7 +31,7 @@ from planner.nc.language.tree import (
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
 
-
+# What operators and functions mean.
 LANGUAGE = Language(
     name="siemens",
     operations=ARITHMETIC
@@ -71,6 +71,7 @@ LANGUAGE = Language(
     asked=PositionAsked.numbers,
 )
 
+# Operators of a higher rank bind first.
 _RANKS = {
     **dict.fromkeys(("OR", "XOR"), 1),
     "AND": 2,
@@ -80,6 +81,7 @@ _RANKS = {
 }
 _FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "POT", "TRUNC", "ROUND", "LN", "EXP")
 _TWO = ("ATAN2", "MIN", "MAX")
+# Names of numbers.
 _CONSTANTS = {"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi}
 _TOKEN = re.compile(
     r"\s*(?:(?P<word>[XYZIJKFSTMDGHABC][-+]?(?:\d+\.?\d*|\.\d+)(?![\d_.])(?!\w*\s*[=(\[]))|"

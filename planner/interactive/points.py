@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.nc.program import Kind, PathControl, Program
 
@@ -64,7 +64,7 @@ def _points(points: ArrayLike) -> FloatArray:
         ) from None
     if given.ndim != 2 or given.shape[1] not in (2, 3) or len(given) < 2:
         raise InputError(f"points: shape {given.shape}; it must be (n, 2) or (n, 3) with at least two points")
-    bad: Array = ~np.isfinite(given).all(axis=1)
+    bad = np.logical_not(np.isfinite(given).all(axis=1))
     _refuse("points: row", bad, given, "every coordinate must be finite")
     return np.pad(given, ((0, 0), (0, len(AXES) - given.shape[1])))
 
@@ -75,12 +75,12 @@ def _feeds(feed: ArrayLike, moves: int) -> FloatArray:
     if given.shape not in ((), (moves,)):
         raise InputError(f"feed: shape {given.shape}; give one number, or one for each of the {moves} moves")
     given = np.broadcast_to(given, (moves,))
-    bad: Array = ~(np.isfinite(given) & (given > 0))
+    bad = np.logical_not(np.isfinite(given) & (given > 0))
     _refuse("feed: move", bad, given, "every feed must be above 0 mm/s, and finite")
     return given
 
 
-def _refuse(what: str, bad: Array, given: FloatArray, needed: str) -> None:
+def _refuse(what: str, bad: NDArray[np.bool_], given: FloatArray, needed: str) -> None:
     """Raise InputError naming the first row of `given` (n, ...) that is `bad` (n,)."""
     if bad.any():
         first = int(np.argmax(bad))

@@ -70,7 +70,7 @@ def polyline_text(
         block = int(line.block[k])
         while said_of < len(words_between) and words_between[said_of][0] <= block:
             said.append(words_between[said_of][2])
-            said_of += 1
+            said_of, mode = said_of + 1, ""
         words = [f"{letter}{_number(end[a])}" for a, letter in enumerate(letters) if end[a] != position[a]]
         code = "G0" if line.rapid[k] else "G1"
         words = [code, *words] if code != mode else words

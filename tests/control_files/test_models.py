@@ -30,7 +30,12 @@ PEERS = {
 def time_of(points: np.ndarray, control: Control, feed: float = 1e9) -> float:
     moves = len(points) - 1
     return predicted_time(
-        points, np.full(moves, feed), np.zeros(moves + 1, bool), MACHINE, ("x", "y", "z")[: points.shape[1]], control
+        points,
+        np.full(moves, feed),
+        np.zeros(moves + 1, bool),
+        MACHINE,
+        ("x", "y", "z")[: points.shape[1]],
+        control,
     )
 
 
@@ -82,12 +87,17 @@ def test_laws(name: str) -> None:
     assert time_of(points[:, [1, 2, 0]], control) == pytest.approx(time), "all axes are alike"
     if name == "grbl":
         far = dataclasses.replace(control, blocks=None)
-        assert time_of(points[::-1], far) == pytest.approx(time_of(points, far)), "backwards as long as forwards"
+        assert time_of(points[::-1], far) == pytest.approx(time_of(points, far)), (
+            "backwards as long as forwards"
+        )
     stop = np.zeros(60, bool)
     stop[30] = True
     args = (MACHINE, ("x", "y", "z"), control)
     whole = predicted_time(points, np.full(59, 80.0), stop, *args)
-    parts = [predicted_time(part, np.full(len(part) - 1, 80.0), np.zeros(len(part), bool), *args) for part in (points[:31], points[30:])]
+    parts = [
+        predicted_time(part, np.full(len(part) - 1, 80.0), np.zeros(len(part), bool), *args)
+        for part in (points[:31], points[30:])
+    ]
     if name != "klipper":
         assert whole == pytest.approx(sum(parts))
 
@@ -101,13 +111,15 @@ def test_predictions_are_near_the_controls_own_code(job: str) -> None:
     program = planner.read_program(file, machine)
     points = np.vstack([program.start, program.end])
     stop = np.zeros(len(points), bool)
-    for control, known, within in zip((unhurried("grbl"), CONTROLS["klipper"]), PEERS[job], (0.007, 0.02), strict=True):
+    for control, known, within in zip(
+        (unhurried("grbl"), CONTROLS["klipper"]), PEERS[job], (0.007, 0.02), strict=True
+    ):
         found = predicted_time(points, program.feed, stop, machine, program.axes, control)
         assert found == pytest.approx(known, rel=within)
 
 
 def test_other_names_and_still_paths_are_refused() -> None:
-    with pytest.raises(planner.InputError, match="no control 'grlb'.*did you mean 'grbl'"):
+    with pytest.raises(planner.InputError, match=r"no control 'grlb'.*did you mean 'grbl'"):
         control_of("grlb")
     with pytest.raises(planner.InputError, match="moves nowhere"):
         time_of(np.zeros((3, 2)), CONTROLS["grbl"])

@@ -1,19 +1,23 @@
 """One job on LinuxCNC four ways, same limits: the program, `planned.ngc`, the exported program, and the plan's setpoints played.
 
-    python -m benchmarks.controls --peers FOLDER [--only PART_OF_NAME ...]
+    python -m benchmarks.controls --peers FOLDER [--real] [--only PART_OF_NAME ...]
 
-Needs LinuxCNC (Debian's package linuxcnc-uspace) and FOLDER, a copy of ../shared/peers that an ordinary user may read; LinuxCNC refuses
-root, and `linuxcnc_run.py` there runs it as the user `lcnc`. Everything runs in real time. The machine is peers.toml: 100 mm/s and
-2000 mm/s2 per axis, tolerance 0.05 mm; the plan keeps a jerk of 2e5 mm/s3 besides, which LinuxCNC 2.9 does not know. The three programs
-get G64 P0.05 Q0 before their first line; the exported one has a G64 of its own, and is made of a plan with nine tenths of the
-tolerance. Times are counted in servo periods of the recorded motion, from the first to the last that moves; the error is what the
-verifier finds of the recorded positions.
+Needs LinuxCNC (Debian's package linuxcnc-uspace) and FOLDER, a copy of ../shared/peers with the compiled `tp_harness` that an ordinary
+user may read. Programs run through LinuxCNC's own interpreter and its own planner (tpmod.so), which `lcnc_fast.py` there steps one
+servo period at a time, whatever else the computer does; with --real they run in LinuxCNC itself, in real time, which on a busy computer
+starves its queue. Setpoints always run in real time, on HAL, as the user `lcnc`: LinuxCNC refuses root.
+
+The machine is peers.toml: 100 mm/s and 2000 mm/s2 per axis, tolerance 0.05 mm; the plan keeps a jerk of 2e5 mm/s3 besides, which
+LinuxCNC 2.9 does not know. Programs get G64 P0.05 Q0; the exported one has a G64 of its own, and is made of a plan with nine tenths of
+the tolerance. Times are counted in servo periods of the motion, from the first to the last that moves; the errors are what the
+verifier finds of it.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import subprocess
 import tempfile
 from pathlib import Path
@@ -35,20 +39,24 @@ WAYS = ("program", "planned.ngc", "exported", "streamed")
 USER = "lcnc"
 
 
-def on_linuxcnc(peers: Path, file: Path, work: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times and positions of a program on LinuxCNC, as recorded."""
+def on_linuxcnc(peers: Path, file: Path, work: Path, real: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Times and positions of a program on LinuxCNC; a program with a G64 of its own keeps it."""
+    own = re.search(r"G64 P([\d.]+) Q([\d.]+)", file.read_text())
+    tolerance, joined = own.groups() if own else ("0.05", "0")
     out = work / f"{file.stem}.npz"
+    script = "linuxcnc_run.py" if real else "lcnc_fast.py"
     command = [
         "/usr/bin/python3",
-        str(peers / "linuxcnc_run.py"),
+        str(peers / script),
         str(file),
         "--tol",
-        "0.05",
+        tolerance,
         "--q",
-        "0",
+        joined,
         "--out",
         str(out),
     ]
+    command += ["--vmax", "100", "--amax", "2000"] + ([] if real else ["--joint"])
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     if done.returncode:
         raise RuntimeError(done.stderr[-500:])
@@ -90,7 +98,7 @@ def row_of(
     }
 
 
-def measure(job: str, machine: Machine, peers: Path) -> list[dict[str, Any]]:
+def measure(job: str, machine: Machine, peers: Path, real: bool) -> list[dict[str, Any]]:
     """The four rows of a job."""
     source = SHARED / "peers" / "programs" / f"{job}.ngc"
     program = planner.read_program(source, machine)
@@ -106,7 +114,10 @@ def measure(job: str, machine: Machine, peers: Path) -> list[dict[str, Any]]:
             "planned.ngc": work / "plan" / "planned.ngc",
             "exported": work / made.file,
         }
-        rows = [row_of(way, *on_linuxcnc(peers, file, work), program, machine) for way, file in files.items()]
+        rows = [
+            row_of(way, *on_linuxcnc(peers, file, work, real), program, machine)
+            for way, file in files.items()
+        ]
         rows.append(row_of("streamed", *streamed(plan, work), program, machine))
     return [{"job": job, "planned_time": plan.cycle_time, **row} for row in rows]
 
@@ -114,13 +125,14 @@ def measure(job: str, machine: Machine, peers: Path) -> list[dict[str, Any]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--peers", type=Path, required=True)
+    parser.add_argument("--real", action="store_true")
     parser.add_argument("--only", nargs="*", default=[""])
     asked = parser.parse_args()
     machine = load_machine(SHARED / "machines" / "peers.toml")
     rows: list[dict[str, Any]] = []
     for job in JOBS:
         if any(part in job for part in asked.only):
-            rows += measure(job, machine, asked.peers)
+            rows += measure(job, machine, asked.peers, asked.real)
             print(*rows[-4:], sep="\n", flush=True)
     shown = [
         [

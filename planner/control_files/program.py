@@ -4,7 +4,7 @@ grbl, Klipper and Marlin stay on the path and slow down at its corners, so a smo
 with F words that keep the axes within their limits in its bends; how far apart its points should be depends on how they look ahead
 and on the time of a line. Their times are predicted by short models (models.py), for the program as it is and for the planned path
 with chords of several widths (`SHARES` of what is allowed); the fastest is written. For LinuxCNC there is no model: the planned path
-is written, with G64 P as narrow as the chords, and benchmarks/results/controls.md says how it did.
+is written, with narrow chords and G64 P for the rest of the room, and benchmarks/results/controls.md says how it did.
 
 Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners of LinuxCNC add up to
 it at most. A plan that uses all of it leaves no room; one with a tenth less does.
@@ -61,7 +61,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     room = _room(plan, tolerance)
     dialect = DIALECTS[control]
     candidates: dict[str, Polyline] = {}
-    for share in SHARES if control != LINUXCNC else (0.5,):
+    for share in SHARES if control != LINUXCNC else SHARES[-1:]:
         candidates[f"planned path, chords within {share * room / MICROMETRE:.3g} um"] = planned_polyline(
             plan, share * room
         )
@@ -71,7 +71,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
         predicted = {name: _predicted(line, plan, control) for name, line in candidates.items()}
     name = min(predicted, key=predicted.__getitem__) if predicted else next(iter(candidates))
     line = candidates[name]
-    mode = f"G64 P{max(0.5 * room, ROUNDING):.4f} Q0" if control == LINUXCNC else ""
+    mode = f"G64 P{(1.0 - SHARES[-1]) * room:.4f} Q0" if control == LINUXCNC else ""
     text = polyline_text(
         line, plan.program, _axes(plan), _rapid_speed(line, plan.machine, _axes(plan)), dialect, mode
     )

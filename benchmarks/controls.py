@@ -20,6 +20,7 @@ import os
 import re
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,13 @@ def streamed(plan: planner.Plan, work: Path) -> tuple[np.ndarray, np.ndarray]:
     write_stream(folder, plan.trajectory)
     subprocess.run(["chown", "-R", USER, str(folder)], check=True)
     command = ["runuser", "-u", USER, "--", "env", f"HOME={folder}", "halrun", "-f", "try.hal"]
-    subprocess.run(command, cwd=folder, capture_output=True, timeout=300, check=True)
+    for again in (True, True, False):  # HAL is one for the whole computer: another session may be ending
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+        if done.returncode == 0:
+            break
+        if not again:
+            raise RuntimeError(done.stderr[-500:])
+        time.sleep(5.0)
     played = np.loadtxt(folder / "played.txt")
     rows = played[played[:, -1] == 0, :3]
     return np.arange(len(rows)) * plan.machine.dt, rows

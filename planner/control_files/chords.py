@@ -96,7 +96,7 @@ def programmed_polyline(plan: Plan, within: float) -> Polyline:
         :, 0
     ]
     return Polyline(
-        points=np.round(np.vstack([toolpath.start[:1], ends]), DECIMALS),
+        points=np.round(np.vstack([toolpath.start[:1], ends]).astype(np.float64), DECIMALS),
         feed=toolpath.feed[segment],
         block=toolpath.block[segment],
         rapid=toolpath.rapid[segment],

@@ -55,7 +55,7 @@ def planned_polyline(plan: Plan, within: float) -> Polyline:
         along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s))])
         chosen = np.append(True, np.diff(np.floor(along)) > 0) | fixed
         rows = np.flatnonzero(chosen)
-        points = np.round(trajectory.position[rows], DECIMALS)
+        points = _rounded(trajectory.position[rows])
         misses = _misses(trajectory.position, rows, points)
         if (misses <= within).all() or chosen.all():
             break
@@ -95,13 +95,20 @@ def programmed_polyline(plan: Plan, within: float) -> Polyline:
     ends[inner[~bent]] = toolpath.curves.at(toolpath.curve[curves], toolpath.length[curves], along[~bent])[
         :, 0
     ]
+    vertices: FloatArray = np.vstack([toolpath.start[:1], ends])
     return Polyline(
-        points=np.round(np.vstack([toolpath.start[:1], ends]).astype(np.float64), DECIMALS),
+        points=_rounded(vertices),
         feed=toolpath.feed[segment],
         block=toolpath.block[segment],
         rapid=toolpath.rapid[segment],
         miss=within if len(inner) else 0.0,
     )
+
+
+def _rounded(points: FloatArray) -> FloatArray:
+    """Points (n, A) as they are written."""
+    found: FloatArray = np.round(points, DECIMALS)
+    return found
 
 
 def _fixed(plan: Plan, trajectory: Trajectory) -> Array:

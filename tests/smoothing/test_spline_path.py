@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from random_polylines import random_polyline
 
 from benchmarks import problems
+from planner.base.threads import use_threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
@@ -21,6 +22,7 @@ from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program, read_program
 from planner.optimal.geometry import splined_with_stops
 from planner.smoothing import initial as lay
+from planner.smoothing import relax as relax_module
 from planner.smoothing import spline_path
 from planner.smoothing.basis import derivatives, knots_at
 from planner.smoothing.initial import greville_control
@@ -341,3 +343,22 @@ def test_runs_that_stay_the_same_are_taken_over_to_the_last_digit():
     first = whole.splines.span_first[2] + 2 * DEGREE
     np.testing.assert_allclose(other.splines.control[:first] - whole.splines.control[:first], 1.0)
     assert np.array_equal(other.splines.control[first:], whole.splines.control[first:])
+
+
+def test_any_number_of_threads_lays_the_same_splines(monkeypatch):
+    toolpath = toolpath_from_program(problems.star_spiral(200), MACHINE)
+    stopping = toolpath.with_joints(np.array([40, 60, 100, 150, 190]), Joint.STOP)
+    path = round_corners(stopping, MACHINE, BezierCorner(), blend_tangents=True)
+    monkeypatch.setattr(relax_module, "SPANS_SHARED", 0)
+    shapes = []
+    try:
+        for threads in (1, 3):
+            use_threads(threads)
+            shapes.append(spline_shape(path, MACHINE))
+    finally:
+        use_threads(None)
+    one, many = shapes
+    assert len(one.splines.fits) > 3
+    assert one.splines.fits.any()
+    for a, b in ((one.splines.control, many.splines.control), (one.used, many.used), (one.left, many.left)):
+        np.testing.assert_array_equal(a, b)

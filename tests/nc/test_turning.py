@@ -1,4 +1,4 @@
-"""Roughing cycles and threads of lathes as geometry: passes, lathe_depths, where they end, and what is left for the finishing cut."""
+"""Roughing cycles and threads of lathes as geometry: passes, depths, where they end, and what is left for the finishing cut."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Random programs of everything: sections of cycles, offsets, feeds, lathes, arcs and splines inside of subprograms, loops, branches and
-saved modes, their numbers partly computed, with line numbers, comments and blanks."""
+"""Random programs of everything: sections of cycles, offsets, feeds, lathes, arcs and splines in subprograms, loops and branches, their numbers partly computed, with line numbers, comments and blanks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Random programs of everything: sections of cycles, offsets, feeds, lathes, arcs and splines in subprograms, loops and branches, their numbers partly computed, with line numbers, comments and blanks."""
+"""Random programs of everything: sections of cycles, offsets, feeds, lathes, arcs and splines in subprograms, loops and branches.
+
+Their numbers are partly computed; there are line numbers, comments and lines without blanks.
+"""
 
 from __future__ import annotations
 

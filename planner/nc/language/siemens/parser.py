@@ -189,7 +189,11 @@ class SiemensParser(Calls):
                     "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
                 )
         returns = (17.0, *(codes.RETURNS if self.source.file else ()))
-        ended = [word for word in words if chr(word.letter) == "M" and word.value in map(Number, returns)]
+        ended = [
+            word
+            for word in words
+            if chr(word.letter) == "M" and isinstance(word.value, Number) and word.value.value in returns
+        ]
         words = [word for word in words if word not in ended]
         words += [as_word("M", word.at, Number(30.0)) for word in ended if not self.source.file]
         if words or assigned:

@@ -153,7 +153,7 @@
     const at = [0, 1, 2].map((a) => (a < linear.length ? pick(c[linear[a]], rows) : rows.map(() => 0)));
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,
-      customdata: rows.map((k) => [c.line[k] + calls(k), c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? c.price[k] : 0]),
+      customdata: rows.map((k) => [calls(k) ? c.line[k] + calls(k) : c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? c.price[k] : 0]),
       hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} mm/s<br>held by %{customdata[2]}<br>" +
         "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm" +
         (c.price ? "<br>saved per µm %{customdata[5]:.3g} µs" : "") + "<extra></extra>",

@@ -64,6 +64,7 @@ LAYERS = (
     "planner.sensitivity",
     "planner.job.trace",
     "planner.job.stages",
+    "planner.job.beside",
     "planner.delivery",
     "planner.job",
     "planner.methods.kinematic",  # two motions that the loop compares its own with

@@ -199,6 +199,8 @@ class Interpreter:
             self._cutter.fix()
         if stop == 600:
             self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600):
+            self.store.add_event("M", stop / 10, block.line)
         if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
@@ -227,8 +229,9 @@ class Interpreter:
             state.tool_loaded = integer(block, "Q", 0)
         if "tool change" in block.m:
             state.tool_loaded = state.tool_selected
+            store.add_event("M", 6.0, line)
             store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop that takes no time and moves nothing", line)
+            self.note("a tool change is a full stop of the motion that moves nothing", line)
         store.make_room(len(block.events) + 3 * _ROWS_AT_ONCE)  # a line may hold any number of them
         for letter, value in block.events:
             store.add_event(letter, value, line)

@@ -135,6 +135,7 @@ class Program:
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
     reading      : the settings it was read with
+    pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     """
 
     source: str
@@ -158,6 +159,7 @@ class Program:
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
     reading: Reading = AS_USUAL
+    pen: bool = False
 
     def __post_init__(self) -> None:
         axes = len(self.axes)

@@ -73,6 +73,7 @@ LAYERS = (
     "planner.methods",
     "planner.report",
     "planner.control_files",
+    "planner.study",
     "planner.commands",
     "planner.cli",
     "planner.__main__",

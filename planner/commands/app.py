@@ -15,6 +15,7 @@ from planner.commands.plan import plan_command
 from planner.commands.pulses import pulses_command
 from planner.commands.report import report_command
 from planner.commands.verify import verify_command
+from planner.commands.what_if import what_if_command
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 
@@ -47,6 +48,7 @@ def common(
 
 for name, command in {
     "plan": plan_command,
+    "what-if": what_if_command,
     "compare": compare_command,
     "verify": verify_command,
     "info": info_command,

@@ -24,6 +24,7 @@ from planner.commands.options import (
     MachineOption,
     MethodOption,
     QuietOption,
+    RoundsOption,
     SolverOption,
     ThreadsOption,
     ToleranceOption,
@@ -46,13 +47,7 @@ def plan_command(
     corner: CornerOption = None,
     solver: SolverOption = None,
     effort: EffortOption = None,
-    rounds: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
-        ),
-    ] = None,
+    rounds: RoundsOption = None,
     shaped: Annotated[
         bool,
         typer.Option(

@@ -14,6 +14,7 @@ from planner.commands.machine import import_file, init_file, list_machines, show
 from planner.commands.plan import plan_command
 from planner.commands.pulses import pulses_command
 from planner.commands.report import report_command
+from planner.commands.sweep import sweep_command
 from planner.commands.verify import verify_command
 from planner.commands.what_if import what_if_command
 
@@ -49,6 +50,7 @@ def common(
 for name, command in {
     "plan": plan_command,
     "what-if": what_if_command,
+    "sweep": sweep_command,
     "compare": compare_command,
     "verify": verify_command,
     "info": info_command,

@@ -153,6 +153,13 @@ def show(*tables: RenderableType) -> None:
     _write("\n".join(lines if terminal else [line.rstrip() for line in lines]))
 
 
+def duration_text(seconds: float) -> str:
+    """A time as people say it: "45 s", "12 min", "3.5 h"."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
 class ProgressBar:
     """Progress of a long job on standard error: a bar with a clock on a terminal, a line now and then elsewhere.
 
@@ -189,6 +196,14 @@ class ProgressBar:
         if fraction == 0.0:
             self._times[stage] = self._times.get(stage, 0) + 1
         self._show(self._text(stage, fraction))
+
+    def count(self, there: int, of: int, before: float) -> None:
+        """Show that so many of some plans are there, some of them from before, and how much time the others need."""
+        left = ""
+        if there > before:
+            each = (time.monotonic() - self._start) / (there - before)
+            left = f", about {duration_text(each * (of - there))} left"
+        self._show(f"{there:,} of {of:,} plans{left}")
 
     def _compile(self, kept: bool) -> None:
         """Called before a kernel is compiled."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,16 @@ from rich.text import Text
 
 from planner.base.units import MICROMETRE
 from planner.report.export import json_ready
+from planner.study.points import PASSED, TABLE
 from planner.study.settings import unit_of, value_of
 from planner.study.variant import StudiedJob
 
 if TYPE_CHECKING:
     from planner.study.forecast import Forecast
+    from planner.study.sweep import Sweep
     from planner.study.what_if import WhatIf
+
+REASONS_SHOWN = 5  # why points did not pass
 
 
 def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
@@ -66,6 +71,31 @@ def _present(job: StudiedJob, it: WhatIf) -> str:
         return ""
     value = value_of(it.settings[0].name, job.machine, job.present_tolerance)
     return "-" if value is None else "several" if value != value else f"{value:g}"
+
+
+def sweep_table(done: Sweep, title: str) -> Group:
+    """A sweep in a few lines: how many points, their outcomes, the fastest that passed, and why the others did not."""
+    outcomes = Counter(row["outcome"] for row in done.rows)
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    before = f", {done.reused:,} of them planned before" if done.reused else ""
+    told = ", ".join(f"{count:,} {outcome}" for outcome, count in outcomes.most_common())
+    table.add_row("points", f"{len(done.rows):,}{before}: {told}")
+    passed = [row for row in done.rows if row["outcome"] == PASSED]
+    for name, pick in (("fastest", min), ("slowest", max)):
+        if passed:
+            row = pick(passed, key=lambda each: each["cycle_time_s"])
+            at = ", ".join(f"{one.name}={row[one.name]:g}" for one in done.varied)
+            table.add_row(name, f"{row['cycle_time_s']:.4f} s at {at}")
+    reasons = Counter((row["outcome"], row["sentence"]) for row in done.rows if row["outcome"] != PASSED)
+    said = [
+        Text(f"{count:,} {outcome}: {sentence}")
+        for (outcome, sentence), count in reasons.most_common(REASONS_SHOWN)
+    ]
+    if len(reasons) > REASONS_SHOWN:
+        said.append(Text(f"and {len(reasons) - REASONS_SHOWN:,} more reasons; {TABLE} has them all"))
+    return Group(Text(title, style="bold"), table, *said)
 
 
 def what_if_dict(job: StudiedJob, rows: Sequence[WhatIf]) -> dict[str, Any]:

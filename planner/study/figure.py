@@ -15,7 +15,6 @@ from planner.report.plots import STYLE
 from planner.study.points import FAILED
 
 if TYPE_CHECKING:
-    from planner.study.ranges import Varied
     from planner.study.sweep import Sweep
 
 PANELS_MAX = 9  # of a picture; the table has all
@@ -56,21 +55,17 @@ def sweep_figure(done: Sweep, path: Path) -> None:
                     label=label,
                 )
                 axes.plot(first.values, np.where(failed[where], time[where], np.nan), "x", color=colour)
-            axes.set_xlabel(_label(first))
+            axes.set_xlabel(f"{first.name} [{first.unit or '-'}]")
             axes.set_ylabel("cycle time [s]")
             if max(first.values) >= LOG_FROM * min(first.values):
                 axes.set_xscale("log")
             named = [f"{one.name} = {one.values[n]:.4g}" for one, n in zip(others[1:], at, strict=True)]
             axes.set_title("\n".join(named))
         if second is not None:
-            grid[0, 0].legend(title=second.name)
+            grid[0, 0].legend(title=f"{second.name} [{second.unit or '-'}]")
         if len(shown) < len(panels):
             figure.suptitle(f"{len(shown)} of {len(panels)} panels; the table has all")
         figure.savefig(path, format="png")
-
-
-def _label(varied: Varied) -> str:
-    return varied.name
 
 
 def _spread(items: object, most: int) -> list[int | None]:

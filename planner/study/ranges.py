@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.machine import Machine
-from planner.study.settings import Setting, known_setting, parse_value
+from planner.study.settings import Setting, known_setting, parse_value, unit_of
 
 LINEAR, LOG = "lin", "log"
 POINTS_MAX = 1_000_000  # of a grid: a slip of the keyboard, not a sweep
@@ -19,10 +19,11 @@ DIGITS = 9  # significant, of a value between the ends: 0.05 rather than 0.05000
 
 @dataclass(frozen=True, kw_only=True)
 class Varied:
-    """A setting and its values in the unit of the machine file, each once, in their order."""
+    """A setting and its values in the unit of the machine file, each once, in their order; `unit` is empty for factors."""
 
     name: str
     values: tuple[float, ...]
+    unit: str = ""
 
 
 def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
@@ -38,9 +39,10 @@ def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
             f"'{text}': write a name and a range, such as tolerance=0.005:0.1:10:log or y.jerk=1e5,2e5"
         )
     name = known_setting(name.strip(), machine)
+    unit = unit_of(name, machine)
     if ":" not in said:
         values = [parse_value(name, value, machine, tolerance) for value in said.split(",")]
-        return Varied(name=name, values=tuple(dict.fromkeys(values)))
+        return Varied(name=name, values=tuple(dict.fromkeys(values)), unit=unit)
     parts = said.split(":")
     spacing = parts[3].strip() if len(parts) == 4 else LINEAR
     if len(parts) not in (3, 4) or spacing not in (LINEAR, LOG):
@@ -51,9 +53,9 @@ def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
         raise InputError(f"{text}: '{parts[2]}' values; their number must be 1 to {POINTS_MAX:,}")
     spread = np.geomspace if spacing == LOG else np.linspace
     found = [float(f"{value:.{DIGITS}g}") for value in spread(first, last, count)]
-    return Varied(
-        name=name, values=tuple(dict.fromkeys([first, *found[1:-1], last] if count > 1 else [first]))
-    )
+    inner = found[1:-1] if count > 1 else []
+    last = last if count > 1 else first
+    return Varied(name=name, values=tuple(dict.fromkeys([first, *inner, last])), unit=unit)
 
 
 def grid_of(varied: Sequence[Varied]) -> list[tuple[Setting, ...]]:

@@ -90,8 +90,8 @@ def known_setting(name: str, machine: Machine) -> str:
     for full in (name, f"axes.{name}"):
         if full in known:
             return full
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    near = near or difflib.get_close_matches(f"axes.{name}", known, n=1)
+    full = f"axes.{name}" if name.partition(".")[0] in machine.axes else name
+    near = difflib.get_close_matches(full, known, n=1, cutoff=0.5)
     hint = f" (did you mean '{near[0]}'?)" if near else ""
     axes = ",".join(machine.axes)
     others = ", ".join(known_name for known_name in known if not known_name.startswith("axes."))

@@ -63,10 +63,11 @@ def planned_on_cluster(
                 f"--cluster {address}: its scheduler has no workers; start some with: dask worker {address}"
             )
         client.run_on_scheduler(_allow_deaths, deaths=DEATHS)
-        shared = client.scatter(job, hash=False)
+        # a task, and not scattered: what dies with a worker the scheduler then makes again
+        shared = client.submit(_same, job, pure=False)
         tasks = [client.submit(_planned, shared, point, pure=False) for point in points]
         try:
-            for done in distributed.as_completed(tasks):
+            for done in distributed.as_completed(tasks, loop=client.loop):
                 yield done.result()
                 done.release()
         except distributed.KilledWorker as fault:
@@ -77,6 +78,10 @@ def planned_on_cluster(
 
 def _planned(job: StudiedJob, point: Point) -> tuple[Point, dict[str, Any]]:
     return point, planned_point(job, point)
+
+
+def _same(job: StudiedJob) -> StudiedJob:
+    return job
 
 
 def _allow_deaths(deaths: int, dask_scheduler: Any = None) -> None:

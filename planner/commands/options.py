@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -83,6 +83,7 @@ CornerOption = Annotated[str | None, CORNER]
 EffortOption = Annotated[str | None, EFFORT]
 SolverOption = Annotated[str | None, SOLVER]
 RoundsOption = Annotated[int | None, ROUNDS]
+Jobs = Annotated[list[Path], typer.Argument(metavar="JOB...", help="NC program, or several")]
 Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
 MachineOption = Annotated[
     str | None,
@@ -113,6 +114,20 @@ ThreadsOption = Annotated[
 ]
 QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="print no progress")]
 ForceOption = Annotated[bool, typer.Option("--force", help="also overwrite files that planner did not write")]
+
+
+def given_options(context: typer.Context, without: Container[str]) -> list[str]:
+    """The options of a command line as they are to be written for another one, all but those of the names in `without`."""
+    words: list[str] = []
+    for option in context.command.params:
+        if option.name is None or option.name in without or option.param_type_name != "option":
+            continue
+        value = context.params.get(option.name)
+        if value is None or value is False or value == "":
+            continue
+        name = max(option.opts, key=len)
+        words += [name] if value is True else [name, str(getattr(value, "value", value))]
+    return words
 
 
 def _one_of(allowed: tuple[str, ...]) -> Callable[[str], str]:

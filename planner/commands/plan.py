@@ -19,7 +19,7 @@ from planner.commands.options import (
     ForceOption,
     Format,
     GeometryOption,
-    Job,
+    Jobs,
     JsonOption,
     MachineOption,
     MethodOption,
@@ -28,6 +28,7 @@ from planner.commands.options import (
     SolverOption,
     ThreadsOption,
     ToleranceOption,
+    given_options,
     takes_reading,
 )
 from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
@@ -39,7 +40,8 @@ NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 @guarded
 @takes_reading
 def plan_command(
-    job: Job,
+    context: typer.Context,
+    jobs: Jobs,
     machine: MachineOption = None,
     tolerance: ToleranceOption = None,
     method: MethodOption = OPTIMAL,
@@ -90,7 +92,7 @@ def plan_command(
     *,
     reading: Reading,
 ) -> None:
-    """Plan the motion of a program, sample it and verify it."""
+    """Plan the motion of a program, sample it and verify it; of several ones side by side, each into DIR/NAME."""
     if plot and output is None:
         raise InputError("--plot writes its pictures into the output directory: name one with -o DIR")
     if report and output is None:
@@ -99,6 +101,29 @@ def plan_command(
         raise InputError(
             "--format is the format of the trajectory in the output directory: name one with -o DIR"
         )
+    if len(jobs) > 1:
+        one_by_one = {"--trace": trace, "--verbose": verbose, "--corners": corners}
+        for name, value in one_by_one.items():
+            if value:
+                raise InputError(f"{name} is for one program; {len(jobs)} are given")
+        from planner.commands.many import plan_many
+        from planner.methods.registry import check_settings
+
+        check_settings(
+            method,
+            geometry=geometry,
+            corner=corner,
+            effort=effort,
+            rounds=rounds,
+            solver=solver,
+            shaped=shaped,
+        )
+        handed_on = given_options(context, ("output", "threads", "quiet", "as_json"))
+        code = plan_many(jobs, handed_on, output, threads=threads, quiet=quiet, as_json=as_json)
+        if code:
+            raise typer.Exit(code)
+        return
+    (job,) = jobs
     from planner import plan
     from planner.job.trace import Trace
     from planner.report import trace_file

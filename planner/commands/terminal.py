@@ -141,7 +141,10 @@ def show(*tables: RenderableType) -> None:
     terminal = sys.stdout is not None and sys.stdout.isatty()
     # Into a string, since rich's own writing ends the process on a broken pipe, with exit code 1.
     console: Console = Console(
-        file=io.StringIO(), force_terminal=terminal, width=None if terminal else PIPE_WIDTH
+        file=io.StringIO(),
+        force_terminal=terminal,
+        width=None if terminal else PIPE_WIDTH,
+        markup=False,  # [mm] is a unit
     )
     for table in tables:
         rendered = [

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
-from planner.base.files import require_ending
+from planner.base.files import STDIN, standard_input, require_ending
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
@@ -31,7 +31,12 @@ def read_program(path: str | Path, machine: Machine | None = None, reading: Read
 
     Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.
     """
-    return parse_program(load(path), machine, reading, source=str(path))
+    return parse_program(load(path), machine, reading, source=source_name(path))
+
+
+def source_name(path: str | Path) -> str:
+    """What messages call a program file."""
+    return "<stdin>" if str(path) == STDIN else str(path)
 
 
 def parse_program(
@@ -118,8 +123,10 @@ def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Progr
 
 
 def load(path: str | Path) -> bytes:
-    """The bytes of a program file. Raises InputError if there is no such file or it cannot be read."""
+    """The bytes of a program file, or of the standard input for "-". Raises InputError if there is no such file or it cannot be read."""
     try:
+        if str(path) == STDIN:
+            return standard_input()
         require_ending(path)
         return Path(path).read_bytes()
     except FileNotFoundError as fault:

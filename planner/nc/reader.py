@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
-from planner.base.files import STDIN, standard_input, require_ending
+from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
@@ -123,7 +123,7 @@ def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Progr
 
 
 def load(path: str | Path) -> bytes:
-    """The bytes of a program file, or of the standard input for "-". Raises InputError if there is no such file or it cannot be read."""
+    """The bytes of a program file, or of the standard input for "-". Raises InputError if it cannot be read."""
     try:
         if str(path) == STDIN:
             return standard_input()

@@ -1,0 +1,196 @@
+"""How much time a plan still needs, from what it has told of itself so far.
+
+Nobody knows beforehand how many rounds a spline gets, or whether a verdict asks for another one. So the time left is the sum of what is
+still expected, counted in a unit that this job has measured itself: one grid and one solve on it (the last ones of the rounds),
+
+    rounds     those that the effort allows, fewer as soon as their gains fall; each as long as the last one
+    after      final grid, single corners, tightening:  AFTER units; on corners alone a share of their solve
+    verdict    samples times SAMPLE seconds, at the speed of this machine, which the first solve tells; half of all jobs get another one
+    prices     PRICES units
+    files      samples times WRITTEN seconds, if any are written
+
+less what the stage that is running has had already. Where a stage tells what share of it is done, that takes the place of what was
+expected. Before the first solve tells a share nothing is known, and nothing is said. The numbers were read off nine plans
+(`benchmarks/progress.py`, which also says how true the estimates are).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from planner.base.names import NORMAL
+
+if TYPE_CHECKING:
+    from planner.job.trace import Step
+
+ROUND = 4.5  # of the first round, in units
+AFTER, PRICES = 4.5, 2.6  # in units
+AFTER_CORNERS, PRICES_CORNERS = 0.3, 0.6  # where there are no splines, of the one solve
+POINT = 0.85e-6  # of a grid point and an iteration of the solver, on the machine where the others were measured [s]
+SAMPLE = 3.7e-6  # of a sample in a verdict [s]
+WRITTEN = 1.5e-6  # of a sample in the files [s]
+AGAIN = 0.5  # further verdicts to be expected
+SPEED = (0.2, 20.0)  # how slow a machine may be, against that one [-]
+SHARE_TOLD = 0.03  # a share of a stage that is done tells something from here on [-]
+LATE = 0.3  # of the time it has had, what a stage that has had more than expected still gets
+FALLING = 0.35  # gain of a round over the gain of the one before, as long as there is only one
+ENOUGH = 1e-5  # gain after which there are no more rounds [share of the time]
+
+BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)
+
+
+@dataclass
+class TimeLeft:
+    """An estimator; it is told of stages and steps with the time [s] of each.
+
+    dt      : interpolation period [s], 0 if it is not known
+    effort  : of the plan
+    rounds  : of reshaping that the user asked for, or None
+    writes  : whether files are written
+    """
+
+    dt: float = 1e-3
+    effort: str = NORMAL
+    rounds: int | None = None
+    writes: bool = False
+    _phase: int = BEGIN
+    _began: dict[str, float] = field(default_factory=dict)  # of the stages, the last time
+    _now_in: str = ""
+    _share: float = 0.0
+    _since: float = 0.0  # when the present phase or round began
+    _grid: float = 0.0
+    _unit: float = math.nan
+    _speed: float = 1.0
+    _points: int = 0
+    _splines: bool = False
+    _cycle_time: float = 0.0
+    _round: float = math.nan
+    _gains: list[float] = field(default_factory=list)
+    _verdicts: int = 0
+
+    def stage(self, now: float, name: str, fraction: float) -> None:
+        """A stage begins (0), is done to a fraction, or ends (1)."""
+        if fraction == 0.0:
+            if name == "solve" and self._now_in == "geometry":
+                self._grid = now - self._began["geometry"]
+            self._began[name] = now
+            if name == "sample":
+                self._go(DELIVER, now)
+            elif name == "verify":
+                self._verdicts += 1
+            elif name == "report" and self._phase == DELIVER:
+                self._go(REPORT, now)
+            elif name == "write":
+                self._go(DONE, now)
+        self._now_in, self._share = name, fraction
+
+    def step(self, now: float, step: Step) -> None:
+        """A step of the planning (job/trace.py)."""
+        if step.name == "splines":
+            self._splines = bool(step.facts.get("runs"))
+        elif step.name == "solve":
+            self._solved(now, step)
+        elif step.name.startswith("reshape") and self._phase == ROUNDS:
+            if "mixed" not in step.name:
+                self._round = now - self._since
+                self._since = now
+            self._gains.append(max(step.gain or 0.0, 0.0))
+        elif step.name in ("final grid", "between points") and self._phase < FINISH:
+            self._go(FINISH, now)
+        elif step.name == "plan" and self._phase >= DELIVER:
+            self._go(DONE, now)
+        if step.found is not None and math.isfinite(step.found) and step.name in ("solve", "tighten", "final grid"):
+            self._cycle_time = self._cycle_time if self._phase > ROUNDS else step.found
+
+    def left(self, now: float) -> float | None:
+        """How much time is left [s]; None as long as nothing is known."""
+        if self._phase == DONE:
+            return self._running(now, "write", self._samples() * WRITTEN * self._speed if self.writes else 0.0)
+        later = self._samples() * self._speed * (WRITTEN if self.writes else 0.0)
+        unit, prices = self._unit, PRICES if self._splines else PRICES_CORNERS
+        if self._phase == BEGIN:
+            share = self._share if self._now_in == "solve" else 0.0
+            if share < SHARE_TOLD:
+                return None
+            solve = (now - self._began["solve"]) / share
+            unit = solve + self._grid
+            later += solve * (1.0 - share)
+        later += prices * unit if self._phase < REPORT else self._running(now, "report", prices * unit)
+        if self._phase < REPORT:
+            later += self._verdict(now)
+        if self._phase <= FINISH:
+            after = (AFTER if self._splines else AFTER_CORNERS) * unit
+            later += after if self._phase < FINISH else self._rest(now - self._since, after)
+        if self._phase <= ROUNDS and self._splines:
+            each = ROUND * unit if math.isnan(self._round) else self._round
+            more = self._more_rounds()
+            had = now - self._since if self._phase == ROUNDS else 0.0
+            later += max(more - 1.0, 0.0) * each + (self._rest(had, each) if more > 0 else 0.0)
+        return later
+
+    def _go(self, phase: int, now: float) -> None:
+        self._phase, self._since = phase, now
+
+    def _solved(self, now: float, step: Step) -> None:
+        if self._phase > ROUNDS:
+            return
+        seconds = now - self._began.get("solve", now)
+        self._unit = seconds + self._grid
+        self._points = int(step.facts.get("points") or 0)
+        work = self._points * int(step.facts.get("iterations") or 1) * POINT
+        if self._phase == BEGIN:
+            if work > 0.0:
+                self._speed = min(max(seconds / work, SPEED[0]), SPEED[1])
+            self._go(ROUNDS if self._splines else FINISH, now)
+
+    def _more_rounds(self) -> float:
+        """Rounds that are still to be expected."""
+        from planner.optimal.effort import EFFORTS
+
+        effort = EFFORTS[self.effort]
+        made = len(self._gains)
+        most = self.rounds
+        if most is None:
+            most = min(effort.work // max(self._points, 1), effort.rounds)
+        if not made:
+            return min(most, 5.0)
+        gain = self._gains[-1]
+        enough = max(effort.left, ENOUGH)
+        if gain <= enough:
+            return min(most - made, 1.0)
+        falling = FALLING
+        if made > 1 and self._gains[0] > gain:
+            falling = min((gain / self._gains[0]) ** (1.0 / (made - 1)), 0.8)
+        elif made > 1:
+            falling = 0.8
+        return max(min(most - made, math.log(gain / enough) / -math.log(falling)), 0.0)
+
+    def _samples(self) -> float:
+        return self._cycle_time / self.dt if self.dt > 0.0 else 0.0
+
+    def _verdict(self, now: float) -> float:
+        """What is left of verdicts."""
+        each = self._samples() * SAMPLE * self._speed
+        if self._phase < DELIVER or not self._verdicts:
+            return (1.0 + AGAIN) * each
+        here = self._running(now, "verify", each)
+        if self._now_in == "verify" and self._share > SHARE_TOLD:
+            each = (now - self._began["verify"]) / self._share
+        return here + AGAIN**self._verdicts * each
+
+    def _running(self, now: float, stage: str, expected: float) -> float:
+        """What is left of a stage of which so much time was expected, from the time or the share that it has had."""
+        if self._now_in != stage:
+            return expected if stage not in self._began else 0.0
+        had = now - self._began[stage]
+        if self._share >= 1.0:
+            return 0.0
+        if self._share > SHARE_TOLD:
+            return had * (1.0 - self._share) / self._share
+        return self._rest(had, expected)
+
+    @staticmethod
+    def _rest(had: float, expected: float) -> float:
+        return max(expected - had, LATE * had)

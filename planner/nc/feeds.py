@@ -53,6 +53,15 @@ def set_feed(state: State, block: Block, note: Note) -> None:
         )
 
 
+def take_default(state: State, default: float | None, block: Block, note: Note) -> None:
+    """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
+    if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
+        return
+    state.feed = default
+    feed = default * SECONDS_PER_MINUTE / state.unit
+    note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
+
+
 def check_feed(state: State, block: Block) -> None:
     """See that the block has a feed: under G94 and G95 it is `state.feed` then. Raises WordFault if it has none."""
     word = block.motion_word()

@@ -17,30 +17,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc import codes, compensation, drilling, feeds, homing, moves, offsets, signals, threads
+from planner.nc import auxiliary, codes, compensation, drilling, feeds, homing, moves, offsets, threads
 from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block, read_block
 from planner.nc.cutter import Cutter, CutterFault
-from planner.nc.faults import FaultList
+from planner.nc.faults import FaultList, Findings
 from planner.nc.lexer import Words
-from planner.nc.moves import WordFault, integer
+from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
-from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
+from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
+# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
 _COVET_AXES = (100, 280, 300, 520, 920)
-_PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
-# make room for themselves.
-_ROWS_AT_ONCE = 4
-_SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
-
-
 _WHY_NO_MOTION = {
     NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
     REFUSED_MOTION: "an axis word under a motion code that is not supported",
@@ -72,10 +65,7 @@ class Interpreter:
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
-        self._reports: list[tuple[int, str]] = []
-        self._found: list[tuple[Words, int, str]] = []
-        self._said: set[tuple[int, str]] = set()
-        self._notes: dict[str, list[int]] = {}  # in their order: first line, times
+        self.found = Findings()
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
@@ -90,23 +80,19 @@ class Interpreter:
         try:
             self._cutter.fix()
         except CutterFault as fault:
-            self._found.append((self._words, len(self._words.letter) - 1, str(fault)))
+            self.found.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed, each once, with its first line and how often."""
-        found = [
-            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
-            for text, (line, times) in self._notes.items()
-        ]
-        return tuple(text for _, text in sorted(found + self.assumed.notes(), key=lambda note: note[0]))
+        return self.found.notes(self.assumed.notes())
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
         row, rows, self._words = 0, len(words.line), words
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
-            self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
+            self.store.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
             after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
@@ -121,7 +107,11 @@ class Interpreter:
             row = after
         self._read = row
         self._splines.keep(words)
-        self._keep_faults(words)
+        refused = self.store.refused_word[: self.store.refusals]
+        letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
+        found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
+        self.found.keep(words, found)
         self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
@@ -138,28 +128,15 @@ class Interpreter:
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
-        self._reports.append((word, message))
-
-    def faults(self) -> FaultList:
-        """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self._found + self._splines.faults())
-
-    def _keep_faults(self, words: Words) -> None:
-        """Keep the chunk's faults in the order of its words."""
-        refused = self.store.refused_word[: self.store.refusals]
-        letters = words.letter[refused]
-        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
-        found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
-        for word, message in sorted(found + self._reports):
-            key = (int(words.at[word]), message)
-            if key not in self._said:
-                self._said.add(key)
-                self._found.append((words, word, message))
-        self._reports.clear()
+        self.found.report(word, message)
 
     def note(self, text: str, line: int) -> None:
         """Keep what was assumed on a line."""
-        self._notes.setdefault(text, [line, 0])[1] += 1
+        self.found.note(text, line)
+
+    def faults(self) -> FaultList:
+        """All faults in the order of the program; a line that is executed many times is named once."""
+        return FaultList(self.found.faults + self._splines.faults())
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
@@ -183,11 +160,11 @@ class Interpreter:
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
         if self._cutter is not None:
-            compensation.check_words(self.state, block)
+            compensation.check_unchanged(self.state, block)
         feeds.set_feed(self.state, block, self.note)
-        self._events(block)
+        auxiliary.events(self.state, self.store, block, self.note)
         if block.g.get("one-shot") == 40:
-            self._dwell(block)
+            auxiliary.dwell(self.state, self.store, block, self.assumed, self.note)
         self._modes(block)
         if not block.foreign:
             self._check_parked(block)
@@ -207,6 +184,7 @@ class Interpreter:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
+<<<<<<< HEAD
     # --- what is said before anything moves -------------------------------------------------------------------------------
 
     def _events(self, block: Block) -> None:
@@ -261,6 +239,9 @@ class Interpreter:
                 word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5"
             )
         self.store.add_dwell(seconds, block.line, self.state)
+=======
+    # --- modes ------------------------------------------------------------------------------------------------------------------
+>>>>>>> main
 
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
@@ -281,7 +262,7 @@ class Interpreter:
             if state.system not in state.systems and state.system != 540:
                 self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0", block.line)
         if "path control" in g:
-            self._path_control(block)
+            auxiliary.path_control(state, block, self.note)
         if "distance mode" in g:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
@@ -289,20 +270,6 @@ class Interpreter:
         if "retract mode" in g:
             state.to_level, state.retract_given = g["retract mode"] == 980, True
         state.apply_offsets()
-
-    def _path_control(self, block: Block) -> None:
-        state = self.state
-        state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
-        if "P" in block.value and block.g["path control"] == 640:
-            tolerance = block.value["P"]
-            if tolerance < 0:
-                raise WordFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
-            if tolerance > 0:
-                state.tolerance = tolerance * state.unit
-            else:
-                self.note("G64 P0 gives no tolerance; the machine's holds", block.line)
-        if "Q" in block.value:
-            self.note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)
 
     # --- what moves ---------------------------------------------------------------------------------------------------------
 
@@ -363,7 +330,7 @@ class Interpreter:
         if state.motion < 0:
             raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
         if not self.assumed.strict:
-            self._take_default_feed(block)
+            feeds.take_default(state, self.setup.feed_default, block, self.note)
         if state.motion not in codes.CYCLES:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
@@ -379,15 +346,6 @@ class Interpreter:
             drilling.drill(state, self.store, block, self.note)
         else:
             self._move(block)
-
-    def _take_default_feed(self, block: Block) -> None:
-        """The machine's feed for a feed move before the first F word."""
-        state, default = self.state, self.setup.feed_default
-        if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
-            return
-        state.feed = default
-        feed = default * SECONDS_PER_MINUTE / state.unit
-        self.note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 
     def _move(self, block: Block) -> None:
         """G0, G1, G2, G3."""
@@ -445,7 +403,7 @@ class Interpreter:
         if found is None:
             return
         if not self.assumed.strict:
-            self._take_default_feed(block)
+            feeds.take_default(state, self.setup.feed_default, block, self.note)
         feeds.check_feed(state, block)
         (points, weights), line = found
         state.position[:] = points[-1, -1]

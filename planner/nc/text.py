@@ -14,6 +14,7 @@ from planner.nc.writer import FEED_MIN, round_down
 
 DECIMALS = 7  # of a coordinate in mm
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
+# Characters that must not stand in a comment, and what stands there instead.
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
 

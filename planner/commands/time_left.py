@@ -33,9 +33,14 @@ SAMPLE = 3.7e-6  # of a sample in a verdict [s]
 WRITTEN = 1.5e-6  # of a sample in the files [s]
 AGAIN = 0.5  # further verdicts to be expected
 SPEED = (0.2, 20.0)  # how slow a machine may be, against that one [-]
+SLOWER = 1.2  # cycle time over that at the programmed feed, as long as nothing else is known [-]
+RIVAL = 0.5  # further verdicts of other plans on corners alone
+LAST_GAINS = 2  # rounds whose geometric mean counts: some gain little between others that gain much
 SHARE_TOLD = 0.03  # a share of a stage that is done tells something from here on [-]
+SURE = 2.0  # times the share that is done: how far it is trusted, against what was expected [-]
 LATE = 0.3  # of the time it has had, what a stage that has had more than expected still gets
-FALLING = 0.35  # gain of a round over the gain of the one before, as long as there is only one
+FALLING = 0.3  # gain of a round over the gain of the one before, as long as there is only one
+STEADY = 0.8  # the same at most
 ENOUGH = 1e-5  # gain after which there are no more rounds [share of the time]
 
 BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)
@@ -45,13 +50,13 @@ BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)
 class TimeLeft:
     """An estimator; it is told of stages and steps with the time [s] of each.
 
-    dt      : interpolation period [s], 0 if it is not known
-    effort  : of the plan
-    rounds  : of reshaping that the user asked for, or None
-    writes  : whether files are written
+    solves : whether the method solves a problem on a grid ("optimal", "second-order")
+    effort : of the plan
+    rounds : of reshaping that the user asked for, or None
+    writes : whether files are written
     """
 
-    dt: float = 1e-3
+    solves: bool = True
     effort: str = NORMAL
     rounds: int | None = None
     writes: bool = False
@@ -66,6 +71,9 @@ class TimeLeft:
     _points: int = 0
     _splines: bool = False
     _cycle_time: float = 0.0
+    _dt: float = math.inf
+    _resolution: object = None
+    _plans: int = 0
     _round: float = math.nan
     _gains: list[float] = field(default_factory=list)
     _verdicts: int = 0
@@ -88,7 +96,9 @@ class TimeLeft:
 
     def step(self, now: float, step: Step) -> None:
         """A step of the planning (job/trace.py)."""
-        if step.name == "splines":
+        if step.name == "programmed feed":
+            self._cycle_time, self._dt = SLOWER * (step.found or 0.0), float(step.facts.get("dt") or math.inf)
+        elif step.name == "splines":
             self._splines = bool(step.facts.get("runs"))
         elif step.name == "solve":
             self._solved(now, step)
@@ -100,26 +110,32 @@ class TimeLeft:
         elif step.name in ("final grid", "between points") and self._phase < FINISH:
             self._go(FINISH, now)
         elif step.name == "plan" and self._phase >= DELIVER:
+            self._plans += 1
             self._go(DONE, now)
-        if step.found is not None and math.isfinite(step.found) and step.name in ("solve", "tighten", "final grid"):
+        if (
+            step.found is not None
+            and math.isfinite(step.found)
+            and step.name in ("solve", "tighten", "final grid")
+        ):
             self._cycle_time = self._cycle_time if self._phase > ROUNDS else step.found
 
     def left(self, now: float) -> float | None:
         """How much time is left [s]; None as long as nothing is known."""
+        write = self._samples() * WRITTEN * self._speed if self.writes else 0.0
         if self._phase == DONE:
-            return self._running(now, "write", self._samples() * WRITTEN * self._speed if self.writes else 0.0)
-        later = self._samples() * self._speed * (WRITTEN if self.writes else 0.0)
-        unit, prices = self._unit, PRICES if self._splines else PRICES_CORNERS
-        if self._phase == BEGIN:
+            return self._running(now, "write", write)
+        unit, later = self._unit, write + self._verdict(now)
+        if self._phase == BEGIN and self.solves:
             share = self._share if self._now_in == "solve" else 0.0
             if share < SHARE_TOLD:
                 return None
             solve = (now - self._began["solve"]) / share
             unit = solve + self._grid
             later += solve * (1.0 - share)
-        later += prices * unit if self._phase < REPORT else self._running(now, "report", prices * unit)
-        if self._phase < REPORT:
-            later += self._verdict(now)
+        elif not self.solves or self._plans:
+            return later
+        prices = (PRICES if self._splines else PRICES_CORNERS) * unit
+        later += prices if self._phase < REPORT else self._running(now, "report", prices)
         if self._phase <= FINISH:
             after = (AFTER if self._splines else AFTER_CORNERS) * unit
             later += after if self._phase < FINISH else self._rest(now - self._since, after)
@@ -134,15 +150,19 @@ class TimeLeft:
         self._phase, self._since = phase, now
 
     def _solved(self, now: float, step: Step) -> None:
+        resolution = step.facts.get("resolution")
+        if self._phase == ROUNDS and resolution != self._resolution:
+            self._go(FINISH, self._began.get("geometry", now))  # the final grid
         if self._phase > ROUNDS:
             return
+        self._resolution = resolution
         seconds = now - self._began.get("solve", now)
         self._unit = seconds + self._grid
         self._points = int(step.facts.get("points") or 0)
         work = self._points * int(step.facts.get("iterations") or 1) * POINT
         if self._phase == BEGIN:
             if work > 0.0:
-                self._speed = min(max(seconds / work, SPEED[0]), SPEED[1])
+                self._speed = math.sqrt(min(max(seconds / work, SPEED[0]), SPEED[1]))
             self._go(ROUNDS if self._splines else FINISH, now)
 
     def _more_rounds(self) -> float:
@@ -156,29 +176,32 @@ class TimeLeft:
             most = min(effort.work // max(self._points, 1), effort.rounds)
         if not made:
             return min(most, 5.0)
-        gain = self._gains[-1]
         enough = max(effort.left, ENOUGH)
-        if gain <= enough:
+        gain = math.exp(
+            sum(math.log(max(g, 0.1 * enough)) for g in self._gains[-LAST_GAINS:])
+            / len(self._gains[-LAST_GAINS:])
+        )
+        if self._gains[-1] <= enough:
             return min(most - made, 1.0)
-        falling = FALLING
-        if made > 1 and self._gains[0] > gain:
-            falling = min((gain / self._gains[0]) ** (1.0 / (made - 1)), 0.8)
-        elif made > 1:
-            falling = 0.8
+        falling = FALLING if made < 2 else (gain / max(self._gains)) ** (1.0 / (made - 1))
+        falling = min(max(falling, FALLING), STEADY)
         return max(min(most - made, math.log(gain / enough) / -math.log(falling)), 0.0)
 
     def _samples(self) -> float:
-        return self._cycle_time / self.dt if self.dt > 0.0 else 0.0
+        return self._cycle_time / self._dt
 
     def _verdict(self, now: float) -> float:
         """What is left of verdicts."""
         each = self._samples() * SAMPLE * self._speed
-        if self._phase < DELIVER or not self._verdicts:
-            return (1.0 + AGAIN) * each
+        rivals = RIVAL * each if self.solves and not self._splines and not self._plans else 0.0
+        if self._phase < DELIVER:
+            return (1.0 + AGAIN) * each + rivals
+        if self._phase > DELIVER:
+            return rivals
         here = self._running(now, "verify", each)
-        if self._now_in == "verify" and self._share > SHARE_TOLD:
-            each = (now - self._began["verify"]) / self._share
-        return here + AGAIN**self._verdicts * each
+        if self._now_in == "verify":
+            each = now - self._began["verify"] + here
+        return here + (0.0 if self._plans else AGAIN ** max(self._verdicts, 1) * each) + rivals
 
     def _running(self, now: float, stage: str, expected: float) -> float:
         """What is left of a stage of which so much time was expected, from the time or the share that it has had."""
@@ -188,7 +211,9 @@ class TimeLeft:
         if self._share >= 1.0:
             return 0.0
         if self._share > SHARE_TOLD:
-            return had * (1.0 - self._share) / self._share
+            sure = min(SURE * self._share, 1.0)
+            whole = sure * had / self._share + (1.0 - sure) * expected
+            return max(whole - had, LATE * had * (1.0 - self._share))
         return self._rest(had, expected)
 
     @staticmethod

@@ -184,64 +184,7 @@ class Interpreter:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
-<<<<<<< HEAD
-    # --- what is said before anything moves -------------------------------------------------------------------------------
-
-    def _events(self, block: Block) -> None:
-        state, store, line = self.state, self.store, block.line
-        if "S" in block.value:
-            if block.value["S"] < 0:
-                raise WordFault(
-                    block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
-                )
-            store.add_event("S", block.value["S"], line)
-            state.spindle.speed = block.value["S"]
-        if "T" in block.value:
-            state.tool_selected = integer(block, "T", 0)
-            store.add_event("T", state.tool_selected, line)
-        if "signals" in block.m:
-            signals.signal(self.store, block)
-        if "tool number" in block.m:
-            if "Q" not in block.value:
-                raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
-            state.tool_loaded = integer(block, "Q", 0)
-        if "tool change" in block.m:
-            state.tool_loaded = state.tool_selected
-            store.add_event("M", 6.0, line)
-            store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop of the motion that moves nothing", line)
-        store.make_room(len(block.events) + 3 * _ROWS_AT_ONCE)  # a line may hold any number of them
-        for letter, value in block.events:
-            store.add_event(letter, value, line)
-        for group in ("spindle", "spindle orientation", "coolant", "override"):
-            if group in block.m:
-                store.add_event("M", block.m[group] / 10, line)
-        state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
-        if "spindle mode" in block.g:
-            state.spindle.surface_speed = block.g["spindle mode"] == 960
-            if state.spindle.surface_speed and "S" not in block.value:
-                raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
-        for code in block.g.values():
-            if code in codes.G_EVENTS:
-                store.add_event("G", code / 10, line)
-
-    def _dwell(self, block: Block) -> None:
-        seconds = block.value.get("P")
-        if seconds is not None and self.assumed.printer:
-            seconds *= MILLISECOND
-            self.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
-        elif seconds is None and not self.assumed.strict and (self.assumed.printer or "S" in block.value):
-            seconds = block.value.get("S", 0.0)
-            self.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
-        if seconds is None or seconds < 0:
-            word = block.at["one-shot"] if seconds is None else block.at["P"]
-            raise WordFault(
-                word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5"
-            )
-        self.store.add_dwell(seconds, block.line, self.state)
-=======
     # --- modes ------------------------------------------------------------------------------------------------------------------
->>>>>>> main
 
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g

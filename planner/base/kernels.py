@@ -34,6 +34,7 @@ _LAYOUT = 0x0001 | 0x0002 | 0x0100 | 0x0400
 _SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "none", str: "str"}
 
 _told: Callable[[bool], None] | None = None
+_done: Callable[[], None] | None = None
 _warned = False
 _one_at_a_time = threading.RLock()
 
@@ -42,10 +43,11 @@ class KernelCacheWarning(UserWarning):
     """Compiled kernels cannot be kept."""
 
 
-def at_compilation(tell: Callable[[bool], None] | None) -> None:
-    """Call `tell` whenever a kernel is about to be compiled, with True if it is kept for the next run; None for no more calls."""
-    global _told
-    _told = tell
+def at_compilation(tell: Callable[[bool], None] | None, done: Callable[[], None] | None = None) -> None:
+    """Call `tell` whenever a kernel is about to be compiled, with True if it is kept for the next run, and `done` after it; None for
+    no more calls."""
+    global _told, _done
+    _told, _done = tell, done
 
 
 def known_numba() -> bool:
@@ -105,6 +107,8 @@ class Kernel:
                 if _told is not None:
                     _told(where is not None and _can_be_kept)
                 found = self._compiled(args, where)
+                if _done is not None:
+                    _done()
             self._made[kind] = found
             return found
 

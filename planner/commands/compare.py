@@ -21,16 +21,8 @@ from planner.commands.options import (
     ToleranceOption,
     takes_reading,
 )
-from planner.commands.terminal import (
-    BAD_INPUT,
-    FAILED,
-    NOT_SOLVED,
-    ProgressBar,
-    guarded,
-    memory_used_up,
-    say,
-    show,
-)
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, guarded, memory_used_up, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:

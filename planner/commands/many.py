@@ -24,7 +24,8 @@ from planner.base.errors import InputError
 from planner.base.files import STDIN
 from planner.base.threads import cores
 from planner.commands.interrupt import INTERRUPTED, interrupts_raise
-from planner.commands.terminal import BUG, ProgressBar, say, show
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import BUG, say, show
 
 OUTCOMES = {0: "passed", 1: "failed", 2: "refused", 3: "not solved", INTERRUPTED: "interrupted"}
 ENDING = 5.0  # that processes get to remove what they have half written [s]

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.base.names import OPTIMAL, users_of
+from planner.base.names import METHODS, NORMAL, OPTIMAL, users_of
 from planner.commands.first_run import Helper
 from planner.commands.options import (
     DEFAULT_MACHINE,
@@ -31,7 +31,8 @@ from planner.commands.options import (
     given_options,
     takes_reading,
 )
-from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import Reading
 
 NO_CORNERS = "no corners to list: the program has no corner without a full stop"
@@ -125,7 +126,8 @@ def plan_command(
         return
     (job,) = jobs
     from planner import plan
-    from planner.job.trace import Trace
+    from planner.commands.time_left import TimeLeft
+    from planner.job.trace import Step, Trace
     from planner.report import trace_file
     from planner.report.export import SUMMARY, check_places, summary, write_plan
 
@@ -136,9 +138,18 @@ def plan_command(
     if trace is not None:
         trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
+    left = TimeLeft(
+        solves=METHODS[method].shapes, effort=effort or NORMAL, rounds=rounds, writes=output is not None
+    )
+
+    def log(step: Step) -> None:
+        progress.log(step)
+        if verbose or trace is not None:
+            steps(step)
+
     with (
         Helper(str(machine or DEFAULT_MACHINE), method) as helper,
-        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start) as progress,
+        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start, left=left) as progress,
     ):
         result = plan(
             job,
@@ -153,7 +164,7 @@ def plan_command(
             tolerance=tolerance,
             reading=reading,
             progress=progress,
-            log=steps if verbose or trace is not None else None,
+            log=log,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:

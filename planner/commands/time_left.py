@@ -27,9 +27,12 @@ if TYPE_CHECKING:
 
 ROUND = 4.5  # of the first round, in units
 AFTER, PRICES = 4.5, 2.6  # in units
+FINAL_AFTER = 2.0  # what comes after the final grid, over that, as soon as it is solved [-]
+MORE_ROUNDS = 1.5  # rounds that there are, over those by which gains would fall to `ENOUGH` [-]
+IN_VAIN = 5, 3.0  # after so many rounds there are so many more: that gain too little before they are given up
 AFTER_CORNERS, PRICES_CORNERS = 0.3, 0.6  # where there are no splines, of the one solve
 POINT = 0.85e-6  # of a grid point and an iteration of the solver, on the machine where the others were measured [s]
-SAMPLE = 3.7e-6  # of a sample in a verdict [s]
+SAMPLE = 3.2e-6  # of a sample in a verdict [s]
 WRITTEN = 1.5e-6  # of a sample in the files [s]
 AGAIN = 0.5  # further verdicts to be expected
 SPEED = (0.2, 20.0)  # how slow a machine may be, against that one [-]
@@ -72,6 +75,8 @@ class TimeLeft:
     _splines: bool = False
     _cycle_time: float = 0.0
     _dt: float = math.inf
+    _final: float = math.nan  # what the final grid took [s]
+    _verdict_took: float = math.nan
     _resolution: object = None
     _plans: int = 0
     _round: float = math.nan
@@ -92,6 +97,8 @@ class TimeLeft:
                 self._go(REPORT, now)
             elif name == "write":
                 self._go(DONE, now)
+        elif fraction == 1.0 and name == "verify":
+            self._verdict_took = now - self._began["verify"]
         self._now_in, self._share = name, fraction
 
     def step(self, now: float, step: Step) -> None:
@@ -103,10 +110,13 @@ class TimeLeft:
         elif step.name == "solve":
             self._solved(now, step)
         elif step.name.startswith("reshape") and self._phase == ROUNDS:
-            if "mixed" not in step.name:
+            gain = max(step.gain or 0.0, 0.0)
+            if "mixed" in step.name and self._gains:
+                self._gains[-1] += gain
+            else:
+                self._gains.append(gain)
                 self._round = now - self._since
                 self._since = now
-            self._gains.append(max(step.gain or 0.0, 0.0))
         elif step.name in ("final grid", "between points") and self._phase < FINISH:
             self._go(FINISH, now)
         elif step.name == "plan" and self._phase >= DELIVER:
@@ -123,7 +133,7 @@ class TimeLeft:
         """How much time is left [s]; None as long as nothing is known."""
         write = self._samples() * WRITTEN * self._speed if self.writes else 0.0
         if self._phase == DONE:
-            return self._running(now, "write", write)
+            return self._running(now, "write", write) + (self._verdict(now) if self._plans == 1 else 0.0)
         unit, later = self._unit, write + self._verdict(now)
         if self._phase == BEGIN and self.solves:
             share = self._share if self._now_in == "solve" else 0.0
@@ -135,9 +145,11 @@ class TimeLeft:
         elif not self.solves or self._plans:
             return later
         prices = (PRICES if self._splines else PRICES_CORNERS) * unit
+        after = (AFTER if self._splines else AFTER_CORNERS) * unit
+        if not math.isnan(self._final):
+            after = FINAL_AFTER * self._final
         later += prices if self._phase < REPORT else self._running(now, "report", prices)
         if self._phase <= FINISH:
-            after = (AFTER if self._splines else AFTER_CORNERS) * unit
             later += after if self._phase < FINISH else self._rest(now - self._since, after)
         if self._phase <= ROUNDS and self._splines:
             each = ROUND * unit if math.isnan(self._round) else self._round
@@ -152,7 +164,8 @@ class TimeLeft:
     def _solved(self, now: float, step: Step) -> None:
         resolution = step.facts.get("resolution")
         if self._phase == ROUNDS and resolution != self._resolution:
-            self._go(FINISH, self._began.get("geometry", now))  # the final grid
+            self._final = now - self._began.get("solve", now) + self._grid
+            self._go(FINISH, now)
         if self._phase > ROUNDS:
             return
         self._resolution = resolution
@@ -181,11 +194,14 @@ class TimeLeft:
             sum(math.log(max(g, 0.1 * enough)) for g in self._gains[-LAST_GAINS:])
             / len(self._gains[-LAST_GAINS:])
         )
-        if self._gains[-1] <= enough:
+        if self._gains[-1] <= enough and made <= IN_VAIN[0]:
             return min(most - made, 1.0)
         falling = FALLING if made < 2 else (gain / max(self._gains)) ** (1.0 / (made - 1))
         falling = min(max(falling, FALLING), STEADY)
-        return max(min(most - made, math.log(gain / enough) / -math.log(falling)), 0.0)
+        more = (MORE_ROUNDS if made > 1 else 1.0) * math.log(gain / enough) / -math.log(falling) + (
+            IN_VAIN[1] if made > IN_VAIN[0] else 0.0
+        )
+        return max(min(most - made, more), 0.0)
 
     def _samples(self) -> float:
         return self._cycle_time / self._dt
@@ -193,15 +209,18 @@ class TimeLeft:
     def _verdict(self, now: float) -> float:
         """What is left of verdicts."""
         each = self._samples() * SAMPLE * self._speed
-        rivals = RIVAL * each if self.solves and not self._splines and not self._plans else 0.0
+        if not math.isnan(self._verdict_took):
+            each = self._verdict_took
+        again = AGAIN if self.solves and not self._plans else 0.0
+        rivals = RIVAL * each if self.solves and not self._splines and self._plans < 2 else 0.0
         if self._phase < DELIVER:
-            return (1.0 + AGAIN) * each + rivals
+            return (1.0 + again) * each + rivals
         if self._phase > DELIVER:
             return rivals
         here = self._running(now, "verify", each)
         if self._now_in == "verify":
             each = now - self._began["verify"] + here
-        return here + (0.0 if self._plans else AGAIN ** max(self._verdicts, 1) * each) + rivals
+        return here + again ** max(self._verdicts, 1) * each + (0.0 if self._plans else rivals)
 
     def _running(self, now: float, stage: str, expected: float) -> float:
         """What is left of a stage of which so much time was expected, from the time or the share that it has had."""

@@ -25,7 +25,8 @@ from planner.commands.options import (
     ToleranceOption,
     takes_reading,
 )
-from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import AS_USUAL, Reading
 
 if TYPE_CHECKING:

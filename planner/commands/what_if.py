@@ -19,7 +19,8 @@ from planner.commands.options import (
     takes_planning,
     takes_reading,
 )
-from planner.commands.terminal import FAILED, NOT_SOLVED, ProgressBar, guarded, say, show
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:

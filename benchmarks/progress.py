@@ -23,15 +23,20 @@ from benchmarks import record
 
 ROOT = Path(__file__).resolve().parents[1]
 NC = ROOT.parent / "shared" / "nc"
+SHAPEOKO = NC / "winder__Universal-G-Code-Sender__ShapeOko_Calibration_Pattern_01b.ngc"
 SPIRAL = NC / "vilemduha__blendercam__Spiral.gcode"
-MOMENTS, FROM, CLOSE = 200, 0.2, 1.0  # moments; share of the plan from which on they count; [s] that nobody minds
+MOMENTS, FROM, CLOSE = (
+    200,
+    0.2,
+    1.0,
+)  # moments; share of the plan from which on they count; [s] that nobody minds
 # Name, file, machine, effort, method, lines of the file.
 Job = tuple[str, Path, str, str, str, int | None]
 FITTED: list[Job] = [
     ("bracket", ROOT / "planner" / "examples" / "bracket.ngc", "mill", "normal", "optimal", None),
     ("bracket, quick", ROOT / "planner" / "examples" / "bracket.ngc", "mill", "quick", "optimal", None),
     ("Spiral, 30,000 lines", SPIRAL, "mill", "normal", "optimal", 30_000),
-    ("ShapeOko pattern", NC / "winder__Universal-G-Code-Sender__ShapeOko_Calibration_Pattern_01b.ngc", "router", "normal", "optimal", None),
+    ("ShapeOko pattern", SHAPEOKO, "router", "normal", "optimal", None),
     ("arc spiral", NC / "LinuxCNC__linuxcnc__arcspiral.ngc", "mill", "normal", "optimal", None),
     ("trochoidal", NC / "LinuxCNC__linuxcnc__trochoidal.ngc", "mill", "normal", "optimal", None),
 ]  # fmt: skip
@@ -115,14 +120,34 @@ def main() -> None:
                 print(f"{job[0]}: {job[1]} is not there", file=sys.stderr)
                 continue
             rows.append({"group": group, **measured(job)})
-            print(json.dumps({k: v for k, v in rows[-1].items() if k != "moments"}), file=sys.stderr, flush=True)
-    lines = ["| group | job | machine, method, effort | blocks | planning, CPU s | within two | worst factor |", "|---|---|---|---|---|---|---|"]
-    lines += [
-        f"| {r['group']} | {r['job']} | {r['machine']}, {r['method']}, {r['effort']} | {r['blocks']:,} | {r['planning_cpu_s']:.1f} | "
-        f"{r['within_two']:.0%} | {r['worst']:.1f} |"
-        for r in rows
+            print(
+                json.dumps({k: v for k, v in rows[-1].items() if k != "moments"}), file=sys.stderr, flush=True
+            )
+    columns = [
+        "group",
+        "job",
+        "machine, method, effort",
+        "blocks",
+        "planning, CPU s",
+        "within two",
+        "worst factor",
     ]
-    record.write(given.name, rows, "\n".join(lines))
+    table = record.markdown(
+        columns,
+        [
+            [
+                row["group"],
+                row["job"],
+                f"{row['machine']}, {row['method']}, {row['effort']}",
+                f"{row['blocks']:,}",
+                f"{row['planning_cpu_s']:.1f}",
+                f"{row['within_two']:.0%}",
+                f"{row['worst']:.1f}",
+            ]
+            for row in rows
+        ],
+    )
+    record.write_results(given.name, {"rows": rows}, table)
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from pydantic import (
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.files import require_ending
+from planner.base.names import known_name
 from planner.base.units import RAD_PER_DEG
 from planner.constraints.own import OwnLimit, check_names
 
@@ -269,7 +270,7 @@ def builtin_machines() -> tuple[str, ...]:
 def builtin_text(name: str) -> str:
     """The commented TOML of a built-in machine. Raises InputError for an unknown name."""
     if name not in builtin_machines():
-        raise InputError(f"no built-in machine '{name}'; there are {', '.join(builtin_machines())}")
+        known_name("built-in machine", name, builtin_machines())
     return (resources.files("planner") / "machines" / f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -279,8 +280,10 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())
+        near = difflib.get_close_matches(str(path), builtin_machines(), n=1)
+        hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise InputError(
-            f"machine file not found; give a TOML file or one of the built-in machines: {names}",
+            f"machine file not found; give a TOML file or one of the built-in machines: {names}{hint}",
             source=str(path),
         ) from fault
     except (OSError, UnicodeDecodeError) as fault:

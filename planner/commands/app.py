@@ -23,7 +23,6 @@ HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 app = typer.Typer(
     help="The fastest motion of an NC program within the limits of a machine, planned and verified.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # rich would take longer to import than everything else for --help
     context_settings=HELP_OPTIONS,

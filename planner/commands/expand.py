@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from planner.base.errors import InputError
 from planner.commands.options import DEFAULT_MACHINE, ForceOption, Job, MachineOption, takes_reading
 from planner.commands.terminal import guarded, say
 from planner.nc.reading import Reading
@@ -26,7 +27,8 @@ def expand_command(
     reading: Reading,
 ) -> None:
     """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
-    from planner.base.errors import InputError
+    if force and output is None:
+        raise InputError("--force has no effect without a file to write; name one with -o FILE")
     from planner.machine import load_machine
     from planner.nc.language.flat import flat_program
     from planner.nc.reader import load

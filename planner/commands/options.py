@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,8 +34,11 @@ def _use_threads(count: int | None) -> int | None:
     return count
 
 
-def _choice(name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME") -> Any:
-    """An option that takes a name that `check` knows; it may be an alias."""
+def _choice(
+    name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME", known: Iterable[str] = ()
+) -> Any:
+    """An option that takes a name that `check` knows; it may be an alias. `known` is what a shell offers."""
+    offered = [*known] or metavar.split("|")
 
     def parsed(text: str) -> str:
         try:
@@ -43,11 +46,28 @@ def _choice(name: str, check: Callable[[str], str], help_text: str, metavar: str
         except InputError as fault:
             raise typer.BadParameter(str(fault)) from None
 
-    return typer.Option(name, metavar=metavar, parser=parsed, help=help_text)
+    return typer.Option(
+        name,
+        metavar=metavar,
+        parser=parsed,
+        help=help_text,
+        autocompletion=lambda incomplete: [each for each in offered if each.startswith(incomplete)],
+    )
+
+
+def _machines(incomplete: str) -> list[str]:
+    """Built-in machines and machine files that a shell offers."""
+    from planner.machine import builtin_machines
+
+    folder = Path(incomplete).parent
+    files = [str(file) for file in folder.glob("*.toml")] if folder.is_dir() else []
+    return [name for name in (*builtin_machines(), *files) if name.startswith(incomplete)]
 
 
 SHAPING = " and ".join(names.users_of("geometry"))
-METHOD = _choice("--method", names.method_name, f"how to plan: {', '.join(names.METHODS)}")
+METHOD = _choice(
+    "--method", names.method_name, f"how to plan: {', '.join(names.METHODS)}", known=names.METHODS
+)
 GEOMETRY = _choice(
     "--geometry",
     names.geometry_name,
@@ -65,12 +85,14 @@ EFFORT = _choice(
     "--effort",
     names.effort_name,
     f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
+    known=names.EFFORTS,
 )
 SOLVER = _choice(
     "--solver",
     names.solver_name,
     "solver; the first is the method's default: "
     + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
+    known=names.SOLVERS,
 )
 ROUNDS = typer.Option(
     "--rounds",
@@ -92,6 +114,7 @@ MachineOption = Annotated[
         "--machine",
         metavar="FILE",
         help=f"machine file, or name of a built-in machine (default: {DEFAULT_MACHINE})",
+        autocompletion=_machines,
     ),
 ]
 ToleranceOption = Annotated[

@@ -102,6 +102,13 @@ def plan_command(
         raise InputError(
             "--format is the format of the trajectory in the output directory: name one with -o DIR"
         )
+    for why, ignored in (
+        ("--corners adds to the table, and --json prints none", corners and as_json),
+        ("--verbose tells what --quiet keeps quiet", verbose and quiet),
+        ("--force is for files, and without -o or --trace there are none", force and not (output or trace)),
+    ):
+        if ignored:
+            raise InputError(f"{why}; leave one out")
     if len(jobs) > 1:
         one_by_one = {"--trace": trace, "--verbose": verbose, "--corners": corners}
         for name, value in one_by_one.items():

@@ -30,7 +30,7 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
 
 
-class ProgressBar:
+class ProgressBar(kernels.Compilation):
     """The bar: clock, share of the time, time left, stage. Elsewhere the same as text.
 
     quiet           : print nothing
@@ -62,7 +62,7 @@ class ProgressBar:
     def __enter__(self) -> ProgressBar:
         self._start = time.monotonic()
         self._next_line = self._start + LINE_EVERY
-        kernels.at_compilation(self._compile, self._end_compile)
+        kernels.at_compilation(self)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -98,16 +98,17 @@ class ProgressBar:
         now = self._compiling if self._compiling is not None else time.monotonic()
         return now - self._start - self._compile_time
 
-    def _compile(self, kept: bool) -> None:
-        """Called before a kernel is compiled."""
+    def begins(self, is_kept: bool) -> None:
+        """Say that a kernel is compiled."""
         self._compiled += 1
         self._compiling = time.monotonic()
-        if kept and self._at_first_kernel is not None:
+        if is_kept and self._at_first_kernel is not None:
             self._at_first_kernel()
             self._at_first_kernel = None
-        self._show(f"{COMPILING}: kernel {self._compiled}{f', {KEPT}' if kept else ''}")
+        self._show(f"{COMPILING}: kernel {self._compiled}{f', {KEPT}' if is_kept else ''}")
 
-    def _end_compile(self) -> None:
+    def ends(self) -> None:
+        """Go on."""
         if self._compiling is not None:
             self._compile_time += time.monotonic() - self._compiling
             self._compiling = None

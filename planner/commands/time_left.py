@@ -90,6 +90,7 @@ class TimeLeft:
                 self._grid = now - self._began["geometry"]
             self._began[name] = now
             if name == "sample":
+                self._began.pop("verify", None)  # there is another one to come
                 self._go(DELIVER, now)
             elif name == "verify":
                 self._verdicts += 1

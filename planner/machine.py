@@ -128,9 +128,11 @@ class Times(_Record):
 
 
 class DialectData(_Record):
-    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit."""
+    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit; `lathe`
+    says whether they are a lathe's, or None: their words tell."""
 
     least_increment: Positive | None = None
+    lathe: bool | None = None
 
 
 class Machine(_Record):

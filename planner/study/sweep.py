@@ -39,7 +39,7 @@ def sweep(
     varied: Sequence[Varied],
     folder: SweepFolder,
     cluster: str | None = None,
-    progress: Callable[[int, int, float], None] | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
 ) -> Sweep:
     """Plan all combinations that the folder does not have yet, and keep each as soon as it is done.
 

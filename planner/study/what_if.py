@@ -64,7 +64,8 @@ def what_if(
                 raise
             row = refused(label, fault)
         if not chosen:
-            time, prices = plan.require() and row.cycle_time, plan.prices
+            plan.require()
+            time, prices = row.cycle_time, plan.prices
         assert time is not None
         rows.append(
             WhatIf(

@@ -28,6 +28,7 @@ from planner.commands.progress import ProgressBar
 from planner.commands.terminal import BUG, say, show
 
 OUTCOMES = {0: "passed", 1: "failed", 2: "refused", 3: "not solved", INTERRUPTED: "interrupted"}
+CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
 ENDING = 5.0  # that processes get to remove what they have half written [s]
 
 
@@ -125,8 +126,8 @@ class _Task:
         command = [
             sys.executable,
             "-P",
-            "-m",
-            "planner.commands.many",
+            "-c",
+            CHILD,
             "plan",
             *self._options,
             "--json",
@@ -195,16 +196,13 @@ def _report(rows: Sequence[Done], as_json: bool) -> None:
     show(programs_table([(str(row.job), row.outcome, row.summary, row.said) for row in rows]))
 
 
-def _end_with_the_first() -> None:
-    """End this process, as Ctrl-C does, when the one that has started it ends."""
-    os.read(0, 1)
-    os.kill(os.getpid(), signal.SIGINT)
-
-
-if __name__ == "__main__":
-    from planner.cli import main
-
+def end_with_the_first() -> None:
+    """Let this process end, as Ctrl-C ends it, when the one that has started it ends."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    threading.Thread(target=_end_with_the_first, daemon=True).start()
-    main()
+
+    def wait() -> None:
+        os.read(0, 1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=wait, daemon=True).start()

@@ -79,7 +79,8 @@ def _m_codes(program: Program) -> Array:
     """(E,) numbers of the M codes of a program, in their order, up to its end."""
     events = program.events
     if isinstance(events, EventTable):
-        return events.value[events.letter == ord("M")]
+        found: Array = events.value[events.letter == ord("M")]
+        return found
     return np.array([float(event.text[1:]) for event in events if event.text[0] == "M"])
 
 

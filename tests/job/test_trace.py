@@ -59,7 +59,10 @@ def test_second_order_is_told_likewise_and_other_methods_in_a_line():
     SecondOrderMethod(rounds=1).plan(program, machine, log=second)
     assert {"splines", "solve", "reshape 1", "plan"} <= {step.name for step in second.steps}
     StopMethod().plan(program, machine, log=stop)
-    assert [(step.name, step.facts["method"]) for step in stop.steps] == [("plan", "stop")]
+    assert [(step.name, step.facts.get("method")) for step in stop.steps] == [
+        ("programmed feed", None),
+        ("plan", "stop"),
+    ]
 
 
 def test_lines_of_a_table():

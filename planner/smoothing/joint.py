@@ -52,7 +52,7 @@ HELD = (
 )
 
 
-class Limits(NamedTuple):
+class MotionLimits(NamedTuple):
     """What the motion of A axes keeps."""
 
     axes: FloatArray  # (3, A) velocity, acceleration and jerk
@@ -68,7 +68,7 @@ class Improved(NamedTuple):
     iterations: FloatArray  # (Q,) of its windows together
 
 
-class Run(NamedTuple):
+class JointRun(NamedTuple):
     """One run that is improved: n control points, in the A axes that it moves in."""
 
     corridor: Corridor  # in all axes
@@ -218,7 +218,7 @@ def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, ag
         places = places_of_run(knots, own, motion, bound, _columns(limits.axes, moving), first, last)
         free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
         pulled = limits.pulled[moving]
-        run = Run(
+        run = JointRun(
             run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, pull[q], gap, again
         )  # fmt: skip
         y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)
@@ -237,7 +237,7 @@ def improve(
     used: FloatArray,
     motion: SplineMotion,
     bound: FloatArray,
-    limits: Limits,
+    limits: MotionLimits,
     pull: FloatArray,
     gap: float,
     again: int,

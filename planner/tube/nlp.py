@@ -40,6 +40,7 @@ import numpy as np
 
 from planner.base.packages import import_needed
 from planner.tube.guess import Guess
+from planner.tube.motion import steps_of
 from planner.tube.numbers import acceleration_along, step_numbers
 from planner.tube.outcome import BROKE_DOWN, OUTCOMES, SOLVED, STUCK, TubeSolution
 from planner.tube.run import TubeRun
@@ -92,9 +93,9 @@ class TubeNLP:
         for slower in SLOWER:
             found = self._solve(run, guess.slower(slower))
             iterations, took = iterations + found.iterations, took + found.solve_time
-            if found.h is not None and found.h.sum() > guess.h.sum() * (1.0 + NOT_SLOWER):
+            if found.steps is not None and found.steps.h.sum() > guess.h.sum() * (1.0 + NOT_SLOWER):
                 found = TubeSolution(status=STUCK[0], sentence=STUCK[1], iterations=0, solve_time=0.0)
-            if found.h is not None:
+            if found.steps is not None:
                 break
         return replace(found, iterations=iterations, solve_time=took)
 
@@ -248,8 +249,7 @@ class TubeNLP:
             sentence=sentence,
             iterations=iterations,
             solve_time=took,
-            h=found[:, axes] * second,
-            jerk=found[:, :axes] * jerk,
+            steps=steps_of(run, guess, found[:, axes] * second, found[:, :axes] * jerk),
             place=nodes[:, -1] * mean_step,
         )
 

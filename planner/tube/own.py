@@ -1,0 +1,176 @@
+"""The free optimum by an own solver: window by window along a run, each by the interior-point method of interior_point.py.
+
+A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join exactly. They overlap:
+each begins inside the one before, where that has found its optimum. A window that does not converge, that breaks something when its
+steps are integrated and looked at exactly (checks.py), or that is not faster, is divided; what is left of that keeps the motion that the
+search began with, and is said.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.feedrate.solution import Status
+from planner.tube.checks import Keeps, worst_shares
+from planner.tube.guess import Guess
+from planner.tube.interior_point import ITERATIONS, Tuning, solve
+from planner.tube.motion import Steps, closed, integrated
+from planner.tube.nlp import PULL
+from planner.tube.outcome import TubeSolution
+from planner.tube.problem import window_of
+from planner.tube.rows import Legs
+from planner.tube.run import TubeRun
+
+# Steps of a window, of its overlap with the next one, and of the smallest part that one which fails is divided into.
+WINDOW, OVERLAP, LEAST = 1000, 150, 60
+# A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
+JOIN_WITHIN = 40
+# Rounding of limits, as a share of them [-].
+ROUNDING = 1e-9
+DEBUG = True
+KEPT = "no faster motion was found there"
+FOUND = "the best motion near its start, geometry and feed together"
+
+
+@dataclass(frozen=True)
+class TubeOwn:
+    """Settings of the search.
+
+    gap  : complementarity at its end, share of the time [-]
+    prox : what a change of a step's duration costs in one iteration [-]
+    """
+
+    gap: float = 1e-5
+    prox: float = 0.1
+
+    def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
+        """The best motion near the guess, never slower than it. Where no faster one is found its steps are `kept`."""
+        began, search = time.perf_counter(), _Search(self, run, guess)
+        search.sweep()
+        took = time.perf_counter() - began
+        if search.kept.all():
+            status, sentence = search.failed or Status.ACCEPTABLE, "the search did not end faster than its start"
+            return TubeSolution(
+                status=status, sentence=sentence, iterations=search.iterations, solve_time=took
+            )
+        share = float(search.guess.h[search.kept].sum() / guess.h.sum())
+        sentence = FOUND if not share else f"{FOUND}; on {share:.2g} of the time {KEPT}"
+        return TubeSolution(
+            status=Status.ACCEPTABLE if share else Status.OPTIMAL,
+            sentence=sentence,
+            iterations=search.iterations,
+            solve_time=took,
+            steps=search.steps(),
+            place=search.places(),
+            kept=search.kept,
+        )
+
+
+class _Search:
+    """A run on its way from a guess to the optimum near it."""
+
+    def __init__(self, settings: TubeOwn, run: TubeRun, guess: Guess):
+        self.run, self.guess = run, guess
+        self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
+        self.kept = np.ones(len(guess), dtype=bool)
+        self.iterations, self.failed = 0, None
+        self._tuning = Tuning(PULL, settings.prox, 1.5, 0.0, ITERATIONS, settings.gap)
+        self._keeps = _keeps(run)
+        self._strain = _strain(run, guess)
+
+    def sweep(self) -> None:
+        """All windows, one after the other."""
+        lo, steps = 0, len(self.guess)
+        while True:
+            hi = steps if steps - lo <= WINDOW + OVERLAP else self._join(lo + WINDOW)
+            self._improve(lo, hi)
+            if hi == steps:
+                return
+            lo = self._join(hi - OVERLAP)
+
+    def steps(self) -> Steps:
+        """The steps; those that are kept as they were guessed."""
+        p, v, a = (self.guess.state[:-1, k] for k in range(3))
+        return Steps(h=self.guess.h, position=p, velocity=v, acceleration=a, jerk=self.jerk)
+
+    def places(self) -> FloatArray:
+        """(N+1,) of the nodes along the run [mm]."""
+        return np.append(self.guess.place[:, 0], self.run.offset[-1])
+
+    def _join(self, near: int) -> int:
+        """A node to join windows at."""
+        begin = near - JOIN_WITHIN
+        return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
+
+    def _improve(self, lo: int, hi: int) -> None:
+        """The steps lo .. hi - 1, and where that fails both halves of them."""
+        if self._improved(lo, hi) or hi - lo < 2 * LEAST:
+            return
+        middle = (lo + hi) // 2
+        reach = min(JOIN_WITHIN, (hi - lo) // 4)
+        middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
+        self._improve(lo, middle)
+        self._improve(middle, hi)
+
+    def _improved(self, lo: int, hi: int) -> bool:
+        """Whether the steps lo .. hi - 1 have found their optimum, which then takes their place."""
+        window = window_of(self.run, self.guess, lo, hi)
+        x, u, place = window.x, window.u, window.place
+        done, iterations, log = solve(window.legs, window.limits, x, u, place, self._tuning)
+        self.iterations += iterations
+        if not done:
+            if DEBUG: print("   ", lo, hi, "not done", log[-1] if iterations == ITERATIONS else log[max(iterations,0)])
+            self.failed = Status.ITERATION_LIMIT
+            return False
+        axes = len(self.run.axis)
+        h = u[:, axes] * window.second
+        before, state = self.guess.h[lo:hi], self.guess.state[lo : hi + 1]
+        jerk = closed(state[0], state[-1], h, u[:, :axes] * (window.length / window.second**3))
+        found = integrated(state[0], h, jerk)
+        found[-1] = state[-1]
+        leg, place = self.guess.leg[lo:hi], place * window.length
+        limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
+        if DEBUG: print("   ", lo, hi, iterations, "limit", limit - 1, "tube", tube - 1, "T", before.sum(), h.sum())
+        if not (limit <= 1.0 + ROUNDING and tube <= 1.0 and h.sum() < before.sum()):
+            return False
+        along = self.guess.place.copy()
+        along[lo:hi, :3] = place + self.run.offset[leg][:, None]
+        whole_h, whole = self.guess.h.copy(), self.guess.state.copy()
+        whole_h[lo:hi], whole[lo : hi + 1], self.jerk[lo:hi] = h, found, jerk
+        self.guess = replace(self.guess, h=whole_h, state=whole, place=along)
+        self.kept[lo:hi] = False
+        return True
+
+
+def _keeps(run: TubeRun) -> Keeps:
+    """What the run has to keep, for the kernel."""
+    names = ("length", "base", "drift", "e1", "e2", "radius", "rate")
+    return Keeps(
+        legs=Legs(**{name: getattr(run, name) for name in names}),
+        velocity=run.velocity,
+        acceleration=run.acceleration,
+        jerk=run.jerk,
+        feed=run.feed,
+        normal=run.across_max,
+        budget=run.budget,
+        curvature=run.curvature,
+        vertex_budget=run.vertex_budget,
+    )
+
+
+def _strain(run: TubeRun, guess: Guess) -> FloatArray:
+    """(N,) the largest share of a limit or of the tolerance that a motion uses at the beginning of each step."""
+    leg: Array = guess.leg
+    p, v, a = (guess.state[:-1, k] for k in range(3))
+    far = np.linalg.norm(p - run.points(leg, guess.place[:, 0] - run.offset[leg]), axis=1) / run.room[leg]
+    shares = (
+        far,
+        (np.abs(v) / run.velocity).max(axis=1),
+        np.linalg.norm(v, axis=1) / run.feed[leg],
+        (np.abs(a) / run.acceleration).max(axis=1),
+    )
+    return np.max(shares, axis=0)

@@ -20,7 +20,8 @@ from planner.tube.rows import VECTORS, Legs, Linear, StepLimits, linearise, slop
 LEAST_SLACK = 0.05  # of a start [-]
 FIRST_GAP = 0.3  # complementarity of the start, share of the time [-]
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
-MISSED = 1e-7  # by how much a row may be missed at the end [-]
+MISSED = 1e-6  # by how much a row may be missed at the end [-]: limits are narrowed by more (problem.py)
+LOST = 1e3  # complementarity beyond which a search does not come back, share of the time [-]
 OFF = 1e-8  # largest gap of the kinematics at the end, in mean steps [-]
 ITERATIONS = 100
 
@@ -100,6 +101,8 @@ def solve(legs, limits, x, u, place, tuning):
             prox = min(prox * tuning.freeze, 100.0)
         if settled and missed <= MISSED and off <= OFF:
             return True, iteration, log
+        if not products <= LOST * time:
+            return False, iteration, log
         turned = factorise(x, u, limits, lin, z, ratio, lam, pull + prox, tuning.exact, factor)
         log[iteration, 4] = turned
         if turned < 0:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,7 +32,7 @@ WINDOW, OVERLAP, LEAST = 1000, 150, 60
 JOIN_WITHIN = 40
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
-DEBUG = True
+DEBUG = False
 KEPT = "no faster motion was found there"
 FOUND = "the best motion near its start, geometry and feed together"
 
@@ -46,6 +47,7 @@ class TubeOwn:
 
     gap: float = 1e-5
     prox: float = 0.1
+    legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
         """The best motion near the guess, never slower than it. Where no faster one is found its steps are `kept`."""

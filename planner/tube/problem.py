@@ -83,10 +83,14 @@ def _limits(run: TubeRun, guess: Guess, lo: int, hi: int, units: tuple[float, fl
     h = guess.h[lo:hi] / second
     longer = LONGER_WATCHED if np.isfinite(run.across_max[leg]).any() else LONGER
     curved = run.curvature[leg] > 0
+    on = _present(run, leg, at_vertex)
+    for step, node in ((0, lo), (-1, hi)):  # where a run begins or ends, the middle ordinate of the velocity is 0 for every motion
+        if node in (0, len(guess)):
+            on[step, 8 * len(run.axis) + rows.ORDER_MID] = False
     return StepLimits(
         leg=leg,
         at_vertex=at_vertex,
-        on=_present(run, leg, at_vertex),
+        on=on,
         box=axes * inside,
         room=room / length,
         room_node=room_node / length,
@@ -103,8 +107,7 @@ def _limits(run: TubeRun, guess: Guess, lo: int, hi: int, units: tuple[float, fl
 
 
 def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray:
-    """(N, R) the rows that there are; those of the first node are not asked for, it stays. Where a run begins or ends the middle
-    ordinate of the velocity is 0 for every motion."""
+    """(N, R) the rows that there are; those of the first node are not asked for, it stays."""
     axes = len(run.axis)
     on = np.ones((len(leg), rows.count(axes)), dtype=bool)
     more = on[:, 8 * axes :]
@@ -112,7 +115,6 @@ def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray
     on[:, 4 * axes : 8 * axes] = velocity
     more[:, rows.FEED_NODE : rows.TUBE_NODE] = (run.feed[leg] < np.linalg.norm(run.velocity)).any()
     more[at_vertex, rows.ORDER_NODE] = False
-    more[[0, -1], rows.ORDER_MID] = False
     limited = np.isfinite(run.across_max[leg])
     more[~limited, rows.NORMAL_NODE] = more[~limited, rows.NORMAL_MID] = False
     more[run.curvature[leg] == 0, rows.ARC] = False

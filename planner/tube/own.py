@@ -18,11 +18,11 @@ from planner.base.arrays import Array, FloatArray
 from planner.feedrate.solution import Status
 from planner.tube.checks import Keeps, worst_shares
 from planner.tube.guess import Guess
-from planner.tube.interior_point import ITERATIONS, Tuning, solve
+from planner.tube.interior_point import Tuning, solve
 from planner.tube.motion import Steps, closed, integrated
 from planner.tube.nlp import PULL
 from planner.tube.outcome import TubeSolution
-from planner.tube.problem import window_of
+from planner.tube.problem import Window, window_of
 from planner.tube.rows import Legs
 from planner.tube.run import TubeRun
 
@@ -30,9 +30,11 @@ from planner.tube.run import TubeRun
 WINDOW, OVERLAP, LEAST = 1000, 150, 60
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
 JOIN_WITHIN = 40
+# What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do not converge with the
+# first do with the second (pentagon on mill), and the other way round.
+PROX = 0.1, 1.0
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
-DEBUG = False
 KEPT = "no faster motion was found there"
 FOUND = "the best motion near its start, geometry and feed together"
 
@@ -41,12 +43,10 @@ FOUND = "the best motion near its start, geometry and feed together"
 class TubeOwn:
     """Settings of the search.
 
-    gap  : complementarity at its end, share of the time [-]
-    prox : what a change of a step's duration costs in one iteration [-]
+    gap : complementarity at its end, share of the time [-]
     """
 
     gap: float = 1e-5
-    prox: float = 0.1
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -55,9 +55,11 @@ class TubeOwn:
         search.sweep()
         took = time.perf_counter() - began
         if search.kept.all():
-            status, sentence = search.failed or Status.ACCEPTABLE, "the search did not end faster than its start"
             return TubeSolution(
-                status=status, sentence=sentence, iterations=search.iterations, solve_time=took
+                status=Status.ITERATION_LIMIT,
+                sentence="the search did not end faster than its start",
+                iterations=search.iterations,
+                solve_time=took,
             )
         share = float(search.guess.h[search.kept].sum() / guess.h.sum())
         sentence = FOUND if not share else f"{FOUND}; on {share:.2g} of the time {KEPT}"
@@ -76,11 +78,10 @@ class _Search:
     """A run on its way from a guess to the optimum near it."""
 
     def __init__(self, settings: TubeOwn, run: TubeRun, guess: Guess):
-        self.run, self.guess = run, guess
+        self.settings, self.run, self.guess = settings, run, guess
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
-        self.iterations, self.failed = 0, None
-        self._tuning = Tuning(PULL, settings.prox, 1.5, 0.0, ITERATIONS, settings.gap)
+        self.iterations = 0
         self._keeps = _keeps(run)
         self._strain = _strain(run, guess)
 
@@ -109,42 +110,48 @@ class _Search:
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
     def _improve(self, lo: int, hi: int) -> None:
-        """The steps lo .. hi - 1, and where that fails both halves of them."""
+        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found."""
         if self._improved(lo, hi) or hi - lo < 2 * LEAST:
             return
         middle = (lo + hi) // 2
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
         middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
+        before = float(self.guess.h[lo:hi].sum())
         self._improve(lo, middle)
         self._improve(middle, hi)
+        if self.guess.h[lo:hi].sum() < before:
+            self._improved(lo, hi)
 
     def _improved(self, lo: int, hi: int) -> bool:
-        """Whether the steps lo .. hi - 1 have found their optimum, which then takes their place."""
-        window = window_of(self.run, self.guess, lo, hi)
-        x, u, place = window.x, window.u, window.place
-        done, iterations, log = solve(window.legs, window.limits, x, u, place, self._tuning)
-        self.iterations += iterations
-        if not done:
-            if DEBUG: print("   ", lo, hi, "not done", log[-1] if iterations == ITERATIONS else log[max(iterations,0)])
-            self.failed = Status.ITERATION_LIMIT
-            return False
-        axes = len(self.run.axis)
-        h = u[:, axes] * window.second
-        before, state = self.guess.h[lo:hi], self.guess.state[lo : hi + 1]
-        jerk = closed(state[0], state[-1], h, u[:, :axes] * (window.length / window.second**3))
+        """Whether an optimum of the steps lo .. hi - 1 was found; if it is faster it takes their place."""
+        for prox in PROX:
+            window = window_of(self.run, self.guess, lo, hi)
+            x, u, place = window.x, window.u, window.place
+            tuning = Tuning(PULL, prox, self.settings.gap)
+            done, iterations = solve(window.legs, window.limits, x, u, place, tuning)
+            self.iterations += iterations
+            if done and self._taken(lo, hi, window):
+                return True
+        return False
+
+    def _taken(self, lo: int, hi: int, window: Window) -> bool:
+        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place."""
+        run, axes = self.run, len(self.run.axis)
+        h = window.u[:, axes] * window.second
+        state, leg = self.guess.state[lo : hi + 1], self.guess.leg[lo:hi]
+        jerk = closed(state[0], state[-1], h, window.u[:, :axes] * (window.length / window.second**3))
         found = integrated(state[0], h, jerk)
         found[-1] = state[-1]
-        leg, place = self.guess.leg[lo:hi], place * window.length
+        place = window.place * window.length
         limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
-        if DEBUG: print("   ", lo, hi, iterations, "limit", limit - 1, "tube", tube - 1, "T", before.sum(), h.sum())
-        if not (limit <= 1.0 + ROUNDING and tube <= 1.0 and h.sum() < before.sum()):
+        if not (limit <= 1.0 + ROUNDING and tube <= 1.0):
             return False
-        along = self.guess.place.copy()
-        along[lo:hi, :3] = place + self.run.offset[leg][:, None]
-        whole_h, whole = self.guess.h.copy(), self.guess.state.copy()
-        whole_h[lo:hi], whole[lo : hi + 1], self.jerk[lo:hi] = h, found, jerk
-        self.guess = replace(self.guess, h=whole_h, state=whole, place=along)
-        self.kept[lo:hi] = False
+        if h.sum() < self.guess.h[lo:hi].sum():
+            along, whole_h, whole = (getattr(self.guess, name).copy() for name in ("place", "h", "state"))
+            along[lo:hi, :3] = place + run.offset[leg][:, None]
+            whole_h[lo:hi], whole[lo : hi + 1], self.jerk[lo:hi] = h, found, jerk
+            self.guess = replace(self.guess, h=whole_h, state=whole, place=along)
+            self.kept[lo:hi] = False
         return True
 
 

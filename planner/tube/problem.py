@@ -84,7 +84,10 @@ def _limits(run: TubeRun, guess: Guess, lo: int, hi: int, units: tuple[float, fl
     longer = LONGER_WATCHED if np.isfinite(run.across_max[leg]).any() else LONGER
     curved = run.curvature[leg] > 0
     on = _present(run, leg, at_vertex)
-    for step, node in ((0, lo), (-1, hi)):  # where a run begins or ends, the middle ordinate of the velocity is 0 for every motion
+    for step, node in (
+        (0, lo),
+        (-1, hi),
+    ):  # where a run begins or ends, the middle ordinate of the velocity is 0 for every motion
         if node in (0, len(guess)):
             on[step, 8 * len(run.axis) + rows.ORDER_MID] = False
     return StepLimits(

@@ -12,9 +12,7 @@ V(dx) = 1/2 dx'P dx + p'dx of all that follows, back from the last node,
 The first node stays. The last one does too: its gap e costs rho/2 e'e + lambda'e, and lambda takes over what is missing with every
 step (a method of multipliers).
 
-W holds the curvature of rows and kinematics, the latter weighted with lambda, which may make it indefinite. h is the last control, and
-its pivot is what the curvature of the time itself leaves: where it is not positive it is turned into its absolute value, so that the
-step goes down.
+W holds the curvature of the rows, sum of z d2g + (z/s) grad g grad g', and is positive.
 """
 
 from __future__ import annotations
@@ -25,10 +23,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.tube.rows import C1, C2, FEED_NODE, FEED_ROWS, LONG, MID, NORMAL_MID, NORMAL_NODE, TUBE_NODE, VECTORS, vector_of
+from planner.tube.rows import FEED_NODE, FEED_ROWS, NORMAL_MID, NORMAL_NODE, TUBE_NODE, VECTORS, vector_of
 
-END = 1e9  # rho [-]
-PIVOT = 1e-6  # smallest pivot of h, share of what was summed up in it [-]
+END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 
 
 class Factor(NamedTuple):
@@ -60,28 +57,9 @@ def _add_vector(W, axes, alpha, e, G):
 
 
 @njit(cache=True, error_model="numpy")
-def _add_curvature(W, axes, x, u, Z, after, exact):
-    """W += `exact` times the second derivatives of the vectors, weighted with Z (13, A), and of the kinematics, with lambda behind the
-    step (3 A,)."""
-    h, row = u[axes], 4 * axes
-    for k in range(axes):
-        a, j = x[2 * axes + k], u[k]
-        lp, lv, la = after[k], after[axes + k], after[2 * axes + k]
-        W[row, axes + k] += exact * (lp + Z[C1, k] / 3.0 + 2.0 * Z[C2, k] / 3.0 + Z[LONG, k])
-        W[row, 2 * axes + k] += exact * (
-            lp * h + lv + 0.5 * Z[MID, k] + Z[C2, k] * h / 3.0 + Z[LONG, k] * h
-        )
-        W[row, 3 * axes + k] += exact * (0.5 * lp * h * h + lv * h + la)
-        W[row, row] += exact * (
-            lp * (a + h * j) + lv * j + (Z[C2, k] / 3.0 + Z[LONG, k]) * a
-        )
-
-
-@njit(cache=True, error_model="numpy")
-def _model(W, Z, G, lin, limits, i, z, ratio, of, axes):
-    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with multipliers z (R,) and z/s (R,), and Z (13, A) of them."""
+def _model(W, G, lin, limits, i, z, ratio, of, axes):
+    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with multipliers z (R,) and z/s (R,); G (13, A, A) is overwritten."""
     W[:] = 0.0
-    Z[:] = 0.0
     G[:] = 0.0
     more = 8 * axes
     for r in range(len(of)):
@@ -94,10 +72,8 @@ def _model(W, Z, G, lin, limits, i, z, ratio, of, axes):
         if r < more:
             k = r % axes
             G[m, k, k] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, k]
-            Z[m, k] += z[r] * lin.n[i, r, k]
             continue
         for k in range(axes):
-            Z[m, k] += z[r] * lin.n[i, r, k]
             for t in range(axes):
                 G[m, k, t] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, t]
         kind, flat = r - more, 0.0
@@ -146,25 +122,24 @@ def _times_transposed(M, h, axes, out):
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(x, u, limits, lin, z, ratio, after, pull, exact, factor):
-    """The recursion into `factor`; after (N, 3 A) is lambda behind every step, pull the weight of ((h - limits.h)/limits.h)^2. Returns
-    how many pivots of h were turned, or -1 where a jerk's is not positive."""
+def factorise(x, u, limits, lin, z, ratio, pull, factor):
+    """The recursion into `factor`, with multipliers z (N, R), z/s (N, R), and `pull`, the weight of (dh/limits.h)^2. False where it
+    breaks down."""
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
     size, R = S + C, lin.g.shape[1]
-    W, Z, G = np.empty((size, size)), np.empty((VECTORS, axes)), np.empty((VECTORS, axes, axes))
+    W, G = np.empty((size, size)), np.empty((VECTORS, axes, axes))
     of = np.array([vector_of(r, axes) for r in range(R)])
     PA, APA, PB, by_h = np.empty((S, S)), np.empty((S, S)), np.empty((S, C)), np.empty(S)
-    Hux, Huu, turned = np.empty((C, S)), np.empty((C, C)), 0
+    Hux, Huu = np.empty((C, S)), np.empty((C, C))
     P = factor.P
     P[N] = 0.0
     for k in range(S):
         P[N, k, k] = END
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
-        _model(W, Z, G, lin, limits, i, z[i], ratio[i], of, axes)
+        _model(W, G, lin, limits, i, z[i], ratio[i], of, axes)
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
-        _add_curvature(W, axes, x[i], u[i], Z, after[i], exact)
         step_of_h(x[i], u[i], axes, by_h)
         # P is symmetric: (P A)' = A'P
         _times_transposed(own, h, axes, PA)  # A'P, (S, S)
@@ -174,14 +149,16 @@ def factorise(x, u, limits, lin, z, ratio, after, pull, exact, factor):
                 total += own[c, m] * by_h[m]
             PB[c, axes] = total
             for k in range(axes):
-                PB[c, k] = h * (
-                    own[c, 2 * axes + k] + h * (0.5 * own[c, axes + k] + h * own[c, k] / 6.0)
-                )
+                PB[c, k] = h * (own[c, 2 * axes + k] + h * (0.5 * own[c, axes + k] + h * own[c, k] / 6.0))
         # A'PA from A'P: its columns
         for row in range(S):
             for k in range(axes):
                 p, v, a = PA[row, k], PA[row, axes + k], PA[row, 2 * axes + k]
-                APA[row, k], APA[row, axes + k], APA[row, 2 * axes + k] = p, h * p + v, h * (0.5 * h * p + v) + a
+                APA[row, k], APA[row, axes + k], APA[row, 2 * axes + k] = (
+                    p,
+                    h * p + v,
+                    h * (0.5 * h * p + v) + a,
+                )
         # B'PA = (A'PB)', W_ux from the lower triangle
         for c in range(C):
             for k in range(axes):
@@ -208,15 +185,9 @@ def factorise(x, u, limits, lin, z, ratio, after, pull, exact, factor):
                     total -= L[c, m] * L[d, m]
                 if c != d:
                     L[c, d] = total / L[d, d]
-                elif c < axes:
-                    if not total > 0.0:
-                        return -1
-                    L[c, c] = np.sqrt(total)
                 else:
-                    least = PIVOT * (abs(Huu[c, c]) + 2.0 * pull / limits.h[i] ** 2)
-                    if not total > least:
-                        turned += 1
-                        total = max(-total, least)
+                    if not total > 0.0:
+                        return False
                     L[c, c] = np.sqrt(total)
         K = factor.K[i]
         for s in range(S):
@@ -239,7 +210,7 @@ def factorise(x, u, limits, lin, z, ratio, after, pull, exact, factor):
                 for m in range(c + 1, C):
                     total -= L[m, c] * K[m, s]
                 K[c, s] = total / L[c, c]
-    return turned
+    return True
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,8 +8,8 @@ no certificate that there is no better one elsewhere.
 2. Methods of `starts` make motions from which the search begins (tube/guess.py): the first one's, and where that does not lead to a
    faster one the next one's.
 3. A solver finds the motion: the own one window by window (tube/own.py), ipopt a whole run at a time.
-4. Where no search ends faster than the first start, its motion stays, run by run and window by window (tube/parts.py): the plan is never
-   slower.
+4. Where no search ends faster than the first start, its motion stays, run by run and window by window (tube/parts.py): the plan is
+   never slower.
 """
 
 from __future__ import annotations

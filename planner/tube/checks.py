@@ -1,9 +1,9 @@
 """Whether steps keep everything exactly: their limits at every time, and the tolerance by the control points of their cubics.
 
-Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed has degree 4: it is looked
-at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is looked at in
-the same places. For the tolerance see nlp.py: control points within the budget of places on the leg that never go back, and on arcs
-kappa (s3 - s0)^2/8 for the bending between them.
+Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed has degree 4: it is
+looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is
+looked at in the same places. For the tolerance see nlp.py: control points within the budget of places on the leg that never go back,
+and on arcs kappa (s3 - s0)^2/8 for the bending between them.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.tube.recursion import Factor, direction, factorise, forces, gaps
-from planner.tube.rows import VECTORS, Legs, Linear, StepLimits, linearise, slopes
+from planner.tube.rows import VECTORS, Linear, linearise, slopes
 
 LEAST_SLACK = 0.05  # of a start [-]
 FIRST_GAP = 0.3  # complementarity of the start, share of the time [-]
@@ -117,7 +117,7 @@ def solve(legs, limits, x, u, place, tuning):
     reached, and the iterations."""
     N, axes = len(u), u.shape[1] - 1
     R, S, C, on = limits.on.shape[1], 3 * axes, axes + 1, limits.on
-    many, few = (N, R), (N, axes)
+    many = (N, R)
     n, alpha, e, tangent = (
         np.zeros((N, R, axes)),
         np.zeros((N, VECTORS, 4)),

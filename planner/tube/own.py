@@ -2,8 +2,8 @@
 
 A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join exactly. They overlap:
 each begins inside the one before, where that has found its optimum. A window that does not converge, that breaks something when its
-steps are integrated and looked at exactly (checks.py), or that is not faster, is divided; what is left of that keeps the motion that the
-search began with, and is said.
+steps are integrated and looked at exactly (checks.py) is divided; what is left of that keeps the motion that the search began with, and
+is said.
 """
 
 from __future__ import annotations

@@ -14,8 +14,7 @@ from planner.tube.numbers import ROUNDING, pace
 from planner.tube.rows import Legs, StepLimits
 from planner.tube.run import TubeRun
 
-# Limits are narrowed by this fraction [-], so that what a row may be missed by, the closing jerks, and the feed between the places where
-# it is kept stay inside them.
+# Limits are narrowed by this fraction [-], so that what a row may be missed by and the closing jerks stay inside them.
 NARROWED = 2e-6
 # Of the largest length of a step on an arc [-]: h (v + a h/2) stands for it, which leaves out h3 j/6.
 STEP_SHARE = 0.95

@@ -11,8 +11,6 @@ from benchmarks import problems
 from planner.geometry.build import toolpath_from_program
 from planner.methods.optimal import OptimalMethod
 from planner.methods.tube import TubeMethod
-from planner.motion.timing import dense_motion
-from planner.motion.trajectory import joined
 from planner.motion.vertex_times import passing_times
 from planner.nc.reader import parse_program
 from planner.tube import own, rows
@@ -29,8 +27,9 @@ from planner.tube.solvers import SOLVERS
 MACHINE = problems.machine()
 CORNER = problems.polyline([[0, 0], [4, 0], [4, 4]])
 ARCS = parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n")
-# Both solvers leave a share of 1e-5 to 1e-4 of complementarity, and ipopt keeps the feed at Bezier ordinates of the velocity [-].
-SAME = 2e-4
+# Both solvers leave a share of 1e-5 to 1e-4 of complementarity, and ipopt keeps the feed at Bezier ordinates of the velocity [-]. On
+# arcs the own one's steps may be 5 % shorter (problem.py), which here is 5e-4 of the time.
+SAME = {"corner": 2e-4, "arcs": 1e-3, "pentagon": 2e-4}
 
 
 @cache
@@ -153,7 +152,7 @@ def test_the_recursion_solves_the_system_of_all_steps():
 
 
 def test_shares_are_those_of_a_fine_sampling():
-    run, guess = begun("corner")
+    run, _ = begun("corner")
     steps = 20
     rng = np.random.default_rng(5)
     h, jerk = rng.uniform(1e-3, 4e-3, steps), run.jerk * rng.uniform(-1.0, 1.0, (steps, 2))
@@ -181,7 +180,7 @@ def test_ipopt_finds_the_same(name):
     assert mine.steps is not None
     assert mine.kept is not None
     assert not mine.kept.any()
-    assert mine.steps.h.sum() == pytest.approx(other.steps.h.sum(), rel=SAME)
+    assert mine.steps.h.sum() == pytest.approx(other.steps.h.sum(), rel=SAME[name])
     assert mine.steps.h.sum() < guess.h.sum() * (1 - 1e-3)
 
 
@@ -190,6 +189,7 @@ def test_windows_find_what_the_whole_run_finds(monkeypatch):
     whole = TubeOwn().solve(run, guess)
     monkeypatch.setattr(own, "WINDOW", len(guess) // 3)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 8)
+    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     parts = TubeOwn().solve(run, guess)
     assert parts.steps is not None
     assert whole.steps is not None
@@ -225,12 +225,9 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     assert made.verdict.passed, made.verdict.faults
     assert own.KEPT in made.sentence
     assert made.trajectory.cycle_time < start.plan(job, MACHINE).trajectory.cycle_time
-    motion = (
-        joined(list(dense_motion(made.trajectory_motion, 1e-4)))
-        if hasattr(made, "trajectory_motion")
-        else None
-    )
-    assert motion is None or np.isfinite(motion.position).all()
+    seen, dt = made.trajectory, MACHINE.dt
+    for column, rate in ((seen.position, 100.0), (seen.velocity, 2000.0), (seen.acceleration, 2e5)):
+        assert np.abs(np.diff(column, axis=0)).max() <= rate * dt * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("k", [0.1, 7.0])

@@ -98,6 +98,9 @@ def speed() -> None:
 
 
 if __name__ == "__main__":
-    sys.path[:0] = [str(TESTS / "language"), str(TESTS), str(TESTS.parent)]
+    language = TESTS / "language"
+    sys.path[:0] = [str(language / name) for name in ("linuxcnc", "fanuc")] + [
+        str(language), str(TESTS), str(TESTS.parent)
+    ]  # fmt: skip
     command, *rest = sys.argv[1:] or ["speed"]
     {"agree": agree, "fuzz": fuzz}[command](int(rest[0]) if rest else 1000) if command != "speed" else speed()

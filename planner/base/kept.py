@@ -44,7 +44,7 @@ class Kept(NamedTuple):
     code: bytes
 
 
-class Place(NamedTuple):
+class KernelName(NamedTuple):
     """A file name without its folder: what stays the same when a kernel changes, and what does not.
 
     single : whether no other kernel has the same first part, as those have that are made by one function
@@ -60,17 +60,17 @@ class Place(NamedTuple):
         return f"{self.kernel}.{self.version}.kernel"
 
 
-def place(function: FunctionType, content: bytes, arguments: object) -> Place:
+def place(function: FunctionType, content: bytes, arguments: object) -> KernelName:
     """The file name of the kernel of a function with this `content_of`, for arguments of these types."""
     where = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     of = hashlib.sha256(repr((function.__module__, arguments, sys.implementation.cache_tag)).encode())
     version = hashlib.sha256(content + _surroundings())
     named = re.sub(r"[^\w.]", "", where)[:80]
     single = "<" not in function.__qualname__
-    return Place(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
+    return KernelName(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
 
 
-def read(where: Place) -> Kept | None:
+def read(where: KernelName) -> Kept | None:
     """The kernel of this name, or None. Raises OSError if it is there and cannot be read."""
     for folder in folders():
         try:
@@ -83,7 +83,7 @@ def read(where: Place) -> Kept | None:
     return None
 
 
-def write(where: Place, kernel: Kept) -> None:
+def write(where: KernelName, kernel: Kept) -> None:
     """Keep a kernel, in place of its old versions. Raises OSError if it can be written nowhere."""
     faults: list[OSError] = []
     for folder in folders():

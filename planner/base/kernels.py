@@ -108,7 +108,7 @@ class Kernel:
             self._made[kind] = found
             return found
 
-    def _loaded(self, where: kept.Place) -> Callable[..., Any] | None:
+    def _loaded(self, where: kept.KernelName) -> Callable[..., Any] | None:
         try:
             kernel = kept.read(where)
         except OSError as fault:
@@ -122,7 +122,7 @@ class Kernel:
         self.loaded += 1
         return found
 
-    def _compiled(self, args: tuple[Any, ...], where: kept.Place | None) -> Callable[..., Any]:
+    def _compiled(self, args: tuple[Any, ...], where: kept.KernelName | None) -> Callable[..., Any]:
         from planner.base.compiling import compiled, to_keep
 
         made = compiled(self.dispatcher, args)

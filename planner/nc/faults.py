@@ -51,6 +51,44 @@ class FaultList(Sequence[Fault]):
         return Fault(line, words.column(word), words.text(word), message, words.file(word))
 
 
+class Findings:
+    """What is found while a program is read in chunks: faults by word, and notes on what was assumed.
+
+    faults : of the chunks so far, in the order of their words; a line that is executed many times is named once
+    """
+
+    def __init__(self) -> None:
+        self.faults: list[tuple[Words, int, str]] = []
+        self._reports: list[tuple[int, str]] = []  # of the chunk that is being read
+        self._said: set[tuple[int, str]] = set()
+        self._notes: dict[str, list[int]] = {}  # in their order: first line, times
+
+    def report(self, word: int, message: str) -> None:
+        """Keep a fault of a word of the chunk, by its index."""
+        self._reports.append((word, message))
+
+    def keep(self, words: Words, more: list[tuple[int, str]]) -> None:
+        """End a chunk: keep its reports and `more` of them in the order of its words."""
+        for word, message in sorted(more + self._reports):
+            key = (int(words.at[word]), message)
+            if key not in self._said:
+                self._said.add(key)
+                self.faults.append((words, word, message))
+        self._reports.clear()
+
+    def note(self, text: str, line: int) -> None:
+        """Keep what was assumed on a line."""
+        self._notes.setdefault(text, [line, 0])[1] += 1
+
+    def notes(self, more: list[tuple[int, str]]) -> tuple[str, ...]:
+        """What was assumed, each once, with its first line and how often; `more` are a line and a text each."""
+        found = [
+            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
+            for text, (line, times) in self._notes.items()
+        ]
+        return tuple(text for _, text in sorted(found + more, key=lambda note: note[0]))
+
+
 def require_none(faults: Sequence[Fault], source: str) -> None:
     """Raise InputError for the first fault, with the number of the others."""
     if not faults:

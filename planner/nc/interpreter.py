@@ -17,30 +17,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc import codes, compensation, drilling, feeds, homing, moves, offsets, signals, threads
+from planner.nc import auxiliary, codes, compensation, drilling, feeds, homing, moves, offsets, threads
 from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block, read_block
 from planner.nc.cutter import Cutter, CutterFault
-from planner.nc.faults import FaultList
+from planner.nc.faults import FaultList, Findings
 from planner.nc.lexer import Words
-from planner.nc.moves import WordFault, integer
+from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
-from planner.nc.program import MOVES, Frame, Kind, PathControl, Program
+from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
+# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
 _COVET_AXES = (100, 280, 300, 520, 920)
-_PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
-# make room for themselves.
-_ROWS_AT_ONCE = 4
-_SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
-
-
 _WHY_NO_MOTION = {
     NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
     REFUSED_MOTION: "an axis word under a motion code that is not supported",
@@ -53,6 +46,7 @@ class Interpreter:
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
     open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
+    by_word : rows that were executed word by word, not by the compiled loop
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -66,16 +60,14 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
+        self.by_word = 0
         self._cutter: Cutter | None = None
         self._words: Words | None = None  # of the last chunk
         self._splines = SplineReader()
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
-        self._reports: list[tuple[int, str]] = []
-        self._found: list[tuple[Words, int, str]] = []
-        self._said: set[tuple[int, str]] = set()
-        self._notes: dict[str, list[int]] = {}  # in their order: first line, times
+        self.found = Findings()
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
@@ -90,26 +82,23 @@ class Interpreter:
         try:
             self._cutter.fix()
         except CutterFault as fault:
-            self._found.append((self._words, len(self._words.letter) - 1, str(fault)))
+            self.found.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed, each once, with its first line and how often."""
-        found = [
-            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
-            for text, (line, times) in self._notes.items()
-        ]
-        return tuple(text for _, text in sorted(found + self.assumed.notes(), key=lambda note: note[0]))
+        return self.found.notes(self.assumed.notes())
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
         row, rows, self._words = 0, len(words.line), words
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
-            self.store.make_room(rows - row + 3 * _ROWS_AT_ONCE)
+            self.store.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
             after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
+                self.by_word += 1
                 self.store.frame = int(words.frame[after])
                 block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:
@@ -121,7 +110,11 @@ class Interpreter:
             row = after
         self._read = row
         self._splines.keep(words)
-        self._keep_faults(words)
+        refused = self.store.refused_word[: self.store.refusals]
+        letters = words.letter[refused]
+        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
+        found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
+        self.found.keep(words, found)
         self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
@@ -138,28 +131,15 @@ class Interpreter:
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
-        self._reports.append((word, message))
-
-    def faults(self) -> FaultList:
-        """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self._found + self._splines.faults())
-
-    def _keep_faults(self, words: Words) -> None:
-        """Keep the chunk's faults in the order of its words."""
-        refused = self.store.refused_word[: self.store.refusals]
-        letters = words.letter[refused]
-        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
-        found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
-        for word, message in sorted(found + self._reports):
-            key = (int(words.at[word]), message)
-            if key not in self._said:
-                self._said.add(key)
-                self._found.append((words, word, message))
-        self._reports.clear()
+        self.found.report(word, message)
 
     def note(self, text: str, line: int) -> None:
         """Keep what was assumed on a line."""
-        self._notes.setdefault(text, [line, 0])[1] += 1
+        self.found.note(text, line)
+
+    def faults(self) -> FaultList:
+        """All faults in the order of the program; a line that is executed many times is named once."""
+        return FaultList(self.found.faults + self._splines.faults())
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
@@ -183,11 +163,11 @@ class Interpreter:
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
         if self._cutter is not None:
-            compensation.check_words(self.state, block)
+            compensation.check_unchanged(self.state, block)
         feeds.set_feed(self.state, block, self.note)
-        self._events(block)
+        auxiliary.events(self.state, self.store, block, self.note)
         if block.g.get("one-shot") == 40:
-            self._dwell(block)
+            auxiliary.dwell(self.state, self.store, block, self.assumed, self.note)
         self._modes(block)
         if not block.foreign:
             self._check_parked(block)
@@ -205,59 +185,7 @@ class Interpreter:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
-    # --- what is said before anything moves -------------------------------------------------------------------------------
-
-    def _events(self, block: Block) -> None:
-        state, store, line = self.state, self.store, block.line
-        if "S" in block.value:
-            if block.value["S"] < 0:
-                raise WordFault(
-                    block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
-                )
-            store.add_event("S", block.value["S"], line)
-            state.spindle.speed = block.value["S"]
-        if "T" in block.value:
-            state.tool_selected = integer(block, "T", 0)
-            store.add_event("T", state.tool_selected, line)
-        if "signals" in block.m:
-            signals.signal(self.store, block)
-        if "tool number" in block.m:
-            if "Q" not in block.value:
-                raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
-            state.tool_loaded = integer(block, "Q", 0)
-        if "tool change" in block.m:
-            state.tool_loaded = state.tool_selected
-            store.add(Kind.STOP, line, state)
-            self.note("a tool change is a full stop that takes no time and moves nothing", line)
-        store.make_room(len(block.events) + 3 * _ROWS_AT_ONCE)  # a line may hold any number of them
-        for letter, value in block.events:
-            store.add_event(letter, value, line)
-        for group in ("spindle", "spindle orientation", "coolant", "override"):
-            if group in block.m:
-                store.add_event("M", block.m[group] / 10, line)
-        state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
-        if "spindle mode" in block.g:
-            state.spindle.surface_speed = block.g["spindle mode"] == 960
-            if state.spindle.surface_speed and "S" not in block.value:
-                raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
-        for code in block.g.values():
-            if code in codes.G_EVENTS:
-                store.add_event("G", code / 10, line)
-
-    def _dwell(self, block: Block) -> None:
-        seconds = block.value.get("P")
-        if seconds is not None and self.assumed.printer:
-            seconds *= MILLISECOND
-            self.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
-        elif seconds is None and not self.assumed.strict and (self.assumed.printer or "S" in block.value):
-            seconds = block.value.get("S", 0.0)
-            self.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
-        if seconds is None or seconds < 0:
-            word = block.at["one-shot"] if seconds is None else block.at["P"]
-            raise WordFault(
-                word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5"
-            )
-        self.store.add_dwell(seconds, block.line, self.state)
+    # --- modes ------------------------------------------------------------------------------------------------------------------
 
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
@@ -278,7 +206,7 @@ class Interpreter:
             if state.system not in state.systems and state.system != 540:
                 self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0", block.line)
         if "path control" in g:
-            self._path_control(block)
+            auxiliary.path_control(state, block, self.note)
         if "distance mode" in g:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
@@ -286,20 +214,6 @@ class Interpreter:
         if "retract mode" in g:
             state.to_level, state.retract_given = g["retract mode"] == 980, True
         state.apply_offsets()
-
-    def _path_control(self, block: Block) -> None:
-        state = self.state
-        state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
-        if "P" in block.value and block.g["path control"] == 640:
-            tolerance = block.value["P"]
-            if tolerance < 0:
-                raise WordFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
-            if tolerance > 0:
-                state.tolerance = tolerance * state.unit
-            else:
-                self.note("G64 P0 gives no tolerance; the machine's holds", block.line)
-        if "Q" in block.value:
-            self.note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)
 
     # --- what moves ---------------------------------------------------------------------------------------------------------
 
@@ -360,7 +274,7 @@ class Interpreter:
         if state.motion < 0:
             raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
         if not self.assumed.strict:
-            self._take_default_feed(block)
+            feeds.take_default(state, self.setup.feed_default, block, self.note)
         if state.motion not in codes.CYCLES:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
@@ -377,15 +291,6 @@ class Interpreter:
         else:
             self._move(block)
 
-    def _take_default_feed(self, block: Block) -> None:
-        """The machine's feed for a feed move before the first F word."""
-        state, default = self.state, self.setup.feed_default
-        if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
-            return
-        state.feed = default
-        feed = default * SECONDS_PER_MINUTE / state.unit
-        self.note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
-
     def _move(self, block: Block) -> None:
         """G0, G1, G2, G3."""
         state, cutter = self.state, self._cutter
@@ -398,11 +303,29 @@ class Interpreter:
             return
         if kind == Kind.LINE:
             feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+        if kind == Kind.LINE and feeds.on_surface(state):
+            radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
+            state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
+            if cutter is None:
+                self._on_surface(block, target, *radii)
+                return
         if cutter is not None:
             cutter.line(target, kind, block.line)
             return
         state.position[:], state.actual = target, None
         self.store.add(kind, block.line, state)
+
+    def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
+        """A straight move in parts, each with the feed of its larger radius."""
+        state, start, at = self.state, self.state.place.copy(), begin
+        parts = feeds.surface_parts(state, begin, end)
+        self.store.make_room(len(parts))
+        for part in parts:
+            there = begin + part * (end - begin)
+            state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
+            state.position[:] = target if part == 1.0 else start + part * (target - start)
+            state.actual, at = None, there
+            self.store.add(Kind.LINE, block.line, state)
 
     def _arc(self, block: Block, target: FloatArray) -> None:
         state = self.state
@@ -413,6 +336,10 @@ class Interpreter:
             )
         try:
             arc, normal = moves.arc(state, block, target)
+            if feeds.on_surface(state):
+                centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
+                size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
+                state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
             feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
             if self._cutter is not None:
                 self._cutter.arc(target, arc, block.line)
@@ -442,7 +369,7 @@ class Interpreter:
         if found is None:
             return
         if not self.assumed.strict:
-            self._take_default_feed(block)
+            feeds.take_default(state, self.setup.feed_default, block, self.note)
         feeds.check_feed(state, block)
         (points, weights), line = found
         state.position[:] = points[-1, -1]

@@ -14,7 +14,7 @@ import dataclasses
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import Array
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
@@ -32,8 +32,8 @@ COMPARED_POINTS = 1_000_000  # some 10 s and 1 GB
 # usual one's points (22.7 and 213 for each corner on chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 
-# Corners that take so many times as long as splines on the coarse grid are not tried on the final one [-]: times on the coarse grid are
-# up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
+# Corners that on the grid of the rounds take so many times as long as splines on the final one are not tried there [-]: times on the
+# coarse grid are up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
 CLOSE = 1.01
 FASTER = (
     1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap
@@ -59,7 +59,6 @@ def corner_bounds(
 def with_corners(
     rounded: SmoothPath,
     best: OnPath,
-    coarse: FloatArray,
     corners: CornerBounds,
     job: Job,
     order: Order,
@@ -69,7 +68,6 @@ def with_corners(
     out.
 
     rounded : the path with the corners that the splines of `best` replace
-    coarse  : (G,) times between full stops on the same splines on the grid of the rounds, on which most corners are ruled out [s]
     corners : bounds on the motion on them
     grids   : of the rounds, and the final one, of `best`
     """
@@ -83,17 +81,15 @@ def with_corners(
         return dataclasses.replace(planned, shape=shape) if planned.solution.solved else best, none
     piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
     chosen = np.zeros(len(corners.time), dtype=bool)
-    chosen[piece[shape.laid.fits]] = True  # elsewhere there is nothing to choose
+    chosen[piece[shape.splines.fits]] = True  # elsewhere there is nothing to choose
     gain = best.stop_to_stop() - corners.time
     chosen &= gain > 0.0
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
-    for resolution, splines, fraction in (
-        (grids.rounds, coarse, CLOSE),
-        (grids.final, best.stop_to_stop(), 1.0),
-    ):
+    splines = best.stop_to_stop()
+    for resolution, fraction in ((grids.rounds, CLOSE), (grids.final, 1.0)):
         if not chosen.any():
             return best, left
         planned = order.solve(rounded.part(chosen), job, resolution)
@@ -105,6 +101,8 @@ def with_corners(
         chosen[chosen] = faster
     if not chosen.any() or (before - time)[faster].sum() < FASTER * best.solution.cycle_time:
         return best, left
-    mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=shape.laid.fits & ~chosen[piece]))
+    mixed = dataclasses.replace(
+        shape, splines=shape.splines._replace(fits=shape.splines.fits & ~chosen[piece])
+    )
     planned = order.solve(with_spline(rounded, mixed), job, grids.final, [best])
     return dataclasses.replace(planned, shape=mixed) if planned.faster_than(best) else best, left

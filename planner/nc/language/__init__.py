@@ -3,12 +3,13 @@
 In reading order:
 
     tree        what a program says: expressions and statements, in no language's spelling
-    compiled    statements to Python source, compiled once
+    compiled    statements to Python source, compiled once: `expressions` in `basic_blocks`
     rows        what the running program appends: row after row, given to the interpreter in chunks
     run         the running program: its parameters, calls and limits
     asked       parameters that hold the state of the control
+    arithmetic  operators and functions that all dialects have
     spelling    expressions and words as RS274NGC and Fanuc spell them
-    linuxcnc    O words to statements;  fanuc: macro statements, M98, M99, G65 to statements
+    linuxcnc, fanuc, heidenhain, siemens    a folder for each dialect: its text to statements
     source      the lines of a program: which are plain words, which belong to the language
     expand      a program through all of this;  flat: the expanded program as text
 

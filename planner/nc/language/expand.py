@@ -12,20 +12,26 @@ from pathlib import Path
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
-from planner.nc.language import fanuc, linuxcnc
 from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, PositionAsked
 from planner.nc.language.compiled import ProgramFault, compile_procedures
+from planner.nc.language.fanuc import text as fanuc_text
+from planner.nc.language.fanuc.calls import files as fanuc_files
+from planner.nc.language.fanuc.lathe import LatheParser
+from planner.nc.language.fanuc.lathe_words import LatheAsked
+from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
-from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
-from planner.nc.language.rows import Rows
-from planner.nc.language.run import Run
+from planner.nc.language.heidenhain.parser import HeidenhainParser
+from planner.nc.language.linuxcnc import text as linuxcnc_text
+from planner.nc.language.linuxcnc.parser import LinuxcncParser
+from planner.nc.language.rows import AppendedRows
+from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import text as siemens_text
-from planner.nc.language.siemens.parser import Parser as SiemensParser
+from planner.nc.language.siemens.parser import SiemensParser
 from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
-from planner.nc.reading import FANUC, HEIDENHAIN, LINUXCNC, SIEMENS
+from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS
 
 ENTRIES_MAX = 10_000  # files and folders that are looked at for a called file
 FILE_MAX = 100_000_000  # bytes of a called file
@@ -46,9 +52,9 @@ def expand(
 
     Nothing is run if a line cannot be read; otherwise the program is run to its end, or to what stops it.
     """
-    rows = Rows()
+    rows = AppendedRows()
     front = _FRONTS[dialect]
-    run = Run(interpreter, rows, front.language, front.asked(interpreter))
+    run = ProgramRun(interpreter, rows, front.language, front.asked(interpreter))
     run.tee = tee or run.tee
     files = _Files(run, rows, front, integers)
     found = files.read(words, interpreter.source)
@@ -61,7 +67,10 @@ def expand(
     program = dataclasses.replace(
         interpreter.program(run.frames),
         expansion=Expansion(
-            dialect=dialect, calls=tuple(run.calls.items()), turns=run.turns, rows=run.executed
+            dialect=FANUC if dialect == LATHE else dialect,
+            calls=tuple(run.calls.items()),
+            turns=run.turns,
+            rows=run.executed,
         ),
     )
     return program, [*faults, *interpreter.faults()]
@@ -79,9 +88,10 @@ class _Front:
 
 _FRONTS = {
     LINUXCNC: _Front(
-        linuxcnc.LANGUAGE, LinuxcncAsked, linuxcnc.Parser, lambda name: frozenset({f"{name}.ngc"})
+        linuxcnc_text.LANGUAGE, LinuxcncAsked, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
     ),
-    FANUC: _Front(fanuc.LANGUAGE, FanucAsked, fanuc.Parser, fanuc.files),
+    FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
+    LATHE: _Front(fanuc_text.LANGUAGE, LatheAsked, LatheParser, fanuc_files),
     HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, lambda name: frozenset()),
 }
@@ -90,7 +100,7 @@ _FRONTS = {
 class _Files:
     """The files of a program: its own, and those in its folder that it calls."""
 
-    def __init__(self, run: Run, rows: Rows, front: _Front, integers: Integers):
+    def __init__(self, run: ProgramRun, rows: AppendedRows, front: _Front, integers: Integers):
         self.run, self.rows, self.front, self.integers = run, rows, front, integers
         self.sources: list[Source] = []
         run.load = self.load

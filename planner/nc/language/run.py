@@ -3,8 +3,8 @@
 Rows go to the interpreter in chunks. A parameter that holds the state of the control (a position, an offset, the tool) is asked of the
 interpreter after everything pending has been executed.
 
-A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows, `IDLE_MAX` rows without a
-move, or at `DEPTH_MAX` open calls, with a sentence that names the line.
+A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows (`BY_WORD_MAX` that are no
+plain straight moves), `IDLE_MAX` rows without a move, or at `DEPTH_MAX` open calls, with a sentence that names the line.
 """
 
 from __future__ import annotations
@@ -13,22 +13,28 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
-from planner.nc.language.rows import NotFinite, Rows
-from planner.nc.language.tree import Language, Place, ProgramFault
+from planner.nc.language.rows import AppendedRows, NotFinite
+from planner.nc.language.tree import Language, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
 TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: some ten seconds of computing
-IDLE_MAX = 100_000  # rows one after the other that neither move nor stop: a loop that only switches something never ends
+IDLE_MAX = 20_000  # rows one after the other that neither move nor stop: a loop that only switches something never ends
 ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
 DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
-ROWS_AT_ONCE = 100_000  # rows that are executed together
+BY_WORD_MAX = 500_000  # rows that are no plain straight moves: they take 0.1 ms each, a minute in all
+ROWS_AT_ONCE = 100_000  # rows that are executed together, at most
+IDLE_AT_ONCE = 2_000  # rows that are executed together at first, and as long as nothing moves
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
+
+if TYPE_CHECKING:
+    from planner.nc.language.fanuc.lathe_cycles import LatheCycles
 
 Load = Callable[[str], bool]
 
@@ -37,7 +43,7 @@ class Ended(Exception):
     """The program has come to its end."""
 
 
-class Run:
+class ProgramRun:
     """One run of a compiled program.
 
     numbered : values of the numbered parameters, by number
@@ -45,7 +51,7 @@ class Run:
     resume   : the label where the caller of a procedure goes on, or None
     """
 
-    def __init__(self, interpreter: Interpreter, rows: Rows, language: Language, asked: Asked):
+    def __init__(self, interpreter: Interpreter, rows: AppendedRows, language: Language, asked: Asked):
         self.interpreter, self.rows, self.language, self.asked = interpreter, rows, language, asked
         self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
         if language.vacant is None:
@@ -69,6 +75,8 @@ class Run:
         self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
+        self._lathe: LatheCycles | None = None
+        self._at_once = IDLE_AT_ONCE
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
@@ -80,7 +88,7 @@ class Run:
         except ProgramFault as fault:
             return self._stopped(fault)
         except NotFinite as fault:
-            place = Place(self._file_at(fault.at), fault.line, fault.at)
+            place = SourcePlace(self._file_at(fault.at), fault.line, fault.at)
             return ProgramFault(place, f"the computed {fault.letter} word is infinite")
         except (ArithmeticError, ValueError, KeyError) as fault:
             return self._stopped(ProgramFault(self._place(fault.__traceback__), _sentence(fault)))
@@ -110,15 +118,23 @@ class Run:
         if self.turns > TURNS_MAX:
             raise _Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
-        if pending > ROWS_AT_ONCE:
+        if pending > self._at_once:
             blocks = self.interpreter.store.blocks
             self.flush()
-            self.idle = 0 if self.interpreter.store.blocks > blocks else self.idle + pending
+            moved = self.interpreter.store.blocks > blocks
+            self.idle = 0 if moved else self.idle + pending
+            self._at_once = min(2 * self._at_once, ROWS_AT_ONCE) if moved else IDLE_AT_ONCE
             if self.idle > IDLE_MAX:
                 raise _Endless(f"{self.idle:,} lines executed without a move")
+            if self.interpreter.by_word > BY_WORD_MAX:
+                raise _Endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
         if self.executed + pending > ROWS_MAX:
             raise _Endless(f"{ROWS_MAX:,} lines executed")
         return 0
+
+    def goes_on(self) -> None:
+        """A loop that cannot end goes on. Raises ValueError."""
+        raise ValueError("this loop never ends: nothing in it changes its condition, and nothing leaves it")
 
     def call(
         self,
@@ -142,7 +158,7 @@ class Run:
         for _ in range(count):
             self.turns += 1
             self.calls[str(name)] += 1
-            if not self.turns & 127 or len(self.rows.pending) > ROWS_AT_ONCE:
+            if not self.turns & 127 or len(self.rows.pending) > self._at_once:
                 self.tick(0)
             if arguments is None:
                 value = function(self, {})
@@ -221,6 +237,14 @@ class Run:
         elif not self._restored_at_return[-1]:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
 
+    def turning(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
+        """Do a part of a lathe's cycle."""
+        if self._lathe is None:
+            from planner.nc.language.fanuc.lathe_cycles import LatheCycles  # 3 ms, for lathes
+
+            self._lathe = LatheCycles(self)
+        self._lathe.act(action, letters, place)
+
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""
         if whole(number) not in blocks:
@@ -271,7 +295,7 @@ class Run:
             self.flush()
         return ProgramFault(fault.place, message)
 
-    def _place(self, traceback: TracebackType | None) -> Place:
+    def _place(self, traceback: TracebackType | None) -> SourcePlace:
         """The statement that a traceback ends in."""
         place = None
         while traceback is not None:
@@ -290,7 +314,7 @@ class _Endless(ValueError):
     def __init__(self, what: str):
         super().__init__(
             f"stopped after {what}: does this loop end? if it does, split the program "
-            "(limits: TURNS_MAX, ROWS_MAX in planner.nc.language.run)"
+            "(limits: TURNS_MAX, ROWS_MAX, BY_WORD_MAX in planner.nc.language.run)"
         )
 
 

@@ -11,10 +11,18 @@ of a chamfer its own number; both moves end and begin there. CT's centre lies on
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, field
-
-from planner.nc.language.asked import FIRST_POSITION
+from planner.nc.language.heidenhain.items import (
+    CORNER,
+    DIRECTION,
+    POLAR,
+    POLE,
+    POSITION,
+    Items,
+    X,
+    Y,
+    absolute,
+    word,
+)
 from planner.nc.language.heidenhain.text import (
     ConversationalBlock,
     minus,
@@ -23,111 +31,24 @@ from planner.nc.language.heidenhain.text import (
     plus,
     quotient,
     times,
-    value,
 )
 from planner.nc.language.spelling import NEGATIVE
 from planner.nc.language.tree import (
+    ONE,
+    TWO,
+    ZERO,
     Expression,
     If,
     Line,
     Named,
     Number,
-    Numbered,
     Parameter,
-    Place,
+    SourcePlace,
     Statement,
     Word,
 )
 
-_ITEM = re.compile(
-    r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
-    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+))",
-    re.IGNORECASE,
-)
-X, Y, Z = own("x"), own("y"), own("z")
-POSITION = {"X": X, "Y": Y, "Z": Z}
-POLE = own("cx"), own("cy")
-DIRECTION = own("dx"), own("dy")
-POLAR = own("pr"), own("pa")
-CORNER = own("px"), own("py")  # of a rounding or chamfer
-ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)
 STRAIGHT = 1e-9  # turn below which there is nothing to round [sine of the angle]
-
-
-@dataclass
-class Items:
-    """What stands behind a path function.
-
-    axes    : absolute or incremental ("I") coordinates by letter
-    polar   : PA, PR, IPA, IPR
-    turn    : -1 for DR-, 1 for DR+, 0 where it is not given
-    radius  : R of CR
-    feed    : F with a number;  fast : FMAX;  automatic : F AUTO
-    codes   : M codes, each with its column
-    """
-
-    axes: dict[str, tuple[Expression, bool]] = field(default_factory=dict)
-    polar: dict[str, Expression] = field(default_factory=dict)
-    turn: int = 0
-    radius: Expression | None = None
-    feed: Expression | None = None
-    fast: bool = False
-    automatic: bool = False
-    codes: list[tuple[int, int]] = field(default_factory=list)
-
-
-def items(block: ConversationalBlock, column: int) -> Items:
-    """Read what stands behind the function. Raises ProgramFault for what a path function does not take here."""
-    found, text = Items(), block.text
-    while text[column:].strip():
-        item = _ITEM.match(text, column)
-        if item is None:
-            raise block.fault(
-                f"{text[column:].split()[0]} is not read here",
-                column + len(text[column:]) - len(text[column:].lstrip()),
-            )
-        at, column = item.start() + len(item.group()) - len(item.group().lstrip()), item.end()
-        if item["axis"]:
-            name = item["axis"].upper()
-            if name[-1] not in "XYZ":
-                raise block.fault(f"axis {name[-1]} is not planned; X, Y and Z are", at)
-            given, column = value(block, column)
-            if name[-1] in found.axes:
-                raise block.fault(f"a second {name[-1]} in this block", at)
-            found.axes[name[-1]] = (given, name[0] == "I")
-        elif item["polar"]:
-            found.polar[item["polar"].upper()], column = value(block, column)
-        elif item["turn"]:
-            found.turn = 1 if item["turn"] == "+" else -1
-        elif item["comp"]:
-            if item["comp"].upper() != "R0":
-                raise block.fault(
-                    "radius compensation of the conversational language is not read; program the centre of the tool and R0",
-                    at,
-                )
-        elif item["radius"]:
-            found.radius, column = value(block, column)
-        elif item["fast"]:
-            found.fast, found.automatic = item["fast"].upper() == "MAX", item["fast"].upper() == "AUTO"
-        elif item["unit"]:
-            raise block.fault(
-                f"{item['unit'].upper()}, a feed per tooth, turn or time, is not read; write F in mm/min", at
-            )
-        elif item["feed"]:
-            found.feed, column = value(block, column)
-        else:
-            found.codes.append((int(item["code"]), at))
-    return found
-
-
-def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
-    """The absolute coordinate."""
-    return plus(POSITION[axis], given[0]) if given[1] else given[0]
-
-
-def word(letter: str, at: int, given: Expression) -> Word:
-    """A word of a row."""
-    return Word(ord(letter), at, given)
 
 
 class Moves:
@@ -347,21 +268,9 @@ class Moves:
             raise block.fault("after RND or CHF a straight move is expected; write the tangent points out")
 
 
-def _unit(place: Place, vector: tuple[Named, Named]) -> Line:
+def _unit(place: SourcePlace, vector: tuple[Named, Named]) -> Line:
     """Divide a vector by its length."""
     length = of("LEN", *vector)
     return Line(
         place, (), ((vector[0], quotient(vector[0], length)), (vector[1], quotient(vector[1], length)))
     )
-
-
-def looked_up(block: ConversationalBlock) -> Line:
-    """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
-    where = [Numbered(Number(float(FIRST_POSITION + k))) for k in range(3)]
-    return Line(block.place, (), tuple(zip((X, Y, Z), where, strict=True)))
-
-
-def refuse_arc_axes(block: ConversationalBlock, given: Items) -> None:
-    """Arcs of C, CR and CT lie in the plane. Raises ProgramFault."""
-    if "Z" in given.axes:
-        raise block.fault("an arc with Z; a helix is written as CP with IPA")

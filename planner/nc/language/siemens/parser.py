@@ -4,7 +4,7 @@
                X Y Z I J K with = AC() IC(), CR= TURN= F S T D M, N
     language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n
     commands   SUPA, TRANS and ATRANS, MSG, MCALL and CYCLE81 82 83, CYCLE832 (tolerance), CYCLE800() (no tilt), and those that do not
-               move anything (`_IDLE`)
+               move anything (`codes.IDLE`)
 
 Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line, for AC and IC.
 
@@ -20,94 +20,39 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.language.siemens import drilling
-from planner.nc.language.siemens.control import ONE, ZERO, Control
-from planner.nc.language.siemens.text import TokenReader, operation, position, variable
+from planner.nc.language.siemens import codes, drilling
+from planner.nc.language.siemens.commands import Commands, as_word
+from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Expression,
     Line,
-    Message,
     Number,
     Parameter,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
-    Statement,
+    SourcePlace,
     Word,
 )
 
-_PLAIN_LETTERS = "NGXYZIJKFSM"
-_SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 40, 54, 55, 56, 57, 90, 91, 94)
-# G codes of Siemens that are others here; an empty tuple changes nothing.
-_CODES: dict[int, tuple[float, ...]] = {
-    9: (),  # exact stop of one block; a full stop is added behind it
-    53: (53.0,),
-    60: (61.1,),
-    64: (64.0,),
-    **dict.fromkeys((642, 643, 644, 645), (64.0,)),
-    70: (20.0,),
-    71: (21.0,),
-    500: (54.0,),
-    700: (20.0,),
-    710: (21.0,),
-    **dict.fromkeys((450, 451, 601, 602, 603, 621, 95 * 100), ()),
-}
-_IDLE = frozenset(
-    (
-        *("FNORM", "FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE"),
-        *("COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF", "UPATH", "SPATH", "FIFOCTRL", "STOPRE"),
-        *(
-            "ORIWKS",
-            "ORIMKS",
-            "ORIAXES",
-            "ORIVECT",
-            "ORIMACHAX",
-            "ORIVIRT1",
-            "TRAFOOF",
-            "TOFRAMEOF",
-            "PAROTOF",
-            "TOWSTD",
-        ),
-        *(
-            "CUT2D",
-            "CUT2DF",
-            "CDON",
-            "CDOF",
-            "CDOF2",
-            "NORM",
-            "KONT",
-            "DIAMOF",
-            "CFC",
-            "CFIN",
-            "CFTCP",
-            "RTLION",
-            "RTLIOF",
-        ),
-    )
-)
-_IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "SPOS", "LIMS"))
-_TYPES = frozenset(("REAL", "INT", "BOOL"))
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
-class Parser(Control):
+class SiemensParser(Commands):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
         super().__init__()
         self.source = source
         self.faults: list[ProgramFault] = []
-        self.names = {"_DEPTH", "_STEP"}
-        self.absolute = True
-        self.unit = 1.0
-        self.cycle: list[Statement] | None = None  # MCALL
 
     def parse(self) -> list[Procedure]:
         """The main program, under the empty name."""
-        start = Place(self.source.file, 1, self.source.begin)
+        start = SourcePlace(self.source.file, 1, self.source.begin)
         special = self._special()
         done, rows = 0, len(self.source.words.line)
         for row in [*special, rows]:
@@ -133,8 +78,8 @@ class Parser(Control):
         """Rows, ascending, that are not words of the same meaning in RS274NGC."""
         words = self.source.words
         letter, value = words.letter, words.value
-        same = np.isin(letter, [ord(c) for c in _PLAIN_LETTERS])
-        same &= (letter != ord("G")) | np.isin(value, _SAME_CODES)
+        same = np.isin(letter, [ord(c) for c in codes.PLAIN_LETTERS])
+        same &= (letter != ord("G")) | np.isin(value, codes.SAME_CODES)
         same &= (letter != ord("M")) | (value != 17)
         found = np.unique(np.searchsorted(words.first, np.flatnonzero(~same), side="right") - 1)
         return [int(row) for row in found if letter[words.first[row]] != ord("%")]
@@ -195,7 +140,7 @@ class Parser(Control):
         """A row of words, commands that move nothing, and assignments."""
         words: list[Word] = []
         assigned: list[tuple[Parameter, Expression]] = []
-        codes: set[float] = set()
+        found: set[float] = set()
         wait: list[Word] = []
         stops = moved = False
         while not reader.ended:
@@ -206,10 +151,10 @@ class Parser(Control):
                 raise reader.fault(f"{token.text} starts neither a word nor a command")
             name = token.text
             if name == "SUPA":
-                words.append(_word("G", at, Number(53.0)))
+                words.append(as_word("G", at, Number(53.0)))
             elif name in drilling.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
                 self._cycle(reader, name)
-            elif name in _IDLE or (name in _IDLE_CALLS and reader.peek() in ("(", "=", "[")):
+            elif name in codes.IDLE or (name in codes.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
                 _skip(reader)
             elif reader.peek() == "=" and (name in self.names or re.fullmatch(r"R\d+", name)):
                 reader.next += 1
@@ -225,13 +170,13 @@ class Parser(Control):
                 for word in self._word(reader, name, at):
                     letter = chr(word.letter)
                     if letter == "G" and isinstance(word.value, Number):
-                        codes.add(word.value.value)
+                        found.add(word.value.value)
                         stops |= word.value.value == 9.0
                         if word.value.value == 9.0:
                             continue
                     moved |= letter in "XY"
                     words.append(word)
-        if 4.0 in codes:
+        if 4.0 in found:
             wait = [word for word in words if chr(word.letter) in "FS"]
             words = [word for word in words if chr(word.letter) not in "FS"]
             words += [Word(ord("P"), word.at, word.value) for word in wait if chr(word.letter) == "F"]
@@ -250,7 +195,7 @@ class Parser(Control):
             self.body.append(
                 Line(
                     reader.place,
-                    (_word("G", reader.place.at, Number(4.0)), _word("P", reader.place.at, ZERO)),
+                    (as_word("G", reader.place.at, Number(4.0)), as_word("P", reader.place.at, ZERO)),
                 )
             )
         if moved and self.cycle is not None:
@@ -266,44 +211,17 @@ class Parser(Control):
             reader.expect("=")
             value = reader.expression()
             return [
-                _word(
+                as_word(
                     {"CR": "R", "TURN": "P", "ADIS": "P"}[name],
                     at,
                     operation("+", value, ONE) if name == "TURN" else value,
                 )
             ]
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
-            raise reader.fault(f"{name} is not read; {_REMEDY}", at - reader.start)
+            raise reader.fault(f"{name} is not read; {codes.REMEDY}", at - reader.start)
         given = Number(number) if number is not None else self._given(reader, letter, at)
         # Offsets D belong to the control: lengths come from [tools]. A tool by its name has no number.
-        return [] if given is None or letter == "D" else [_word(letter, at, given)]
-
-    def _given(self, reader: TokenReader, letter: str, at: int) -> Expression | None:
-        """The value behind an equals sign; None for a text, such as T="DRILL"."""
-        reader.expect("=")
-        if not reader.ended and reader.tokens[reader.next].kind == "text":
-            reader.next += 1
-            return None
-        kind = reader.peek()
-        if kind in ("AC", "IC") and reader.peek(1) == "(":
-            reader.next += 2
-            value = reader.expression()
-            reader.expect(")")
-            return self._coordinate(letter, value, kind == "AC", reader, at)
-        return reader.expression()
-
-    def _coordinate(
-        self, letter: str, value: Expression, absolute: bool, reader: TokenReader, at: int
-    ) -> Expression:
-        if letter in "IJK":
-            return operation("-", value, position("XYZ"["IJK".index(letter)])) if absolute else value
-        if letter not in "XYZ":
-            raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
-        if absolute == self.absolute:
-            return value
-        return operation(
-            "-" if absolute else "+", *((value, position(letter)) if absolute else (position(letter), value))
-        )
+        return [] if given is None or letter == "D" else [as_word(letter, at, given)]
 
     def _code(self, reader: TokenReader, code: int, at: int) -> list[Word]:
         if code in (90, 91):
@@ -313,123 +231,14 @@ class Parser(Control):
         if code in (70, 71, 700, 710):
             self.unit = MM_PER_INCH if code in (70, 700) else 1.0
         if code == 9:
-            return [_word("G", at, Number(9.0))]
+            return [as_word("G", at, Number(9.0))]
         if code == 641:
-            return [_word("G", at, Number(64.0))]
-        if code in _CODES:
-            return [_word("G", at, Number(one)) for one in _CODES[code]]
-        if code in (*_SAME_CODES, 4):
-            return [_word("G", at, Number(float(code)))]
-        raise reader.fault(f"G{code} of Siemens is not read; {_REMEDY}", at - reader.start)
-
-    # --- commands ---------------------------------------------------------------------------------------------------------------
-
-    def _cycle(self, reader: TokenReader, name: str) -> None:
-        place = reader.place
-        given = self._arguments(reader)
-        if name == "CYCLE800":
-            if any(one is not None and one not in (ZERO, Number(-0.0)) for one in given[4:]):
-                raise reader.fault("CYCLE800 with angles tilts the part; axes that turn are not planned yet")
-        elif name == "CYCLE832":
-            if given and given[0] is not None and given[0] != ZERO:
-                self.body.append(
-                    Line(place, (_word("G", place.at, Number(64.0)), _word("P", place.at, given[0])))
-                )
-        else:
-            self.body += self._drilled(reader, name, given)
-
-    def _drilled(self, reader: TokenReader, name: str, given: list[Expression | None]) -> list[Statement]:
-        try:
-            return drilling.drilled_rows(reader.place, name, given, self.unit)
-        except ValueError as fault:
-            raise reader.fault(str(fault), 0) from fault
-
-    def _arguments(self, reader: TokenReader) -> list[Expression | None]:
-        """What stands in the brackets behind a cycle; None for what is left out or a text."""
-        given: list[Expression | None] = []
-        if not reader.take("("):
-            return given
-        while not reader.take(")"):
-            if reader.peek() == ",":
-                given.append(None)
-            elif not reader.ended and reader.tokens[reader.next].kind == "text":
-                reader.next += 1
-                given.append(None)
-            else:
-                given.append(reader.expression())
-            if not reader.take(",") and reader.peek() != ")":
-                raise reader.fault(") is missing")
-        return given
-
-    def _modal_call(self, reader: TokenReader) -> None:
-        if reader.ended:
-            self.cycle = None
-            return
-        name = reader.peek()
-        reader.next += 1
-        if name not in drilling.ARGUMENTS:
-            raise reader.fault(f"MCALL {name} is not read; read are {', '.join(drilling.ARGUMENTS)}", 0)
-        self.cycle = self._drilled(reader, name, self._arguments(reader))
-
-    def _shift(self, reader: TokenReader) -> None:
-        """TRANS: an origin; ATRANS: one beside the one before."""
-        more = reader.peek(-1) == "ATRANS"
-        place = reader.place
-        ends = {axis: variable(f"_t{axis.lower()}") for axis in "XYZ"}
-        given: dict[str, Expression] = {}
-        while not reader.ended:
-            token, at = reader.tokens[reader.next], reader.at()
-            reader.next += 1
-            letter = token.text[0]
-            if letter not in ends or not (
-                token.kind == "word" or (len(token.text) == 1 and reader.peek() == "=")
-            ):
-                raise reader.fault(f"TRANS takes X, Y and Z; {token.text} comes", token.at)
-            value = Number(float(token.text[1:])) if token.kind == "word" else self._given(reader, letter, at)
-            if value is None:
-                raise reader.fault("a text is no length", token.at)
-            given[letter] = value
-        assigned: list[tuple[Parameter, Expression]] = [
-            (ends[axis], operation("+", ends[axis], given.get(axis, ZERO)) if more else given.get(axis, ZERO))
-            for axis in ends
-        ]
-        self.body.append(Line(place, (), tuple(assigned)))
-        words = [_word("G", place.at, Number(52.0)), *(_word(axis, place.at, ends[axis]) for axis in ends)]
-        self.body.append(Line(place, tuple(words)))
-
-    def _define(self, reader: TokenReader) -> None:
-        kind = reader.peek()
-        reader.next += 1
-        if kind not in _TYPES:
-            raise reader.fault(f"DEF {kind} is not read; read are {', '.join(sorted(_TYPES))}", 0)
-        while True:
-            name = reader.peek()
-            if reader.ended or reader.tokens[reader.next].kind != "name" or reader.peek(1) == "[":
-                raise reader.fault("the name of a variable is expected here; arrays are not read")
-            reader.next += 1
-            self.names.add(name)
-            value = reader.expression() if reader.take("=") else ZERO
-            self.body.append(Line(reader.place, (), ((variable(name), value),)))
-            if not reader.take(","):
-                return
-
-    # --- other commands -------------------------------------------------------------------------------------------------------
-
-    def _message(self, reader: TokenReader) -> None:
-        found = re.search(r'"([^"]*)"', reader.text)
-        reader.next = len(reader.tokens)
-        if found and found.group(1):
-            self.body.append(Message(reader.place, (found.group(1),)))
-
-    def _refused(self, reader: TokenReader) -> None:
-        raise reader.fault(f"{reader.peek(-1)} is not read; {_REMEDY}", reader.tokens[reader.next - 1].at)
-
-    def _idle(self, reader: TokenReader) -> None:
-        reader.next = len(reader.tokens)
-
-
-def _word(letter: str, at: int, value: Expression) -> Word:
-    return Word(ord(letter), at, value)
+            return [as_word("G", at, Number(64.0))]
+        if code in codes.CODES:
+            return [as_word("G", at, Number(one)) for one in codes.CODES[code]]
+        if code in (*codes.SAME_CODES, 4):
+            return [as_word("G", at, Number(float(code)))]
+        raise reader.fault(f"G{code} of Siemens is not read; {codes.REMEDY}", at - reader.start)
 
 
 def _skip(reader: TokenReader) -> None:
@@ -450,39 +259,25 @@ def _without_comment(text: str) -> str:
     return re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", text.rstrip("\r\n\x1a"))
 
 
-_REMEDY = "let the CAM system write the moves out"
-_STATEMENTS: dict[str, Callable[[Parser, TokenReader], None]] = {
-    "DEF": Parser._define,
-    "IF": Parser._if,
-    "ELSE": Parser._else,
-    "ENDIF": Parser._end_if,
-    "WHILE": Parser._while,
-    "LOOP": Parser._loop,
-    **dict.fromkeys(("ENDWHILE", "ENDLOOP"), Parser._end_loop),
-    "FOR": Parser._for,
-    "ENDFOR": Parser._end_for,
-    "REPEAT": Parser._repeat,
-    "UNTIL": Parser._until,
-    **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), Parser._goto),
-    **dict.fromkeys(("TRANS", "ATRANS"), Parser._shift),
-    "MCALL": Parser._modal_call,
-    "MSG": Parser._message,
-    **dict.fromkeys(("EXTERN", "PROC", "WORKPIECE"), Parser._idle),
+_STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
+    "DEF": SiemensParser._define,
+    "IF": SiemensParser._if,
+    "ELSE": SiemensParser._else,
+    "ENDIF": SiemensParser._end_if,
+    "WHILE": SiemensParser._while,
+    "LOOP": SiemensParser._loop,
+    **dict.fromkeys(("ENDWHILE", "ENDLOOP"), SiemensParser._end_loop),
+    "FOR": SiemensParser._for,
+    "ENDFOR": SiemensParser._end_for,
+    "REPEAT": SiemensParser._repeat,
+    "UNTIL": SiemensParser._until,
+    **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
+    **dict.fromkeys(("TRANS", "ATRANS"), SiemensParser._shift),
+    "MCALL": SiemensParser._modal_call,
+    "MSG": SiemensParser._message,
+    **dict.fromkeys(("EXTERN", "PROC", "WORKPIECE"), SiemensParser._idle),
     **dict.fromkeys(
-        (
-            "ROT",
-            "AROT",
-            "ROTS",
-            "SCALE",
-            "ASCALE",
-            "MIRROR",
-            "AMIRROR",
-            "TRAORI",
-            "TRANSMIT",
-            "TRACYL",
-            "CIP",
-            "CT",
-        ),
-        Parser._refused,
+        codes.REFUSED,
+        SiemensParser._refused,
     ),
 }

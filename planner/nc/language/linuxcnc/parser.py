@@ -14,163 +14,40 @@ What LinuxCNC refuses and this reader takes: a subprogram that stands after its 
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
 
-from planner.nc.language.asked import LinuxcncAsked
+from planner.nc.language.linuxcnc.control import KEYWORDS, LinuxcncControl, end_of
+from planner.nc.language.linuxcnc.text import ARGUMENTS_MAX, LANGUAGE, SPELLING
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.spelling import NEGATIVE, LineReader, Spelling, Unspelled
+from planner.nc.language.spelling import LineReader, Unspelled
 from planner.nc.language.tree import (
-    Break,
     Call,
-    Continue,
     Expression,
-    If,
-    Language,
     Line,
-    Loop,
     Message,
     Modes,
     Named,
     Number,
     Numbered,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
     Return,
-    Statement,
+    SourcePlace,
 )
 
-ARGUMENTS_MAX = 30
-CONTROL_NESTED_MAX = 100  # loops and branches in each other
-EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
+# What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
-_FUNCTIONS = (
-    "ABS",
-    "ACOS",
-    "ASIN",
-    "ATAN",
-    "COS",
-    "EXISTS",
-    "EXP",
-    "FIX",
-    "FUP",
-    "LN",
-    "ROUND",
-    "SIN",
-    "SQRT",
-    "TAN",
-)
-_RANKS = {
-    "**": 5,
-    **dict.fromkeys(("*", "/", "MOD"), 4),
-    **dict.fromkeys(("+", "-"), 3),
-    **dict.fromkeys(("EQ", "NE", "GT", "GE", "LT", "LE"), 2),
-    **dict.fromkeys(("AND", "OR", "XOR"), 1),
-}
-SPELLING = Spelling(functions=frozenset(_FUNCTIONS), ranks=_RANKS)
-
-
-def modulo(a: float, b: float) -> float:
-    """a MOD b, never negative. Raises ZeroDivisionError."""
-    if b == 0.0:
-        raise ZeroDivisionError
-    rest = math.fmod(a, b)
-    return rest + abs(b) if rest < 0.0 else rest
-
-
-def nearest(x: float) -> float:
-    """ROUND: halves go away from zero."""
-    return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
-
-
-DEGREES: dict[str, Callable[..., object]] = {
-    "sin": lambda x: math.sin(math.radians(x)),
-    "cos": lambda x: math.cos(math.radians(x)),
-    "tan": lambda x: math.tan(math.radians(x)),
-    "asin": lambda x: math.degrees(math.asin(x)),
-    "acos": lambda x: math.degrees(math.acos(x)),
-    "atan": lambda x: math.degrees(math.atan(x)),
-    "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
-}
-ARITHMETIC: dict[tuple[str, int], str] = {
-    (NEGATIVE, 1): "(-{0})",
-    ("+", 2): "({0}+{1})",
-    ("-", 2): "({0}-{1})",
-    ("*", 2): "({0}*{1})",
-    ("/", 2): "({0}/{1})",
-    ("GT", 2): "({0}>{1})",
-    ("GE", 2): "({0}>={1})",
-    ("LT", 2): "({0}<{1})",
-    ("LE", 2): "({0}<={1})",
-    ("ABS", 1): "abs({0})",
-    ("EXP", 1): "exp({0})",
-    ("LN", 1): "log({0})",
-    ("SQRT", 1): "sqrt({0})",
-    **{(name.upper(), 1): f"{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
-}
-LANGUAGE = Language(
-    name="linuxcnc",
-    operations=ARITHMETIC
-    | {
-        ("**", 2): "power({0},{1})",
-        ("MOD", 2): "modulo({0},{1})",
-        ("EQ", 2): f"(abs({{0}}-{{1}})<{EQUAL!r})",
-        ("NE", 2): f"(abs({{0}}-{{1}})>={EQUAL!r})",
-        ("AND", 2): "({0}!=0 and {1}!=0)",
-        ("OR", 2): "({0}!=0 or {1}!=0)",
-        ("XOR", 2): "(({0}!=0)!=({1}!=0))",
-        ("ATAN", 2): "atan2({0},{1})",
-        ("FIX", 1): "float(floor({0}))",
-        ("FUP", 1): "float(ceil({0}))",
-        ("ROUND", 1): "nearest({0})",
-    },
-    conditions=frozenset(("EQ", "NE", "GT", "GE", "LT", "LE", "AND", "OR", "XOR")),
-    functions=DEGREES
-    | {
-        "exp": math.exp, "log": math.log, "sqrt": math.sqrt, "power": math.pow, "floor": math.floor, "ceil": math.ceil,
-        "modulo": modulo, "nearest": nearest,
-    },
-    locals=ARGUMENTS_MAX,
-    largest=5601,
-    vacant=0.0,
-    asked=LinuxcncAsked.numbers,
-    asked_names=LinuxcncAsked.names,
-)  # fmt: skip
-
-
-@dataclass
-class _Open:
-    """A control statement whose end has not come: its body so far, and for `if` its branches."""
-
-    kind: str
-    label: str
-    place: Place
-    condition: Expression | None
-    body: list[Statement]
-    branches: list[tuple[Expression, list[Statement]]]
-
-
-_ENDS = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
-_KEYWORDS = frozenset(
-    ("sub", "call", "return", "if", "elseif", "else", "while", "do", "repeat", "break", "continue", *_ENDS)
-)
 _PROGRAM = ""
 
 
-class Parser:
+class LinuxcncParser(LinuxcncControl):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
+        super().__init__()
         self.source = source
-        self.procedures: dict[str, Procedure] = {}
         self.faults: list[ProgramFault] = []
-        self.main: list[Statement] = []
-        self.open: list[_Open] = []
-        self.base = self.body = self.main
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow
 
@@ -190,10 +67,13 @@ class Parser:
         for left in self.open[:1] if not self.faults else ():
             self.faults.append(
                 ProgramFault(
-                    left.place, f"this {left.kind} has no end; write o{left.label} {_end_of(left.kind)}"
+                    left.place, f"this {left.kind} has no end; write o{left.label} {end_of(left.kind)}"
                 )
             )
-        return [Procedure(_PROGRAM, Place(self.source.file, 1, 0), self.main), *self.procedures.values()]
+        return [
+            Procedure(_PROGRAM, SourcePlace(self.source.file, 1, 0), self.main),
+            *self.procedures.values(),
+        ]
 
     def _plain(self, rows: PlainRows) -> None:
         in_main = self.body is self.main
@@ -265,8 +145,8 @@ class Parser:
         if not keyword and reader.ended and isinstance(label, str):
             self._plain_program(label, line)
             return
-        if keyword not in _KEYWORDS:
-            raise reader.refused(at, f"after an O word one of {', '.join(sorted(_KEYWORDS))} is expected")
+        if keyword not in KEYWORDS:
+            raise reader.refused(at, f"after an O word one of {', '.join(sorted(KEYWORDS))} is expected")
         if keyword == "call":
             self._call(reader, line, label)
         elif not isinstance(label, str):
@@ -299,12 +179,6 @@ class Parser:
         found = _NEXT_PROGRAM.search(self.source.words.data, line.start - self.source.begin + len(line.text))
         return found is not None and found.group(1) is not None
 
-    def _add(self, label: str, place: Place, body: list[Statement]) -> None:
-        if label in self.procedures:
-            first = self.procedures[label].place.line
-            raise ProgramFault(place, f"a second subprogram o{label}; the first is on line {first}")
-        self.procedures[label] = Procedure(label, place, body)
-
     def _call(self, reader: LineReader, line: SourceLine, label: str | Expression) -> None:
         arguments: list[Expression] = []
         while reader.peek() == "[":
@@ -316,82 +190,6 @@ class Parser:
             word = f"o{label} call"
         self.body.append(Call(line.place, label, tuple(enumerate(arguments, 1)), word))
 
-    def _control(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
-        top = self.open[-1] if self.open else None
-        if keyword == "while" and top is not None and top.kind == "do" and top.label == label:
-            self._close(top)
-            self.body.append(Loop(top.place, "do", label, _needed(condition, keyword, line), top.body))
-        elif keyword in ("sub", "if", "while", "do", "repeat"):
-            self._begin(keyword, label, condition, line)
-        elif keyword in ("elseif", "else"):
-            self._another_branch(keyword, label, condition, line)
-        elif keyword in _ENDS:
-            self._end(keyword, label, condition, line)
-        elif keyword == "return":
-            if not any(o.kind == "sub" for o in self.open):
-                raise ProgramFault(line.place, "return stands in a subprogram only")
-            self.body.append(Return(line.place, condition))
-        else:
-            if not any(o.kind in ("while", "do", "repeat") and o.label == label for o in self.open):
-                raise ProgramFault(line.place, f"there is no loop o{label} around this {keyword}")
-            self.body.append((Break if keyword == "break" else Continue)(line.place, label))
-
-    def _begin(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
-        if keyword == "sub" and self.open:
-            raise ProgramFault(
-                line.place, f"a subprogram begins inside {self.open[-1].kind}; write its end before it"
-            )
-        if len(self.open) >= CONTROL_NESTED_MAX:
-            raise ProgramFault(line.place, f"more than {CONTROL_NESTED_MAX} loops and branches in each other")
-        if keyword not in ("sub", "do"):
-            _needed(condition, keyword, line)
-        body: list[Statement] = []
-        self.open.append(_Open(keyword, label, line.place, condition, body, []))
-        if keyword == "sub":
-            self._add(label, line.place, body)
-        self.body = body
-
-    def _another_branch(
-        self, keyword: str, label: str, condition: Expression | None, line: SourceLine
-    ) -> None:
-        top = self._innermost("if", keyword, label, line)
-        if top.condition is None:
-            raise ProgramFault(line.place, f"{keyword} after else; else comes last")
-        top.branches.append((top.condition, top.body))
-        top.condition = _needed(condition, keyword, line) if keyword == "elseif" else None
-        top.body = self.body = []
-
-    def _end(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
-        kind = _ENDS[keyword]
-        top = self._innermost(kind, keyword, label, line)
-        self._close(top)
-        if kind == "sub":
-            if condition is not None:
-                top.body.append(Return(line.place, condition))
-        elif kind == "if":
-            if top.condition is not None:
-                top.branches.append((top.condition, top.body))
-            self.body.append(
-                If(top.place, tuple(top.branches), [] if top.condition is not None else top.body)
-            )
-        else:
-            assert top.condition is not None
-            self.body.append(Loop(top.place, kind, label, top.condition, top.body))
-
-    def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> _Open:
-        if not self.open or self.open[-1].kind != kind or self.open[-1].label != label:
-            last = (
-                f"o{self.open[-1].label} {self.open[-1].kind} on line {self.open[-1].place.line} is open"
-                if self.open
-                else "nothing is open"
-            )
-            raise ProgramFault(line.place, f"o{label} {keyword} has no o{label} {kind} before it: {last}")
-        return self.open[-1]
-
-    def _close(self, top: _Open) -> None:
-        self.open.pop()
-        self.body = self.open[-1].body if self.open else self.base
-
     def _nothing_left(self, reader: LineReader, after: str) -> None:
         if not reader.ended:
             raise reader.refused(reader.at, f"nothing may follow {after} on its line")
@@ -401,16 +199,6 @@ _FLOW = re.compile(r"[Mm](7[0-3]|9[89])(?![\d.])")
 _NEXT_PROGRAM = re.compile(
     rb"^[ \t]*(?:(?:N[\d \t]+)?M[ \t]*(99)(?!\d)|O[ \t]*\d+[ \t\r]*(?:\(|;|$))", re.MULTILINE | re.IGNORECASE
 )
-
-
-def _needed(condition: Expression | None, keyword: str, line: SourceLine) -> Expression:
-    if condition is None:
-        raise ProgramFault(line.place, f"{keyword} needs an [expression] after it")
-    return condition
-
-
-def _end_of(kind: str) -> str:
-    return "while [condition]" if kind == "do" else f"end{kind}"
 
 
 def _constant_name(value: Expression) -> str | Expression:

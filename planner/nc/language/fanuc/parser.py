@@ -14,126 +14,53 @@ and a word with such a value is left out. The right side of an assignment needs 
 
 from __future__ import annotations
 
-import math
 import re
 
 from planner.base.units import MILLISECOND
-from planner.nc.language.asked import FanucAsked
-from planner.nc.language.linuxcnc import ARITHMETIC, DEGREES, modulo
+from planner.nc.language.fanuc import calls
+from planner.nc.language.fanuc.control import FanucControl
+from planner.nc.language.fanuc.text import SPELLING
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.spelling import LineReader, Spelling, Unspelled
+from planner.nc.language.spelling import LineReader, Unspelled
 from planner.nc.language.tree import (
     Call,
     Expression,
     Goto,
     If,
     Label,
-    Language,
     Line,
-    Loop,
     Message,
     Named,
     Number,
     Numbered,
     Operation,
     Parameter,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
-    Return,
+    SourcePlace,
     Statement,
     Word,
 )
-
-LOCALS = 33
-LOOPS_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
-_NUMBERS = {  # parameters of the letters of G65
-    **dict(zip("ABCIJK", range(1, 7), strict=True)),
-    **{"D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19, "T": 20},
-    **dict(zip("UVWXYZ", range(21, 27), strict=True)),
-}
-_TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
-_FUNCTIONS = (
-    "ABS", "ACOS", "ADP", "ASIN", "ATAN", "BCD", "BIN", "COS", "EXP", "FIX", "FUP", "LN", "ROUND", "SIN", "SQR", "SQRT", "TAN",
-)  # fmt: skip
-_RANKS = {
-    **dict.fromkeys(("*", "/", "MOD", "AND"), 3),
-    **dict.fromkeys(("+", "-", "OR", "XOR"), 2),
-    **dict.fromkeys(("EQ", "NE", "GT", "GE", "LT", "LE"), 1),
-}
-SPELLING = Spelling(functions=frozenset(_FUNCTIONS), ranks=_RANKS, long_values=True)
-
-
-def from_decimal_digits(x: float) -> float:
-    """BIN: 0x25 read as the decimal digits 25."""
-    return float(int(f"{int(x):x}"))
-
-
-def to_decimal_digits(x: float) -> float:
-    """BCD: 25 as 0x25."""
-    return float(int(str(int(x)), 16))
-
-
-def angle(y: float, x: float) -> float:
-    """ATAN[y]/[x] in degrees, from 0 to 360."""
-    return math.degrees(math.atan2(y, x)) % 360.0
-
-
-LANGUAGE = Language(
-    name="fanuc",
-    operations=ARITHMETIC
-    | {
-        ("MOD", 2): "modulo({0},{1})",
-        ("EQ", 2): "({0}=={1})",
-        ("NE", 2): "({0}!={1})",
-        ("AND", 2): "float(int({0})&int({1}))",
-        ("OR", 2): "float(int({0})|int({1}))",
-        ("XOR", 2): "float(int({0})^int({1}))",
-        ("ATAN", 2): "angle({0},{1})",
-        ("FIX", 1): "float(trunc({0}))",
-        ("FUP", 1): "copysign(ceil(abs({0})),{0})",
-        ("ROUND", 1): "copysign(floor(abs({0})+0.5),{0})",
-        ("SQR", 1): "sqrt({0})",
-        ("ADP", 1): "({0})",
-        ("BIN", 1): "binary({0})",
-        ("BCD", 1): "decimal({0})",
-    },
-    conditions=frozenset(("EQ", "NE", "GT", "GE", "LT", "LE")),
-    functions=DEGREES
-    | {
-        "exp": math.exp, "log": math.log, "sqrt": math.sqrt, "floor": math.floor, "ceil": math.ceil, "trunc": math.trunc,
-        "copysign": math.copysign, "modulo": modulo, "angle": angle, "binary": from_decimal_digits, "decimal": to_decimal_digits,
-    },
-    locals=LOCALS,
-    largest=9999,
-    vacant=None,
-    asked=FanucAsked.numbers,
-    read="({0} or 0.0)",
-    raw=frozenset(("EQ", "NE")),
-)  # fmt: skip
 
 _LINE_NUMBER = re.compile(r"N(\d+)", re.IGNORECASE)
 _PROGRAM = re.compile(r"[O:](\d+)", re.IGNORECASE)
 _KEYWORD = re.compile(r"(IF|WHILE|GOTO|DO|END|POPEN|PCLOS|DPRNT|BPRNT)(?![A-Z])", re.IGNORECASE)
 _GOTO = re.compile(r"GOTO(\d+)?")
-_ALARM, _STOP = 3000.0, 3006.0  # parameters: raise an alarm, stop with a message
-_LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
+_STOP = 3006.0  # parameter: stop with a message
+_CALLS = ("M98", "M97", "M99", "G65", "G66")
 
 
-class Parser:
+class FanucParser(FanucControl):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
+        super().__init__()
         self.source = source
         self.faults: list[ProgramFault] = []
         self.procedures: list[Procedure] = []
-        self.body: list[Statement] = []
-        self.open: list[
-            tuple[int, Place, Expression, list[Statement]]
-        ] = []  # DO number, its condition, the body around it
         self.modal: Call | None = None  # G66
-        self.local: list[tuple[int, Place, Procedure]] = []  # M97
+        self.local: list[tuple[int, SourcePlace, Procedure]] = []  # M97
         self.numbers: frozenset[str] = frozenset()
         self.targets: frozenset[int] | None = frozenset()  # labels that are used; None for all
         self.calls_blocks = False  # M97 is used: an M99 may return from it
@@ -148,7 +75,7 @@ class Parser:
         )
         self.targets = _targets(texts)
         self.calls_blocks = any("M97" in text for text in texts)
-        self._begin("" if self.source.file == 0 else "file", Place(self.source.file, 1, 0))
+        self._begin("" if self.source.file == 0 else "file", SourcePlace(self.source.file, 1, 0))
         for item in items:
             try:
                 if isinstance(item, PlainRows):
@@ -165,7 +92,7 @@ class Parser:
             self._local_call(number, place, procedure)
         return self.procedures
 
-    def _begin(self, name: str, place: Place) -> None:
+    def _begin(self, name: str, place: SourcePlace) -> None:
         self.body = []
         self.procedures.append(Procedure(name, place, self.body))
 
@@ -176,11 +103,11 @@ class Parser:
             self.open.clear()
         self.modal = None
 
-    def _local_call(self, number: int, place: Place, procedure: Procedure) -> None:
+    def _local_call(self, number: int, place: SourcePlace, procedure: Procedure) -> None:
         at = next(
             (k for k, s in enumerate(procedure.body) if isinstance(s, Label) and s.number == number), None
         )
-        name = _local_name(number, procedure)
+        name = calls.block_name(number, procedure)
         if at is None:
             self.faults.append(
                 ProgramFault(place, f"M97 P{number}: there is no block N{number} in this program")
@@ -217,7 +144,7 @@ class Parser:
     def _part(self, rows: PlainRows, first: int, last: int) -> PlainRows:
         row = first - self.source.first_row
         words = self.source.words
-        place = Place(
+        place = SourcePlace(
             self.source.file, int(words.line[row]), self.source.begin + int(words.at[words.first[row]])
         )
         return PlainRows(place, first, last, rows.may_end and last == rows.last)
@@ -274,41 +201,16 @@ class Parser:
         elif keyword == "IF":
             self._if(reader, line)
         elif keyword == "WHILE":
-            condition = reader.bracket()
-            at = reader.at
-            if reader.keyword() != "do":
-                raise reader.refused(at, "WHILE [condition] is followed by DO and a number")
-            self._do(reader, line, condition)
+            self._while(reader, line)
         elif keyword == "DO":
-            self._do(reader, line, Number(1.0))
+            self._do(reader, line)
         elif keyword == "END":
-            number = self._number(reader)
-            if not self.open or self.open[-1][0] != number:
-                raise ProgramFault(line.place, f"END {number} has no DO {number} before it")
-            _, place, condition, around = self.open.pop()
-            around.append(Loop(place, "while", f"DO {number}", condition, self.body))
-            self.body = around
+            self._end(reader, line)
         else:  # output to a file
             self.body.append(Message(line.place, (reader.text,)))
             return
         if not reader.ended:
             raise reader.refused(reader.at, f"nothing may follow {keyword} on its line")
-
-    def _number(self, reader: LineReader) -> int:
-        at = reader.at
-        value = reader.number()
-        if value is None or value != int(value):
-            raise reader.refused(at, "DO and END are followed by a whole number")
-        return int(value)
-
-    def _do(self, reader: LineReader, line: SourceLine, condition: Expression) -> None:
-        number = self._number(reader)
-        if any(number == known for known, _, _, _ in self.open) or len(self.open) >= LOOPS_MAX:
-            raise ProgramFault(
-                line.place, f"DO {number} inside another DO {number}, or more than {LOOPS_MAX} in each other"
-            )
-        self.open.append((number, line.place, condition, self.body))
-        self.body = []
 
     def _if(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
@@ -331,14 +233,14 @@ class Parser:
     def _words(
         self, words: tuple[Word, ...], assignments: tuple[tuple[Parameter, Expression], ...], line: SourceLine
     ) -> None:
-        codes = [_code(word) for word in words]
-        for code in ("M98", "M97", "M99", "G65", "G66"):
-            if code in codes:
-                getattr(self, f"_{code.lower()}")(words, line)
-                return
+        codes = [calls.code_of(word) for word in words]
+        called = next((code for code in _CALLS if code in codes), None)
+        if called is not None:
+            self._call(called, words, line)
+            return
         if "G67" in codes:
             self.modal = None
-            words = tuple(word for word in words if _code(word) != "G67")
+            words = tuple(word for word in words if calls.code_of(word) != "G67")
         for target, _ in assignments:
             if target == Numbered(Number(_STOP)):
                 words = (*words, Word(ord("M"), line.place.at, Number(0.0)))
@@ -352,89 +254,23 @@ class Parser:
         if self.modal is not None and any(chr(word.letter) in "XYZ" for word in words):
             self.body.append(self.modal)
 
-    def _split(
-        self, words: tuple[Word, ...], code: str, own: str
-    ) -> tuple[list[Word], dict[str, Expression]]:
-        """The words that a call does not use, and those that it does."""
-        rest, given = [], {}
-        for word in words:
-            letter = chr(word.letter)
-            if letter in own and letter not in given:
-                given[letter] = word.value
-            elif _code(word) != code:
-                rest.append(word)
-        return rest, given
-
-    def _m98(self, words: tuple[Word, ...], line: SourceLine) -> None:
-        rest, given = self._split(words, "M98", "PL")
-        if "P" not in given:
-            raise ProgramFault(line.place, "M98 needs P with the number of a subprogram")
-        program, times = given["P"], given.get("L", Number(1.0))
-        if isinstance(program, Number):
-            number = f"{program.value:.0f}"
-            if number not in self.numbers and len(number) > _LONGEST_NUMBER and "L" not in given:
-                times = Number(float(number[:-_LONGEST_NUMBER]))
-                number = number[-_LONGEST_NUMBER:]
-            name: str | Expression = str(int(number))
+    def _call(self, code: str, words: tuple[Word, ...], line: SourceLine) -> None:
+        program = self.procedures[-1]
+        if code == "M98":
+            self.body += calls.subprogram(words, line, self.numbers)
+        elif code == "M97":
+            number, statements = calls.of_block(words, line, program)
+            self.local.append((number, line.place, program))
+            self.body += statements
+        elif code == "M99":
+            self.body += calls.returned(words, line, restarts=program.name == "" and not self.calls_blocks)
+        elif code == "G65":
+            self.body.append(calls.macro(words, "G65", line))
         else:
-            name = program
-        if rest:
-            self.body.append(Line(line.place, tuple(rest)))
-        self.body.append(Call(line.place, name, None, _called("M98", name), times))
+            self._modal_call(calls.macro(words, "G66", line), line)
 
-    def _m97(self, words: tuple[Word, ...], line: SourceLine) -> None:
-        rest, given = self._split(words, "M97", "PL")
-        if not isinstance(given.get("P"), Number):
-            raise ProgramFault(line.place, "M97 needs P with the number of a block")
-        number = int(given["P"].value)  # type: ignore[union-attr]
-        procedure = self.procedures[-1]
-        self.local.append((number, line.place, procedure))
-        if rest:
-            self.body.append(Line(line.place, tuple(rest)))
-        name = _local_name(number, procedure)
-        self.body.append(Call(line.place, name, None, f"M97 P{number}", given.get("L", Number(1.0))))
-
-    def _m99(self, words: tuple[Word, ...], line: SourceLine) -> None:
-        rest, given = self._split(words, "M99", "P")
-        if rest:
-            self.body.append(Line(line.place, tuple(rest)))
-        if self.procedures[-1].name == "" and not self.calls_blocks:
-            self.body.append(Message(line.place, ("M99 starts the main program again; it is read once",)))
-        self.body.append(Return(line.place, None, given.get("P")))
-
-    def _arguments(self, words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
-        arguments: dict[int, Expression] = {}
-        seen = dict.fromkeys(_TRIPLES, 0)
-        program: str | Expression = ""
-        times: Expression = Number(1.0)
-        for word in words:
-            letter = chr(word.letter)
-            if _code(word) == code or letter == "N":
-                continue
-            if letter == "P":
-                program = f"{word.value.value:.0f}" if isinstance(word.value, Number) else word.value
-            elif letter == "L":
-                times = word.value
-            elif letter in _NUMBERS:
-                turn = 0
-                if letter in _TRIPLES:
-                    turn = seen[letter]
-                    seen[letter] += 1
-                arguments[_NUMBERS[letter] + 3 * turn] = word.value
-            else:
-                raise ProgramFault(line.place._replace(at=word.at), f"{code} has no parameter for {letter}")
-        if program == "" or max(arguments, default=0) > LOCALS:
-            raise ProgramFault(
-                line.place, f"{code} needs P with the number of a macro, and at most ten of I, J and K"
-            )
-        return Call(line.place, program, tuple(arguments.items()), _called(code, program), times)
-
-    def _g65(self, words: tuple[Word, ...], line: SourceLine) -> None:
-        self.body.append(self._arguments(words, "G65", line))
-
-    def _g66(self, words: tuple[Word, ...], line: SourceLine) -> None:
+    def _modal_call(self, call: Call, line: SourceLine) -> None:
         """The call that follows every move: its arguments are computed now and kept in names of their own."""
-        call = self._arguments(words, "G66", line)
         assert call.arguments is not None
         kept: list[tuple[int, Expression]] = []
         for number, value in call.arguments:
@@ -454,13 +290,6 @@ def _seconds(word: Word) -> Word:
     return word._replace(value=Operation("*", (word.value, Number(MILLISECOND))))
 
 
-def files(name: str) -> frozenset[str]:
-    """What the file of program O1000 may be called, in small letters."""
-    numbers = {name, name.zfill(_LONGEST_NUMBER)}
-    stems = {f"{letter}{number}" for number in numbers for letter in ("", "o")}
-    return frozenset(stem + ending for stem in stems for ending in ("", ".nc", ".ngc", ".cnc", ".tap"))
-
-
 def _targets(texts: list[str]) -> frozenset[int] | None:
     """The labels that are used, or None if some are computed: M99 P, M97 P, GOTO."""
     used: set[int] = set()
@@ -472,21 +301,6 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
         if ("M99" in text or "M97" in text) and "P" in text:
             return None
     return frozenset(used)
-
-
-def _code(word: Word) -> str:
-    """G and M codes by name; empty for other words and computed codes."""
-    if chr(word.letter) not in "GM" or not isinstance(word.value, Number):
-        return ""
-    return f"{chr(word.letter)}{word.value.value:g}"
-
-
-def _called(code: str, name: str | Expression) -> str:
-    return f"{code} P{name}" if isinstance(name, str) else f"{code} P"
-
-
-def _local_name(number: int, procedure: Procedure) -> str:
-    return f"N{number} of O{procedure.name}" if procedure.name else f"N{number}"
 
 
 def _is_percent(source: Source, rows: PlainRows) -> bool:

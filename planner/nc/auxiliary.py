@@ -1,0 +1,94 @@
+"""What a block says before it moves: spindle, tool, coolant and other codes that a control passes on; dwells; path control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.base.units import MILLISECOND
+from planner.nc import codes, signals
+from planner.nc.assumed import Assumed
+from planner.nc.block import Block
+from planner.nc.moves import WordFault, integer
+from planner.nc.program import Kind, PathControl
+from planner.nc.state import State
+from planner.nc.store import Store
+
+Note = Callable[[str, int], None]
+# By ten times the G code.
+_PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
+# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
+# make room for themselves.
+ROWS_AT_ONCE = 4
+_SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
+
+
+def events(state: State, store: Store, block: Block, note: Note) -> None:
+    """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
+    line = block.line
+    if "S" in block.value:
+        if block.value["S"] < 0:
+            raise WordFault(
+                block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
+            )
+        store.add_event("S", block.value["S"], line)
+        state.spindle.speed = block.value["S"]
+    if "T" in block.value:
+        state.tool_selected = integer(block, "T", 0)
+        store.add_event("T", state.tool_selected, line)
+    if "signals" in block.m:
+        signals.signal(store, block)
+    if "tool number" in block.m:
+        if "Q" not in block.value:
+            raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
+        state.tool_loaded = integer(block, "Q", 0)
+    if "tool change" in block.m:
+        state.tool_loaded = state.tool_selected
+        store.add(Kind.STOP, line, state)
+        note("a tool change is a full stop that takes no time and moves nothing", line)
+    store.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
+    for letter, value in block.events:
+        store.add_event(letter, value, line)
+    for group in ("spindle", "spindle orientation", "coolant", "override"):
+        if group in block.m:
+            store.add_event("M", block.m[group] / 10, line)
+    state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
+    if "spindle mode" in block.g:
+        state.spindle.surface_speed = block.g["spindle mode"] == 960
+        if state.spindle.surface_speed and "S" not in block.value:
+            raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
+        state.spindle.speed_max = abs(block.value.get("D", 0.0))
+    for code in block.g.values():
+        if code in codes.G_EVENTS:
+            store.add_event("G", code / 10, line)
+
+
+def dwell(state: State, store: Store, block: Block, assumed: Assumed, note: Note) -> None:
+    """G4. Raises WordFault."""
+    seconds = block.value.get("P")
+    if seconds is not None and assumed.printer:
+        seconds *= MILLISECOND
+        note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+    elif seconds is None and not assumed.strict and (assumed.printer or "S" in block.value):
+        seconds = block.value.get("S", 0.0)
+        note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
+    if seconds is None or seconds < 0:
+        word = block.at["one-shot"] if seconds is None else block.at["P"]
+        raise WordFault(word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5")
+    store.add_dwell(seconds, block.line, state)
+
+
+def path_control(state: State, block: Block, note: Note) -> None:
+    """G61, G61.1 and G64 with its tolerance. Raises WordFault."""
+    state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
+    if "P" in block.value and block.g["path control"] == 640:
+        tolerance = block.value["P"]
+        if tolerance < 0:
+            raise WordFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
+        if tolerance > 0:
+            state.tolerance = tolerance * state.unit
+        else:
+            note("G64 P0 gives no tolerance; the machine's holds", block.line)
+    if "Q" in block.value:
+        note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)

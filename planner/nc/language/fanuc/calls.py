@@ -1,0 +1,132 @@
+"""Calls and returns of Fanuc's and Haas' macros: M97, M98, M99, G65 and G66 as statements."""
+
+from __future__ import annotations
+
+from planner.nc.language.fanuc.text import LOCALS
+from planner.nc.language.source import SourceLine
+from planner.nc.language.tree import (
+    Call,
+    Expression,
+    Line,
+    Message,
+    Number,
+    Procedure,
+    ProgramFault,
+    Return,
+    Statement,
+    Word,
+)
+
+_NUMBERS = {  # parameters of the letters of G65
+    **dict(zip("ABCIJK", range(1, 7), strict=True)),
+    **{"D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19, "T": 20},
+    **dict(zip("UVWXYZ", range(21, 27), strict=True)),
+}
+_TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
+_LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
+
+
+def subprogram(words: tuple[Word, ...], line: SourceLine, known: frozenset[str]) -> list[Statement]:
+    """M98. known : the numbers of the file's programs. Raises ProgramFault."""
+    rest, given = _split(words, "M98", "PL")
+    if "P" not in given:
+        raise ProgramFault(line.place, "M98 needs P with the number of a subprogram")
+    program, times = given["P"], given.get("L", Number(1.0))
+    if isinstance(program, Number):
+        number = f"{program.value:.0f}"
+        if number not in known and len(number) > _LONGEST_NUMBER and "L" not in given:
+            times = Number(float(number[:-_LONGEST_NUMBER]))
+            number = number[-_LONGEST_NUMBER:]
+        name: str | Expression = str(int(number))
+    else:
+        name = program
+    return [*_row(rest, line), Call(line.place, name, None, _called("M98", name), times)]
+
+
+def of_block(words: tuple[Word, ...], line: SourceLine, program: Procedure) -> tuple[int, list[Statement]]:
+    """M97: the block that is called, and the statements. Raises ProgramFault."""
+    rest, given = _split(words, "M97", "PL")
+    called = given.get("P")
+    if not isinstance(called, Number):
+        raise ProgramFault(line.place, "M97 needs P with the number of a block")
+    number = int(called.value)
+    times = given.get("L", Number(1.0))
+    call = Call(line.place, block_name(number, program), None, f"M97 P{number}", times)
+    return number, [*_row(rest, line), call]
+
+
+def returned(words: tuple[Word, ...], line: SourceLine, *, restarts: bool) -> list[Statement]:
+    """M99. restarts : it stands in the main program, which a control then starts again."""
+    rest, given = _split(words, "M99", "P")
+    said: list[Statement] = [
+        Message(line.place, ("M99 starts the main program again; it is read once",))
+    ] * restarts
+    return [*_row(rest, line), *said, Return(line.place, None, given.get("P"))]
+
+
+def macro(words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
+    """G65, or the call that G66 makes after every move. Raises ProgramFault."""
+    arguments: dict[int, Expression] = {}
+    seen = dict.fromkeys(_TRIPLES, 0)
+    program: str | Expression = ""
+    times: Expression = Number(1.0)
+    for word in words:
+        letter = chr(word.letter)
+        if code_of(word) == code or letter == "N":
+            continue
+        if letter == "P":
+            program = f"{word.value.value:.0f}" if isinstance(word.value, Number) else word.value
+        elif letter == "L":
+            times = word.value
+        elif letter in _NUMBERS:
+            turn = 0
+            if letter in _TRIPLES:
+                turn = seen[letter]
+                seen[letter] += 1
+            arguments[_NUMBERS[letter] + 3 * turn] = word.value
+        else:
+            raise ProgramFault(line.place._replace(at=word.at), f"{code} has no parameter for {letter}")
+    if program == "" or max(arguments, default=0) > LOCALS:
+        raise ProgramFault(
+            line.place, f"{code} needs P with the number of a macro, and at most ten of I, J and K"
+        )
+    return Call(line.place, program, tuple(arguments.items()), _called(code, program), times)
+
+
+def files(name: str) -> frozenset[str]:
+    """What the file of program O1000 may be called, in small letters."""
+    numbers = {name, name.zfill(_LONGEST_NUMBER)}
+    stems = {f"{letter}{number}" for number in numbers for letter in ("", "o")}
+    return frozenset(stem + ending for stem in stems for ending in ("", ".nc", ".ngc", ".cnc", ".tap"))
+
+
+def code_of(word: Word) -> str:
+    """G and M codes by name; empty for other words and computed codes."""
+    if chr(word.letter) not in "GM" or not isinstance(word.value, Number):
+        return ""
+    return f"{chr(word.letter)}{word.value.value:g}"
+
+
+def block_name(number: int, program: Procedure) -> str:
+    """The name of what M97 calls: the program from its block of that number on."""
+    return f"N{number} of O{program.name}" if program.name else f"N{number}"
+
+
+def _split(words: tuple[Word, ...], code: str, own: str) -> tuple[list[Word], dict[str, Expression]]:
+    """The words that a call does not use, and those that it does."""
+    rest, given = [], {}
+    for word in words:
+        letter = chr(word.letter)
+        if letter in own and letter not in given:
+            given[letter] = word.value
+        elif code_of(word) != code:
+            rest.append(word)
+    return rest, given
+
+
+def _row(rest: list[Word], line: SourceLine) -> list[Statement]:
+    return [Line(line.place, tuple(rest))] if rest else []
+
+
+def _called(code: str, name: str | Expression) -> str:
+    return f"{code} P{name}" if isinstance(name, str) else f"{code} P"

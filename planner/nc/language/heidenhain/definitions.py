@@ -1,0 +1,157 @@
+"""What sets something before it moves: the program's units, tool calls, and definitions of cycles."""
+
+from __future__ import annotations
+
+import re
+
+from planner.base.units import MM_PER_INCH
+from planner.nc.language.heidenhain import drilling
+from planner.nc.language.heidenhain.flow import Flow
+from planner.nc.language.heidenhain.items import items, looked_up, word
+from planner.nc.language.heidenhain.moves import Moves
+from planner.nc.language.heidenhain.text import ConversationalBlock, of, own, parameter, value
+from planner.nc.language.tree import (
+    Expression,
+    If,
+    Line,
+    Message,
+    Number,
+    Parameter,
+    Statement,
+)
+
+_PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
+
+
+class Definitions(Flow):
+    """What has been set.
+
+    moves  : path functions, with the feed of the tool call
+    unit   : mm per unit of the program
+    cycles : numbers of those that the program defines
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.moves = Moves(1.0)
+        self.unit = 1.0
+        self.cycles: set[int] = set()
+
+    def _begin(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        inch = block.text.upper().split()[-1] == "INCH"
+        self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
+        at = block.place.at
+        codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
+        return [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+
+    def _end(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
+
+    def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        found = re.match(
+            r"\s*(?:(\d+)(?:\.\d+)?|\"[^\"]*\")?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?((?:\s*(?:D[LR]2?|D[LR])[-+=\d.]+)*)\s*$",
+            block.text[column:],
+            re.IGNORECASE,
+        )
+        if found is None:
+            raise block.fault('TOOL CALL takes a number or "name", the axis Z, S and F', column)
+        tool, axis, _, feed, more = found.groups()
+        if axis and axis.upper() != "Z":
+            raise block.fault(f"tool axis {axis.upper()}; Z is planned", column + found.start(2))
+        if more and more.strip():
+            raise block.fault(
+                "DL and DR of a tool call are not read; correct the tool's length in the machine file",
+                column + found.start(5),
+            )
+        at = block.place.at
+        words = [word("T", at, Number(float(tool or 0))), word("M", at, Number(6.0))]
+        length = [word("G", at, Number(43.0)), word("H", at, Number(float(tool or 0)))]
+        rows: list[Statement] = (
+            [Line(block.place, tuple(words)), Line(block.place, tuple(length))] if tool else []
+        )
+        if found.group(3):
+            speed, _ = value(block, column + found.start(3))
+            rows.append(Line(block.place, (word("S", at, speed),)))
+        self.moves.automatic = None
+        if feed and feed.upper() != "MAX":
+            self.moves.automatic, _ = value(block, column + found.start(4))
+            rows.append(Line(block.place, (word("F", at, self.moves.scaled(self.moves.automatic)),)))
+        if tool:
+            rows.append(looked_up(block))
+        return rows
+
+    def _define(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        found = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
+        if found is None:
+            raise block.fault("CYCL DEF needs the number of a cycle", column)
+        cycle, part, column = int(found.group(1)), found.group(2), column + found.end()
+        if part is not None:
+            return self._old_cycle(block, cycle, int(part), column)
+        if cycle not in drilling.CYCLES:
+            raise block.fault(
+                f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}",
+                column,
+            )
+        given: list[tuple[Parameter, Expression]] = []
+        for entry in re.finditer(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE):
+            number, _ = value(block, column + entry.end())
+            if int(entry.group(1)) == 212 and isinstance(number, Number) and number.value != 0.0:
+                raise block.fault("Q212, a decrement of the infeed, is not read", column + entry.start())
+            given.append((self._q(block, int(entry.group(1))), number))
+        return [Line(block.place, (), (*given, (own("cycle"), Number(float(cycle)))))]
+
+    def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
+        at = block.place.at
+        if cycle in (7, 9, 32) and part == 0:
+            return []
+        if cycle == 32:
+            found = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
+            if found is None:
+                return []  # 32.2: filter and rotary axes
+            tolerance, _ = value(block, column + found.end())
+            return [Line(block.place, (word("G", at, Number(64.0)), word("P", at, tolerance)))]
+        if cycle == 9:
+            found = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
+            seconds, _ = value(block, column + (found.end() if found else 0))
+            return [Line(block.place, (word("G", at, Number(4.0)), word("P", at, seconds)))]
+        if cycle == 1:
+            return self._pecking(block, part, column)
+        if cycle == 7:
+            given = items(block, column)
+            words = [word("G", at, Number(52.0))]
+            words += [word(axis, at, end) for axis, (end, relative) in given.axes.items() if not relative]
+            if len(words) == 1 or any(relative for _, relative in given.axes.values()):
+                raise block.fault(
+                    "a datum shift by X, Y or Z is read, not incremental and not from a table", column
+                )
+            return [Line(block.place, tuple(words)), looked_up(block)]
+        raise block.fault(
+            f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}", column
+        )
+
+    def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[Statement]:
+        """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
+        cycle: list[tuple[Parameter, Expression]] = [(own("cycle"), Number(1.0))]
+        if part == 0:
+            return [Line(block.place, (), tuple(cycle))]
+        found = _PECKING.match(block.text, column)
+        if found is None or not 1 <= part <= len(drilling.PECKING):
+            raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
+        number, _ = value(block, found.end())
+        return [Line(block.place, (), ((parameter(drilling.PECKING[part - 1]), number),))]
+
+    def _call_cycle(self, block: ConversationalBlock) -> list[Statement]:
+        known = [cycle for cycle in drilling.CYCLES if cycle in self.cycles]
+        if not known:
+            raise block.fault("there is no drilling cycle to call; write CYCL DEF 200 before")
+        branches = tuple(
+            (
+                of("EQ", own("cycle"), Number(float(cycle))),
+                drilling.drilled(block, cycle, self.moves, self.unit),
+            )
+            for cycle in known
+        )
+        nothing: list[Statement] = [
+            Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
+        ]
+        return [If(block.place, branches, nothing)]

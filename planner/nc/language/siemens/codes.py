@@ -1,0 +1,35 @@
+"""What the words and commands of a Sinumerik program are in RS274NGC: tables."""
+
+from __future__ import annotations
+
+# Letters of words with the same meaning in RS274NGC.
+PLAIN_LETTERS = "NGXYZIJKFSM"
+# G codes with the same meaning.
+SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 40, 54, 55, 56, 57, 90, 91, 94)
+# G codes of Siemens that are others here; an empty tuple changes nothing.
+CODES: dict[int, tuple[float, ...]] = {
+    9: (),  # exact stop of one block; a full stop is added behind it
+    53: (53.0,),
+    60: (61.1,),
+    64: (64.0,),
+    **dict.fromkeys((642, 643, 644, 645), (64.0,)),
+    70: (20.0,),
+    71: (21.0,),
+    500: (54.0,),
+    700: (20.0,),
+    710: (21.0,),
+    **dict.fromkeys((450, 451, 601, 602, 603, 621, 95 * 100), ()),
+}
+# Commands that move nothing and change nothing of what is planned.
+IDLE = frozenset((
+    "FNORM", "FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE", "COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF", "UPATH", "SPATH",
+    "FIFOCTRL", "STOPRE", "ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIMACHAX", "ORIVIRT1", "TRAFOOF", "TOFRAMEOF", "PAROTOF",
+    "TOWSTD", "CUT2D", "CUT2DF", "CDON", "CDOF", "CDOF2", "NORM", "KONT", "DIAMOF", "CFC", "CFIN", "CFTCP", "RTLION", "RTLIOF",
+))  # fmt: skip
+# The same with arguments or a value behind them.
+IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "SPOS", "LIMS"))
+# Commands that turn, mirror or scale, and arcs that are not read.
+REFUSED = (
+    "ROT", "AROT", "ROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "TRAORI", "TRANSMIT", "TRACYL", "CIP", "CT",
+)  # fmt: skip
+REMEDY = "let the CAM system write the moves out"

@@ -1,0 +1,167 @@
+"""Commands of a Sinumerik program: cycles, frames, declarations and messages."""
+
+from __future__ import annotations
+
+import re
+
+from planner.nc.language.siemens import codes, drilling
+from planner.nc.language.siemens.control import SiemensControl
+from planner.nc.language.siemens.text import TokenReader, operation, position, variable
+from planner.nc.language.tree import ZERO, Expression, Line, Message, Number, Parameter, Statement, Word
+
+_TYPES = frozenset(("REAL", "INT", "BOOL"))
+
+
+class Commands(SiemensControl):
+    """What commands have set.
+
+    names    : of the variables
+    absolute : G90 is in force
+    unit     : mm per unit of the program
+    cycle    : of MCALL, which follows every row that moves
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.names = {"_DEPTH", "_STEP"}
+        self.absolute = True
+        self.unit = 1.0
+        self.cycle: list[Statement] | None = None
+
+    def _cycle(self, reader: TokenReader, name: str) -> None:
+        place = reader.place
+        given = self._arguments(reader)
+        if name == "CYCLE800":
+            if any(one is not None and one not in (ZERO, Number(-0.0)) for one in given[4:]):
+                raise reader.fault("CYCLE800 with angles tilts the part; axes that turn are not planned yet")
+        elif name == "CYCLE832":
+            if given and given[0] is not None and given[0] != ZERO:
+                self.body.append(
+                    Line(place, (as_word("G", place.at, Number(64.0)), as_word("P", place.at, given[0])))
+                )
+        else:
+            self.body += self._drilled(reader, name, given)
+
+    def _drilled(self, reader: TokenReader, name: str, given: list[Expression | None]) -> list[Statement]:
+        try:
+            return drilling.drilled_rows(reader.place, name, given, self.unit)
+        except ValueError as fault:
+            raise reader.fault(str(fault), 0) from fault
+
+    def _arguments(self, reader: TokenReader) -> list[Expression | None]:
+        """What stands in the brackets behind a cycle; None for what is left out or a text."""
+        given: list[Expression | None] = []
+        if not reader.take("("):
+            return given
+        while not reader.take(")"):
+            if reader.peek() == ",":
+                given.append(None)
+            elif not reader.ended and reader.tokens[reader.next].kind == "text":
+                reader.next += 1
+                given.append(None)
+            else:
+                given.append(reader.expression())
+            if not reader.take(",") and reader.peek() != ")":
+                raise reader.fault(") is missing")
+        return given
+
+    def _modal_call(self, reader: TokenReader) -> None:
+        if reader.ended:
+            self.cycle = None
+            return
+        name = reader.peek()
+        reader.next += 1
+        if name not in drilling.ARGUMENTS:
+            raise reader.fault(f"MCALL {name} is not read; read are {', '.join(drilling.ARGUMENTS)}", 0)
+        self.cycle = self._drilled(reader, name, self._arguments(reader))
+
+    def _shift(self, reader: TokenReader) -> None:
+        """TRANS: an origin; ATRANS: one beside the one before."""
+        more = reader.peek(-1) == "ATRANS"
+        place = reader.place
+        ends = {axis: variable(f"_t{axis.lower()}") for axis in "XYZ"}
+        given: dict[str, Expression] = {}
+        while not reader.ended:
+            token, at = reader.tokens[reader.next], reader.at()
+            reader.next += 1
+            letter = token.text[0]
+            if letter not in ends or not (
+                token.kind == "word" or (len(token.text) == 1 and reader.peek() == "=")
+            ):
+                raise reader.fault(f"TRANS takes X, Y and Z; {token.text} comes", token.at)
+            value = Number(float(token.text[1:])) if token.kind == "word" else self._given(reader, letter, at)
+            if value is None:
+                raise reader.fault("a text is no length", token.at)
+            given[letter] = value
+        assigned: list[tuple[Parameter, Expression]] = [
+            (ends[axis], operation("+", ends[axis], given.get(axis, ZERO)) if more else given.get(axis, ZERO))
+            for axis in ends
+        ]
+        self.body.append(Line(place, (), tuple(assigned)))
+        words = [
+            as_word("G", place.at, Number(52.0)),
+            *(as_word(axis, place.at, ends[axis]) for axis in ends),
+        ]
+        self.body.append(Line(place, tuple(words)))
+
+    def _define(self, reader: TokenReader) -> None:
+        kind = reader.peek()
+        reader.next += 1
+        if kind not in _TYPES:
+            raise reader.fault(f"DEF {kind} is not read; read are {', '.join(sorted(_TYPES))}", 0)
+        while True:
+            name = reader.peek()
+            if reader.ended or reader.tokens[reader.next].kind != "name" or reader.peek(1) == "[":
+                raise reader.fault("the name of a variable is expected here; arrays are not read")
+            reader.next += 1
+            self.names.add(name)
+            value = reader.expression() if reader.take("=") else ZERO
+            self.body.append(Line(reader.place, (), ((variable(name), value),)))
+            if not reader.take(","):
+                return
+
+    def _message(self, reader: TokenReader) -> None:
+        found = re.search(r'"([^"]*)"', reader.text)
+        reader.next = len(reader.tokens)
+        if found and found.group(1):
+            self.body.append(Message(reader.place, (found.group(1),)))
+
+    def _refused(self, reader: TokenReader) -> None:
+        raise reader.fault(
+            f"{reader.peek(-1)} is not read; {codes.REMEDY}", reader.tokens[reader.next - 1].at
+        )
+
+    def _idle(self, reader: TokenReader) -> None:
+        reader.next = len(reader.tokens)
+
+    def _given(self, reader: TokenReader, letter: str, at: int) -> Expression | None:
+        """The value behind an equals sign; None for a text, such as T="DRILL"."""
+        reader.expect("=")
+        if not reader.ended and reader.tokens[reader.next].kind == "text":
+            reader.next += 1
+            return None
+        kind = reader.peek()
+        if kind in ("AC", "IC") and reader.peek(1) == "(":
+            reader.next += 2
+            value = reader.expression()
+            reader.expect(")")
+            return self._coordinate(letter, value, kind == "AC", reader, at)
+        return reader.expression()
+
+    def _coordinate(
+        self, letter: str, value: Expression, absolute: bool, reader: TokenReader, at: int
+    ) -> Expression:
+        if letter in "IJK":
+            return operation("-", value, position("XYZ"["IJK".index(letter)])) if absolute else value
+        if letter not in "XYZ":
+            raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
+        if absolute == self.absolute:
+            return value
+        return operation(
+            "-" if absolute else "+", *((value, position(letter)) if absolute else (position(letter), value))
+        )
+
+
+def as_word(letter: str, at: int, value: Expression) -> Word:
+    """A word of a row."""
+    return Word(ord(letter), at, value)

@@ -1,0 +1,1 @@
+"""Makes what the tests of the dialects share importable: `language_programs`."""

@@ -50,8 +50,11 @@ def step_numbers(
 
 
 def pace(velocity: FloatArray) -> FloatArray:
-    """(N,) speed of each step [mm/s] with the velocities (N+1, A) at its nodes, at most a thousand times below the fastest: near rest
-    the rows of the normal acceleration have to be as small as the speed."""
+    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
+    to be as small as the speed.
+
+    velocity : (N+1, A) at the nodes [mm/s]
+    """
     at_nodes = np.linalg.norm(velocity, axis=1)
     return np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * float(at_nodes.max()))
 

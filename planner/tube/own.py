@@ -82,7 +82,7 @@ class _Search:
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
         self.iterations = 0
-        self._keeps = _keeps(run)
+        self._keeps = keeps_of(run)
         self._strain = _strain(run, guess)
 
     def sweep(self) -> None:
@@ -155,7 +155,7 @@ class _Search:
         return True
 
 
-def _keeps(run: TubeRun) -> Keeps:
+def keeps_of(run: TubeRun) -> Keeps:
     """What the run has to keep, for the kernel."""
     names = ("length", "base", "drift", "e1", "e2", "radius", "rate")
     return Keeps(

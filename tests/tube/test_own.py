@@ -159,7 +159,7 @@ def test_shares_are_those_of_a_fine_sampling():
     begin = np.array([[0.0, 0.0], [20.0, 15.0], [0.0, 0.0]])
     state = integrated(begin, h, jerk)
     leg = np.zeros(steps, np.int64)
-    limit, tube = worst_shares(own._keeps(run), leg, h, state, jerk, np.zeros((steps, 3)))
+    limit, tube = worst_shares(own.keeps_of(run), leg, h, state, jerk, np.zeros((steps, 3)))
     t = np.linspace(0.0, 1.0, 2001)[:, None, None] * h[None, :, None]
     p, v, a = (state[:-1, k] for k in range(3))
     speeds, pushes = v + t * (a + t * jerk / 2), a + t * jerk

@@ -109,22 +109,22 @@ class _Search:
         begin = near - JOIN_WITHIN
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
-    def _improve(self, lo: int, hi: int) -> None:
+    def _improve(self, lo: int, hi: int, costs: tuple[float, ...] = PROX) -> None:
         """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found."""
-        if self._improved(lo, hi) or hi - lo < 2 * LEAST:
+        if self._improved(lo, hi, costs) or hi - lo < 2 * LEAST:
             return
         middle = (lo + hi) // 2
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
         middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
         before = float(self.guess.h[lo:hi].sum())
-        self._improve(lo, middle)
-        self._improve(middle, hi)
+        self._improve(lo, middle, PROX[:1])
+        self._improve(middle, hi, PROX[:1])
         if self.guess.h[lo:hi].sum() < before:
-            self._improved(lo, hi)
+            self._improved(lo, hi, costs)
 
-    def _improved(self, lo: int, hi: int) -> bool:
-        """Whether an optimum of the steps lo .. hi - 1 was found; if it is faster it takes their place."""
-        for prox in PROX:
+    def _improved(self, lo: int, hi: int, costs: tuple[float, ...]) -> bool:
+        """Whether an optimum of the steps lo .. hi - 1 was found with one of the `costs` of PROX; if it is faster it takes their place."""
+        for prox in costs:
             window = window_of(self.run, self.guess, lo, hi)
             x, u, place = window.x, window.u, window.place
             tuning = Tuning(PULL, prox, self.settings.gap)

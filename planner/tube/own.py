@@ -123,7 +123,8 @@ class _Search:
             self._improved(lo, hi, costs)
 
     def _improved(self, lo: int, hi: int, costs: tuple[float, ...]) -> bool:
-        """Whether an optimum of the steps lo .. hi - 1 was found with one of the `costs` of PROX; if it is faster it takes their place."""
+        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `costs` (PROX); if it is faster it takes their
+        place."""
         for prox in costs:
             window = window_of(self.run, self.guess, lo, hi)
             x, u, place = window.x, window.u, window.place

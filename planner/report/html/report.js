@@ -70,7 +70,7 @@
       head.append(make("th", "more of"), make("th", "saves [s]"));
       element("prices").append(head);
       for (const [name, seconds] of saved.sort((a, b) => b[1] - a[1]).slice(0, 8)) {
-        if (!(seconds > 0)) continue;
+        if (!(seconds > 1e-6)) continue;
         const row = make("tr"), more = name === "tolerance" ? `${1000 * prices.more_tolerance_mm} µm` : `${100 * prices.more_limit} %`;
         const hint = (prices.hints || []).includes(name) ? "about " : "";
         row.append(make("td", `${name}, ${more}`), make("td", hint + digits(seconds, 3)));
@@ -372,7 +372,7 @@
   ], [
     (k) => c.line_number[k], (k) => (programLines[c.line_number[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
     (k) => c.line_planned[k] / c.line_programmed[k], (k) => c.line_highest[k], (k) => about.limits[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
-    ...(c.line_more ? [(k) => 1000 * c.line_more_feed[k], (k) => 1000 * c.line_more[k]] : []),
+    ...(c.line_more ? [c.line_more_feed, c.line_more].map((saved) => (k) => Math.round(1e6 * saved[k]) / 1e3) : []),
   ], c.line_number, c.line_more ? "cells ten" : "cells");
   const corner = about.corners;
   if (corner.line && corner.line.length) {

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from language_programs import same
 
 from planner.base.errors import InputError
 from planner.machine import load_machine
@@ -27,14 +28,9 @@ def read(text: str) -> Program:
     return parse_program(text, MILL, SIEMENS)
 
 
-def same(found: Program, text: str) -> None:
-    expected = parse_program(text, MILL)
-    assert found.kind.tolist() == expected.kind.tolist()
-    np.testing.assert_allclose(found.end, expected.end, atol=1e-9)
-    np.testing.assert_allclose(found.feed, expected.feed)
-    np.testing.assert_allclose(found.arc_center, expected.arc_center, atol=1e-9)
-    np.testing.assert_allclose(found.arc_sweep, expected.arc_sweep, atol=1e-9)
-    np.testing.assert_allclose(found.dwell, expected.dwell)
+def assert_reads_as(found: Program, text: str) -> None:
+    """The same motion as that of a program in RS274NGC."""
+    same(found, parse_program(text, MILL), apart=1e-9)
 
 
 def test_words_with_values_and_coordinates_of_both_kinds() -> None:
@@ -51,7 +47,7 @@ N80 G90 G4 F1.5
 N90 G0 SUPA Z=-3
 M30"""
     )
-    same(
+    assert_reads_as(
         found,
         """G21 G90 G94
 T0 M6
@@ -101,7 +97,7 @@ IF NOT (R1==4) AND TRUE GOTOF N900
 X999
 N900 Z=7 DIV 2"""
     )
-    same(
+    assert_reads_as(
         found,
         "G21 G0 X0 Y0\nG1 X10 F600\nX20\nX30\nY9\nY-2\nZ1\nZ0\nX29\nX28\nX11\nY-1\nY0\nY1\nZ3",
     )
@@ -123,7 +119,7 @@ X40
 TRANS
 X1""".replace("_NO", "1")
     )
-    same(
+    assert_reads_as(
         found,
         """G21 G90 G0 X0 Y0 Z30 F300
 G52 X15 Z1

@@ -21,16 +21,8 @@ from planner.commands.options import (
     ToleranceOption,
     takes_reading,
 )
-from planner.commands.terminal import (
-    BAD_INPUT,
-    FAILED,
-    NOT_SOLVED,
-    ProgressBar,
-    guarded,
-    memory_used_up,
-    say,
-    show,
-)
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, guarded, memory_used_up, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
@@ -55,6 +47,14 @@ def compare_command(
         Path | None,
         typer.Option("-o", "--output", "--out", metavar="FILE", help="write the comparison (.json, .csv)"),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report",
+            metavar="FILE",
+            help="write a page with the motions side by side (.html) for a browser",
+        ),
+    ] = None,
     force: ForceOption = False,
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
@@ -66,6 +66,8 @@ def compare_command(
 
     The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused the job.
     """
+    if force and output is None:
+        raise InputError("--force has no effect without a file to write; name one with -o FILE")
     methods = parse_methods(method)
     from planner.machine import load_machine
     from planner.nc.reader import read_program
@@ -79,18 +81,27 @@ def compare_command(
 
     if output is not None:
         check_comparison_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+    if report is not None:
+        from planner.report.html.comparison_page import check_page_place
+
+        check_page_place(report, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     limits = load_machine(machine or DEFAULT_MACHINE)
     program = read_program(job, limits, reading)
-    rows = [_run(name, program, limits, tolerance, quiet) for name in methods]
+    rows = [_run(name, program, limits, tolerance, quiet, report is not None) for name in methods]
     about = about_job(str(job), limits, tolerance)
+    if report is not None:
+        from planner.report.html.comparison_page import write_comparison_page
+
+        write_comparison_page(report, rows, str(job), limits, program)
     if output is not None:
         write_comparison(output, rows, about)
     if as_json:
         say(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
     else:
         show(comparison_table(rows, f"{job}: {len(rows)} methods, machine {limits.name}"))
-        if output is not None:
-            say(str(output))
+        for file in (output, report):
+            if file is not None:
+                say(str(file))
     outcomes = {row.outcome for row in rows}
     if "passed" not in outcomes:
         raise typer.Exit(
@@ -115,9 +126,12 @@ def parse_methods(text: str) -> list[str]:
     return names
 
 
-def _run(method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool) -> Row:
-    """Plan with one method and say on standard error how it went."""
+def _run(
+    method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool, shown: bool
+) -> Row:
+    """Plan with one method and say on standard error how it went; keep samples of the motion if they are `shown` on a page."""
     from planner.report.compare import Row, row_of
+    from planner.report.html.comparison_page import SAMPLES_MAX
 
     with ProgressBar(quiet=quiet) as progress:
         try:
@@ -127,6 +141,7 @@ def _run(method: str, program: Program, machine: Machine, tolerance: float | Non
                 machine,
                 tolerance,
                 lambda stage, fraction: progress(f"{method}: {stage}", fraction),
+                SAMPLES_MAX if shown else 0,
             )
         except MemoryError as fault:
             row = Row(method=method, outcome="not solved", sentence=memory_used_up(fault))

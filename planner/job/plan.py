@@ -8,16 +8,18 @@ from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
+from planner.job.beside import Beside, beside_motion
 from planner.job.records import CornerTable, GridHistory, PriceList
+from planner.job.shown import Shown
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.verify import CornerCheck, Verdict
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Plan:
-    """A planned job.
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Plan(Shown):
+    """A planned job: its records, and how it shows itself in Python and notebooks (shown.py).
 
     method, solver      : names of what was used
     corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where no corner is rounded
@@ -52,6 +54,20 @@ class Plan:
     notes: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Program, machine, method, cycle time and verdict, in a line."""
+        verdict = "not solved" if self.verdict is None else "passed" if self.verdict.passed else "failed"
+        time = "" if self.trajectory is None else f"{self.trajectory.cycle_time:.4f} s, "
+        source = self.program.source.replace("\\", "/").rpartition("/")[2]
+        return f"<Plan of {source} on {self.machine.name} by {self.method}: {time}{verdict}>"
+
+    @property
+    def cycle_time(self) -> float:
+        """Duration of the motion [s]. Raises NotSolvedError if there is none."""
+        if self.trajectory is None:
+            raise NotSolvedError(self.sentence)
+        return self.trajectory.cycle_time
+
     @property
     def geometry(self) -> str | None:
         """How the path was smoothed: "auto" or "spline", "corners" where each corner is rounded by itself; None where no corner is
@@ -59,6 +75,11 @@ class Plan:
         if self.corner is None:
             return None
         return self.corner if self.corner in (AUTO, SPLINE) else SINGLE_CORNERS
+
+    @property
+    def beside(self) -> tuple[Beside, ...]:
+        """What happens while the axes stand still, tool changes for example, and how long it takes; no part of the cycle time."""
+        return beside_motion(self.program, self.machine)
 
     @property
     def solved(self) -> bool:

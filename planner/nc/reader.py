@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
-from planner.base.files import require_ending
+from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
@@ -22,16 +22,43 @@ from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, LATHE, SIEMENS, Reading
 
 
-def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
+def read_program(
+    path: str | Path | None = None,
+    machine: Machine | None = None,
+    reading: Reading = AS_USUAL,
+    *,
+    text: str | bytes | None = None,
+) -> Program:
     """Read an NC program or a plotter file.
 
+    path    : the file; None where `text` is given
+    text    : the program itself
     machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
               None for zeros and blending
     reading : what is refused, left out and assumed
 
-    Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.
+    Raises InputError if the file cannot be read, for the first construct that is not supported or not valid, and unless one of file
+    and text is given.
+
+    >>> import planner
+    >>> len(planner.read_program(text="G21 F3000\\nG1 X10\\nY5\\n"))
+    2
     """
-    return parse_program(load(path), machine, reading, source=str(path))
+    if (path is None) == (text is None):
+        raise InputError("give a program file, or its text as text=...")
+    if text is not None:
+        return dataclasses.replace(
+            parse_program(text, machine, reading), text=text.encode() if isinstance(text, str) else text
+        )
+    assert path is not None
+    data = load(path)
+    program = parse_program(data, machine, reading, source=source_name(path))
+    return dataclasses.replace(program, text=data) if str(path) == STDIN else program
+
+
+def source_name(path: str | Path) -> str:
+    """What messages call a program file."""
+    return "<stdin>" if str(path) == STDIN else str(path)
 
 
 def parse_program(
@@ -121,8 +148,10 @@ def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Progr
 
 
 def load(path: str | Path) -> bytes:
-    """The bytes of a program file. Raises InputError if there is no such file or it cannot be read."""
+    """The bytes of a program file, or of the standard input for "-". Raises InputError if it cannot be read."""
     try:
+        if str(path) == STDIN:
+            return standard_input()
         require_ending(path)
         return Path(path).read_bytes()
     except FileNotFoundError as fault:

@@ -25,9 +25,10 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.info import PLACES_SHOWN
+from planner.report.beside import beside_summary
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
-from planner.report.planned import LeftOut, planned_program
+from planner.report.planned import LeftOut, planned_program, source_text
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
@@ -139,6 +140,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "status": plan.status.name,
             "sentence": plan.sentence,
             "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
+            "beside_motion": beside_summary(plan),
             "stop_time_s": plan.stop_time,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
             "verdict": verdict_summary(verdict) if verdict is not None else None,
@@ -219,14 +221,6 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
         return planned_program(plan, blocks)
     except LeftOut as why:
         return None, [f"{PLANNED} is left out: {why}"]
-
-
-def source_text(plan: Plan) -> bytes | None:
-    """The text of the program, if it was read from a file that is still there."""
-    try:
-        return Path(plan.program.source).read_bytes()
-    except (OSError, ValueError):
-        return None
 
 
 def _is_source(plan: Plan, file: Path) -> bool:

@@ -179,6 +179,8 @@ class Interpreter:
             self._cutter.fix()
         if stop == 600:
             self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600):
+            self.store.add_event("M", stop / 10, block.line)
         if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:

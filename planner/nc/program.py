@@ -137,6 +137,7 @@ class Program:
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
     reading      : the settings it was read with
+    pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : the program itself, if it was given as a text; None for those of a file, and for points
     """
 
@@ -162,6 +163,7 @@ class Program:
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
     reading: Reading = AS_USUAL
+    pen: bool = False
     text: bytes | None = None
 
     def __post_init__(self) -> None:

@@ -23,6 +23,7 @@ from benchmarks import record
 
 ROOT = Path(__file__).resolve().parents[1]
 NC = ROOT.parent / "shared" / "nc"
+BOARD = NC / "pcb2gcode__pcb2gcode__multivibrator-extra-passes-two-isolators-tiles-milldrill.ngc"
 TURTLE = NC / "winder__Universal-G-Code-Sender__electric_turtle.nc"
 SHAPEOKO = NC / "winder__Universal-G-Code-Sender__ShapeOko_Calibration_Pattern_01b.ngc"
 SPIRAL = NC / "vilemduha__blendercam__Spiral.gcode"
@@ -48,7 +49,7 @@ FITTED: list[Job] = [
     ),
 ]
 NEW: list[Job] = [
-    ("pocket", NC / "LinuxCNC__linuxcnc__qpocket.ngc", "mill", "normal", "optimal", None),
+    ("circuit board, milling", BOARD, "router", "normal", "optimal", None),
     ("electric turtle, kinematic", TURTLE, "mill", "normal", "kinematic", None),
     (
         "circuit board",

@@ -7,6 +7,7 @@ template with every key and its unit.
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Sequence
 from importlib import resources
@@ -206,7 +207,7 @@ class Machine(_Record):
     def _names_known(self) -> Machine:
         for table, allowed in (("positions", ("g28", "g30")), ("work_offsets", WORK_OFFSETS)):
             for key, values in getattr(self, table).items():
-                if key not in allowed:
+                if key not in allowed and not (table == "work_offsets" and _FURTHER_OFFSET.fullmatch(key)):
                     raise ValueError(f"{table}: '{key}' is not known; allowed are {', '.join(allowed)}")
                 for letter in values:
                     if letter not in LINEAR_AXES:
@@ -248,6 +249,7 @@ class Machine(_Record):
         return machine
 
 
+_FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
 
 

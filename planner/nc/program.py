@@ -199,8 +199,11 @@ class Program:
 
     def place(self, block: int) -> str:
         """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost first."""
-        text = f"line {self.line[block]}"
-        frame = int(self.frame[block]) if self.frames else 0
+        return f"line {self.line[block]}" + self.called(int(self.frame[block]) if self.frames else 0)
+
+    def called(self, frame: int) -> str:
+        """The calls that led to a frame, innermost first, behind the line of a block; empty for the main program."""
+        text = ""
         while frame > 0:
             at = self.frames[frame]
             elsewhere = f" in {at.source}" if at.source != self.source else ""

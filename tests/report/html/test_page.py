@@ -66,6 +66,22 @@ def test_columns_are_those_of_the_plan(page: str, plan: Plan) -> None:
     assert about["limits"][-1] == "none"
 
 
+def test_places_of_an_expanded_program_name_their_calls(tmp_path: Path) -> None:
+    file = tmp_path / "calls.ngc"
+    file.write_text(
+        "G21 F3000\no1 sub\nG1 X#1\no1 endsub\no2 sub\no1 call [9]\no2 endsub\nG1 Y5\no1 call [5]\no2 call\nM2\n"
+    )
+    plan = planner.plan(file, MILL, method="stop")
+    page = report_page(plan, file.read_bytes())
+    about = json.loads(re.search(r'id="about">(.*?)</script>', page, re.DOTALL).group(1))  # type: ignore[union-attr]
+    frame = column(page, "frame", "<i4")
+    assert plan.trajectory is not None
+    places = [f"line {line}{about['calls'][k]}" for line, k in zip(plan.trajectory.line, frame, strict=True)]
+    assert list(dict.fromkeys(places)) == [
+        "line 8", "line 3 (1), called from line 9", "line 3 (1), called from line 6 (2), called from line 10",
+    ]  # fmt: skip
+
+
 def test_deviation_is_that_of_the_verdict(plan: Plan) -> None:
     assert plan.verdict is not None
     worst = float(samples_of(plan).deviation.max())
@@ -275,3 +291,15 @@ def test_prices_are_a_colour_and_columns(browser: Any, plan: Plan) -> None:
         "10 % more F saves [ms]",
         "10 % more of all limits saves [ms]",
     ]
+
+
+@pytest.mark.slow
+def test_zoomed_in_what_is_in_sight_is_drawn_finer(browser: Any, plan: Plan) -> None:
+    browser.execute_script("Plotly.relayout('profile', {'xaxis.autorange': true})")
+    everywhere = wait_for(browser, "const n = report.drawn(); return n > 2000 ? n : null")
+    close = "{'scene.camera.eye': {x: 0, y: 0, z: 0.3}, 'scene.camera.center': {x: 0, y: 0, z: 0}}"
+    browser.execute_script(f"Plotly.relayout('path', {close})")
+    less = wait_for(browser, f"const n = report.drawn(); return n < {everywhere} ? n : null")
+    assert less > everywhere / 3, "what is out of sight is still there, coarser"
+    browser.execute_script("Plotly.relayout('path', {'scene.camera.eye': {x: 0, y: 0, z: 1.6}})")
+    assert wait_for(browser, f"return report.drawn() === {everywhere}")

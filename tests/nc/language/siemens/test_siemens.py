@@ -11,7 +11,7 @@ from language_programs import same
 from planner.base.errors import InputError
 from planner.machine import load_machine
 from planner.nc.program import Kind, PathControl, Program
-from planner.nc.reader import parse_program
+from planner.nc.reader import parse_program, read_program
 from planner.nc.reading import Reading
 
 MILL = load_machine("mill")
@@ -221,3 +221,68 @@ def test_mutated_programs_end_in_a_program_or_a_sentence(monkeypatch: pytest.Mon
         except InputError:
             refused += 1
     assert 0 < refused < 200
+
+
+SUBPROGRAMS = {
+    "HOLE.SPF": "PROC HOLE(REAL DEPTH, INT TWICE)\nDEF REAL A=5\nG1 Z=-DEPTH\nIF TWICE==1\nG1 Z=-2*DEPTH\nENDIF\nG0 Z=A\nRET\nG0 X99\n",
+    "ROW.SPF": ";no first line\nG91 X2\nG90\nM17\n",
+    "L10.SPF": "R1=R1+1\nG1 Y=R1\nM30\n",
+    "10_deep.spf": "N10 TRANS X100\nG1 X1\nHOLE(1)\nM17\n",
+}
+
+
+def test_subprograms_in_files_of_their_own(tmp_path: Path) -> None:
+    for name, text in SUBPROGRAMS.items():
+        (tmp_path / name).write_text(text)
+    main = 'DEF REAL A=7\nEXTERN HOLE(REAL, INT)\nG0 X0 Y0 Z5 F100\nG1 X1\nHOLE(3, 1)\nROW P3\nL10\nL10\nCALL "10_DEEP"\nG1 X=A\nM30\n'
+    (tmp_path / "main.mpf").write_text(main)
+    program = read_program(tmp_path / "main.mpf", reading=Reading(dialect="siemens"))
+    written = "G21 G90 G0 X0 Y0 Z5 F100\nG1 X1\nG1 Z-3\nZ-6\nG0 Z5\nX3\nX5\nX7\nG1 Y1\nY2\nG1 X101\nZ-1\nG0 Z5\nG1 X107\nM30\n"
+    same(program, parse_program(written))
+    assert program.expansion is not None
+    assert dict(program.expansion.calls) == {"hole": 2, "row": 3, "l10": 2, "10_deep": 1}
+    place = program.place(len(program) - 2)
+    assert "HOLE.SPF" in place
+    assert "called from line 3" in place
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        ("NOFILE", "no such subprogram"),
+        ("HOLE(1", "missing"),
+        ("CALL 5", "followed by the name"),
+        ("POCKET3(1,2)", "not read"),
+        ("HOLE(1) X5", "not expected"),
+    ],
+)
+def test_calls_that_lead_nowhere_are_refused(call: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "HOLE.SPF").write_text(SUBPROGRAMS["HOLE.SPF"])
+    (tmp_path / "main.mpf").write_text(f"G0 X1\n{call}\nM30\n")
+    with pytest.raises(InputError, match=said) as found:
+        read_program(tmp_path / "main.mpf", reading=Reading(dialect="siemens"))
+    assert found.value.line == 2
+
+
+def test_patterns_of_holes() -> None:
+    head = "G0 X0 Y0 Z10 F100\nMCALL CYCLE81(5,0,2,-3)\n"
+    row = read(head + "HOLES1(10,20,30,5,4,3)\nMCALL\nG0 X0 Y0\nM30")
+    holes = row.end[row.kind == Kind.LINE]
+    along = 5 + 4 * np.arange(3)
+    np.testing.assert_allclose(holes[:, 0], 10 + along * np.cos(np.pi / 6), atol=1e-12)
+    np.testing.assert_allclose(holes[:, 1], 20 + along * np.sin(np.pi / 6), atol=1e-12)
+    assert (holes[:, 2] == -3).all()
+    assert row.end[-1].tolist() == [0, 0, 5]
+    for step, apart in ((0, 72.0), (20, 20.0)):
+        circle = read(head + f"HOLES2(1,2,15,10,{step},5)\nMCALL\nM30")
+        holes = circle.end[circle.kind == Kind.LINE]
+        angle = np.radians(10 + apart * np.arange(5))
+        np.testing.assert_allclose(
+            holes[:, :2], np.stack([1 + 15 * np.cos(angle), 2 + 15 * np.sin(angle)], axis=1), atol=1e-12
+        )
+    for text, said in (
+        ("HOLES1(1,2,3,4,5,6)", "stands behind MCALL"),
+        ("MCALL CYCLE81(5,0,2,-3)\nHOLES2(1,2,,0)", "needs RAD"),
+    ):
+        with pytest.raises(InputError, match=said):
+            read(f"G0 X0\n{text}\nM30")

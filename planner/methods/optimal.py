@@ -15,7 +15,6 @@ from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
 from planner.job.job import Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.methods.free import freed
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
 from planner.optimal.effort import EFFORTS
@@ -68,4 +67,8 @@ class OptimalMethod(Method):
         if self.shaped:
             return shaped_plan(job, settings)
         plan = fastest_plan(job, settings)
-        return freed(job, plan) if self.effort == BEST and self.corner == AUTO else plan
+        if self.effort != BEST or self.corner != AUTO:
+            return plan
+        from planner.methods.free import freed  # other plans need not load what it uses
+
+        return freed(job, plan)

@@ -41,7 +41,7 @@ def test_more_effort_is_never_slower(program):
 
 def test_where_jerk_is_what_limits_the_best_effort_finds_what_rounds_do_not():
     """On mill, a/j = 40 ms: rounds end 2 % later than ipopt's free optimum, 2.8357 s for 50 legs."""
-    normal, best = (plan(problems.zigzag(10), MACHINE, effort=name) for name in (NORMAL, BEST))
+    normal, best = (plan(problems.zigzag(6), MACHINE, effort=name) for name in (NORMAL, BEST))
     assert best.verdict.passed
     assert best.trajectory.cycle_time < normal.trajectory.cycle_time * (1 - 1e-2)
 

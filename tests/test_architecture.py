@@ -22,6 +22,7 @@ LAYERS = (
     "planner.base.arrays",
     "planner.base.files",
     "planner.base.glossary",
+    "planner.base.processor",
     "planner.base.kept",
     "planner.base.linking",
     "planner.base.compiling",

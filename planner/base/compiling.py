@@ -3,6 +3,7 @@
 A kernel that Python calls (a root) contains all the kernels that it calls, optimised once as a whole. As it comes, numba also
 optimises each of these by itself, turns each into machine code, and makes an entry for Python and one for C, none of which is used. So
 
+  processor   code is made for a level of the architecture (processor.py): `_Generator`
   libraries   what is compiled inside a root stays a library of instructions that the root links: `_Inner`; only the root is optimised
               as a whole and turned into machine code, with everything in it
   entries     kernels inside a root have no entry for Python: `ENTRIES`
@@ -29,6 +30,7 @@ from numba.core import codegen, compiler, registry, targetconfig, types
 from numba.core.types import functions
 
 from planner.base.kept import Kept
+from planner.base.processor import processor
 
 ENTRIES = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -108,6 +110,24 @@ class _LaterEnvironment:
         return getattr(self._numba_s, name)
 
 
+class _Generator(codegen.JITCPUCodegen):
+    """numba's code generator, for the processor of processor.py."""
+
+    _library_class = _Inner
+
+    def _get_host_cpu_name(self) -> str:
+        return processor().name
+
+    def _get_host_cpu_features(self) -> str:
+        return processor().features
+
+
+@functools.cache
+def _generator() -> _Generator:
+    """The one of this process."""
+    return _Generator("planner")
+
+
 class _RootCompiler(compiler.Compiler):
     """Gives a root a library with machine code, as numba does it."""
 
@@ -127,7 +147,7 @@ class _Compiler:
     def compile(self, args: Any, return_type: Any) -> Any:
         with _replaced():
             made = self._numba_s.compile(args, return_type)
-        generator = registry.cpu_target.target_context.codegen()
+        generator = _generator()
         for name in [name for name in _environments if generator._engine.is_symbol_defined(name)]:
             generator.set_env(name, _environments.pop(name))
         return made
@@ -140,7 +160,7 @@ class _Compiler:
 def _replaced() -> Iterator[None]:
     settings = targetconfig.TargetConfig
     replacements: list[tuple[Any, str, Any]] = [
-        (registry.cpu_target.target_context.codegen(), "_library_class", _Inner),
+        (registry.cpu_target.target_context, "_internal_codegen", _generator()),
         (functions.BaseFunction, "get_call_type", _call_type),
         (settings, "__eq__", _same_settings),
         (settings, "__hash__", _hash_of_settings),

@@ -35,6 +35,7 @@ _SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "non
 
 _told: Callable[[bool], None] | None = None
 _warned = False
+_files: set[str] = set()
 _one_at_a_time = threading.RLock()
 
 
@@ -46,6 +47,11 @@ def at_compilation(tell: Callable[[bool], None] | None) -> None:
     """Call `tell` whenever a kernel is about to be compiled, with True if it is kept for the next run; None for no more calls."""
     global _told
     _told = tell
+
+
+def files_used() -> list[str]:
+    """The files of all kernels that this process has loaded or written, sorted."""
+    return sorted(_files)
 
 
 def known_numba() -> bool:
@@ -110,17 +116,18 @@ class Kernel:
 
     def _loaded(self, where: kept.Place) -> Callable[..., Any] | None:
         try:
-            kernel = kept.read(where)
+            found = kept.read(where)
         except OSError as fault:
             _warn(fault)
             return None
-        if kernel is None:
+        if found is None:
             return None
         from planner.base.linking import linker
 
-        found = linker().function(kernel, self.py_func)
+        kernel, file = found
         self.loaded += 1
-        return found
+        _files.add(file)
+        return linker().function(kernel, self.py_func)
 
     def _compiled(self, args: tuple[Any, ...], where: kept.Place | None) -> Callable[..., Any]:
         from planner.base.compiling import compiled, to_keep
@@ -129,7 +136,7 @@ class Kernel:
         self.compiled += 1
         if where is not None:
             try:
-                kept.write(where, to_keep(made))
+                _files.add(kept.write(where, to_keep(made)))
             except OSError as fault:
                 _warn(fault)
         return made.entry_point

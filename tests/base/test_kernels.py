@@ -109,6 +109,24 @@ def test_kernels_from_the_disk(use: Callable[..., str], tmp_path: Path) -> None:
     assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
 
 
+def test_kernels_that_came_with_the_installation_are_found_and_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(kept, "installed", lambda: str(tmp_path / "installed"))
+    where = kept.place(six.py_func, six.content, ("f8",))
+    kernel = kept.Kept("entry", [], b"code")
+    assert kept.read(where) is None
+    written = Path(kept.write(where, kernel))
+    assert kept.read(where) == (kernel, str(written))
+    came = tmp_path / "installed" / written.name
+    came.parent.mkdir()
+    written.rename(came)
+    assert kept.read(where) == (kernel, str(came))
+    kept.write(where, kernel)  # as another version of it would be
+    assert came.exists()
+
+
 SIX = 6
 
 

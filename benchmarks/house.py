@@ -36,6 +36,14 @@ LIMIT_NAMES = (
     "acceleration.",
 )
 
+# Functions that modules of one kind have in common: a limit's own law, and what the file of one control says.
+OF_A_KIND = {
+    "feed_sq_max": "constraints",
+    "rate": "constraints",
+    "recognised": "machine_import",
+    "settings": "machine_import",
+}
+
 
 def measured(root: Path) -> dict[str, Any]:
     """The figures of the package in a tree."""
@@ -54,9 +62,9 @@ def measured(root: Path) -> dict[str, Any]:
     lengths = sorted((node.end_lineno or node.lineno) - node.lineno + 1 for node in functions)
     names = Counter(
         node.name
-        for tree in trees.values()
+        for path, tree in trees.items()
         for node in tree.body
-        if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_")
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and _stands_alone(node.name, path)
     )
     public = [node for node in functions if not node.name.startswith("_")]
     longest = max(lines, key=lambda path: lines[path])
@@ -99,11 +107,16 @@ def details(root: Path) -> str:
             ):
                 out.append(f"{name}:{node.lineno} {node.name}: {_arguments(node)} arguments")
         for node in tree.body:
-            if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
+            if isinstance(node, ast.ClassDef | ast.FunctionDef) and _stands_alone(node.name, path):
                 where.setdefault(node.name, []).append(name)
         out += [f"{name} {constant}: no comment" for constant, reason in _constants(tree, text) if not reason]
     out += [f"{name} in {', '.join(files)}" for name, files in where.items() if len(files) > 1]
     return "\n".join(out)
+
+
+def _stands_alone(name: str, path: Path) -> bool:
+    """Whether a name is public and should be that of one thing only."""
+    return not name.startswith("_") and OF_A_KIND.get(name) != path.parent.name
 
 
 def _spells(tree: ast.Module, name: str) -> bool:

@@ -6,9 +6,8 @@
 
 The random jobs of benchmarks/never_slower.py, some of the first ones also behind filters (`FILTERED`) and shaped (`SHAPED`), and the
 programs of ../shared/nc up to `NC_BYTES` with effort "quick", are planned by `optimal` on one thread with `ROUNDS` rounds of reshaping.
-Counts come from the trace (planner/job/trace.py), and from counters around functions that tell nobody (`watch`): loops of compiled
-functions run as Python for that. A retry whose effect the trace does not tell is switched off (`SWITCHES`) on jobs where it fired, and
-cycle times are compared.
+Counts come from the trace (planner/job/trace.py) and from counters (retry_counts.py). A retry whose effect the trace does not tell is
+switched off (`SWITCHES`) on jobs where it fired, and cycle times are compared.
 
 Traces are added to FILE, one plan a line; plans in it are not made again. Computing times are those of this process.
 """
@@ -17,9 +16,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -27,18 +25,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import ablation, never_slower
+from benchmarks import never_slower
 from benchmarks.record import markdown, write_results
+from benchmarks.retry_counts import count_steps, counts, watch
+from benchmarks.tries import add_row, programs, read_rows, summed
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
-from planner.feedrate.jerk import chain, piece, window
+from planner.feedrate.jerk import window
 from planner.job import method
 from planner.job.trace import Trace
 from planner.machine import Fir, Machine, Mode
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
-from planner.optimal import behind_filters, geometry, loop, reshape, shaped
-from planner.smoothing import initial, relax, spline_path
+from planner.optimal import behind_filters, geometry, loop, shaped
+from planner.smoothing import initial, relax
 
 JOBS, FILTERED, FILTERED_JOBS = 300, 3, 60
 ROUNDS = 5  # of reshaping: later rounds have retries of the same kinds, and cost most of the time
@@ -47,16 +47,13 @@ NC_BYTES = 50_000  # of a program: larger ones take more than 20 s
 Planned = dict[str, Any]
 Case = tuple[str, Program, Machine, OptimalMethod]
 
-counts: Counter[str] = Counter()
-
 
 def cases(jobs: int) -> Iterator[Case]:
     """The programs behind the first of the random jobs."""
-    ablation.NC_BYTES = NC_BYTES
     usual = OptimalMethod(rounds=ROUNDS)
     for seed in range(jobs):
         if seed == FILTERED_JOBS:
-            for name, program, machine in ablation.programs():
+            for name, program, machine in programs(NC_BYTES):
                 yield name, program, machine, OptimalMethod(effort="quick")
         program, machine = never_slower.job(seed)
         yield f"random {seed}", program, machine, usual
@@ -90,136 +87,10 @@ def planned(case: Case) -> Planned:
     }
 
 
-def count_steps(steps: list[dict[str, Any]]) -> None:
-    """Count what a trace tells."""
-    stops = corners = filters = 0
-    candidates: list[str] = []
-    winner = ""
-    for step in steps:
-        name = step["name"]
-        filters = filters + 1 if name == "filters" else 0
-        if name == "filters":
-            counts[f"filters, round {filters}"] += 1
-        elif name == "shaped":
-            again = candidates.count(f"{step['limits']:g}") > 0
-            candidates.append(f"{step['limits']:g}")
-            if step["kept"]:
-                winner = f"shaped: {candidates[-1]} times the limits" + ", no stops added" * again
-        stops = stops + 1 if name == "splines" and step["stops_added"] else 0 if name == "splines" else stops
-        corners = corners + 1 if name == "corners" else 0 if name == "bound on corners" else corners
-        if name == "splines" and step["stops_added"]:
-            counts[f"stops for splines, round {stops}"] += 1
-        elif name in ("slower for verdict", "less for the period"):
-            counts[f"{name}, round {step['round']}"] += 1
-        elif name == "corners":
-            counts[f"corners, solve {corners}"] += 1
-    if winner:
-        counts[winner] += 1
-
-
-# ---------------------------------------------------------------------------------------------------------------- counters
-
-
-def watch() -> None:
-    """Count what the trace does not tell."""
-    for module, names in ((relax, ("_relax", "_relax_run")), (initial, ("_lay", "_lay_run"))):
-        for name in names:
-            setattr(module, name, getattr(module, name).py_func)
-    _around(spline_path, "relax", _labelled("first shape"))
-    _around(reshape, "relax", _labelled("reshaped"))
-    _around(relax, "certify", _certified)
-    _around(relax, "_relax_run", _run_relaxed)
-    _around(initial, "_denser", _counted("laid denser"))
-    _around(initial, "_lay_run", _counted("runs laid"))
-    _around(spline_path, "cusps", _cusps)
-    _around(reshape, "cusps", _cusps)
-    _around(window.ScaledWindow, "_from", _tried)
-    _around(window.ScaledWindow, "_tracked", _tracked)
-    _around(chain.Chain, "_unfelt", _unfelt)
-    _around(piece.Piece, "_join", _joined)
-
-
-def _around(owner: Any, name: str, wrapper: Callable[..., Any]) -> None:
-    inner = getattr(owner, name)
-    setattr(owner, name, lambda *args, **more: wrapper(inner, *args, **more))
-
-
-def _counted(name: str) -> Callable[..., Any]:
-    def wrapper(inner: Callable[..., Any], *args: Any) -> Any:
-        counts[name] += 1
-        return inner(*args)
-
-    return wrapper
-
-
-_label = [""]
-_attempts = [0]
-
-
-def _labelled(label: str) -> Callable[..., Any]:
-    def wrapper(inner: Callable[..., Any], *args: Any) -> Any:
-        _label[0] = label
-        return inner(*args)
-
-    return wrapper
-
-
-def _certified(inner: Callable[..., Any], *args: Any) -> Any:
-    _attempts[0] += 1
-    return inner(*args)
-
-
-def _run_relaxed(inner: Callable[..., Any], *args: Any) -> Any:
-    _attempts[0] = 0
-    found = inner(*args)
-    counts[f"{_label[0]}: runs relaxed"] += 1
-    counts[f"{_label[0]}: runs tightened"] += _attempts[0] > 1
-    counts[f"{_label[0]}: runs tightened more than twice"] += _attempts[0] > 3
-    counts[f"{_label[0]}: runs without a certificate"] += not found[0]
-    return found
-
-
-def _cusps(inner: Callable[..., Any], laid: Any) -> Any:
-    found = inner(laid)
-    counts[f"{_label[0]}: runs with a cusp"] += int(found.sum())
-    return found
-
-
-def _tried(inner: Callable[..., Any], *args: Any) -> Any:
-    found, most, starts = inner(*args)
-    counts["windows"] += 1
-    if found is None:
-        counts["windows: no start converged"] += 1
-    elif starts > 1:
-        counts[f"windows: start {starts} converged"] += 1
-    return found, most, starts
-
-
-def _tracked(inner: Callable[..., Any], *args: Any) -> Any:
-    found = inner(*args)
-    counts["starts tracked" if found is not None else "starts not tracked"] += 1
-    return found
-
-
-def _unfelt(inner: Callable[..., Any], self: Any, begin: int, end: int, found: Any) -> int:
-    keep: int = inner(self, begin, end, found)
-    counts["windows: made larger"] += (keep - begin) / (end - begin) < chain.KEPT_SHARE_MIN
-    return keep
-
-
-def _joined(inner: Callable[..., Any], *args: Any) -> bool:
-    met: bool = inner(*args)
-    counts["pieces joined in the middle" if met else "pieces not joined in the middle"] += 1
-    return met
-
-
-# ---------------------------------------------------------------------------------------------------------------- switches
-
-
 def _first_starts(count: int) -> Callable[[], None]:
     def switch() -> None:
         inner = window.ScaledWindow._starts
-        window.ScaledWindow._starts = lambda self, *way: islice(inner(self, *way), count)  # type: ignore[method-assign,assignment]
+        window.ScaledWindow._starts = lambda self, *way: islice(inner(self, *way), count)  # type: ignore[method-assign]
 
     return switch
 
@@ -280,19 +151,7 @@ def report(rows: list[Planned]) -> tuple[dict[str, Any], str]:
     for row in usual.values():
         times.update(row["counts"])
         jobs.update(name for name, count in row["counts"].items() if count)
-    tries: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
-    for row in usual.values():
-        names = set()
-        for name, took, kept, gain in ablation.tries(row["steps"]):
-            entry = tries[name]
-            entry["ran"] += 1
-            entry["kept"] += kept
-            entry["gain"] += gain / len(usual)
-            entry["most"] = max(entry["most"], gain)
-            entry["took"] += took / total
-            names.add(name)
-        for name in names:
-            tries[name]["jobs"] += 1
+    tries = summed(list(usual.values()), total)
     text = f"{len(usual)} plans, {sum(row['time'] is not None for row in usual.values())} pass, {total:.0f} s of computing.\n\n"
     text += "What the trace tells; gains are shares of the cycle time, mean over all plans and the largest one.\n\n"
     text += markdown(
@@ -353,9 +212,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=np.inf, help="of computing at most")
     parser.add_argument("--report", action="store_true", help="plan nothing")
     chosen = parser.parse_args()
-    rows = []
-    if chosen.traces.exists():
-        rows = [json.loads(line) for line in chosen.traces.read_text(encoding="utf-8").splitlines()]
+    rows = read_rows(chosen.traces)
     if chosen.report:
         numbers, text = report(rows)
         print(text)
@@ -378,8 +235,7 @@ def main() -> None:
             break
         with contextlib.suppress(RecursionError):
             row = {"without": chosen.without, **planned(case)}
-            with chosen.traces.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            add_row(chosen.traces, row)
             print(name, row["time"], f"{row['took']:.1f} s", flush=True)
 
 

@@ -55,8 +55,8 @@ def _smoothed(file: Path, machine: Machine) -> dict[str, Any]:
     return {
         "program": file.name,
         "blocks": blocks,
-        "runs": len(shape.laid.fits),
-        "certified": int(shape.laid.fits.sum()),
+        "runs": len(shape.splines.fits),
+        "certified": int(shape.splines.fits.sum()),
         "spans": len(shape.left),
         "took_s": took,
         "us_per_block": 1e6 * took / max(blocks, 1),

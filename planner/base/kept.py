@@ -47,7 +47,7 @@ class Kept(NamedTuple):
     code: bytes
 
 
-class Place(NamedTuple):
+class KernelName(NamedTuple):
     """A file name without its folder: what stays the same when a kernel changes, and what does not.
 
     single : whether no other kernel has the same first part, as those have that are made by one function
@@ -63,17 +63,17 @@ class Place(NamedTuple):
         return f"{self.kernel}.{self.version}.kernel"
 
 
-def place(function: FunctionType, content: bytes, arguments: object) -> Place:
+def place(function: FunctionType, content: bytes, arguments: object) -> KernelName:
     """The file name of the kernel of a function with this `content_of`, for arguments of these types."""
     where = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     of = hashlib.sha256(repr((function.__module__, arguments, sys.implementation.cache_tag)).encode())
     version = hashlib.sha256(content + _surroundings())
     named = re.sub(r"[^\w.]", "", where)[:80]
     single = "<" not in function.__qualname__
-    return Place(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
+    return KernelName(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
 
 
-def read(where: Place) -> tuple[Kept, str] | None:
+def read(where: KernelName) -> tuple[Kept, str] | None:
     """The kernel of this name and its file, or None. Raises OSError if it is there and cannot be read."""
     for folder in (*folders(), installed()):
         name = os.path.join(folder, where.name)
@@ -87,7 +87,7 @@ def read(where: Place) -> tuple[Kept, str] | None:
     return None
 
 
-def write(where: Place, kernel: Kept) -> str:
+def write(where: KernelName, kernel: Kept) -> str:
     """Keep a kernel, in place of its old versions; returns its file. Raises OSError if it can be written nowhere."""
     faults: list[OSError] = []
     for folder in folders():

@@ -114,7 +114,7 @@ class Kernel:
             self._made[kind] = found
             return found
 
-    def _loaded(self, where: kept.Place) -> Callable[..., Any] | None:
+    def _loaded(self, where: kept.KernelName) -> Callable[..., Any] | None:
         try:
             found = kept.read(where)
         except OSError as fault:
@@ -129,7 +129,7 @@ class Kernel:
         _files.add(file)
         return linker().function(kernel, self.py_func)
 
-    def _compiled(self, args: tuple[Any, ...], where: kept.Place | None) -> Callable[..., Any]:
+    def _compiled(self, args: tuple[Any, ...], where: kept.KernelName | None) -> Callable[..., Any]:
         from planner.base.compiling import compiled, to_keep
 
         made = compiled(self.dispatcher, args)

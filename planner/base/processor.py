@@ -13,7 +13,24 @@ from typing import NamedTuple
 
 # What LLVM calls the features of a level beyond those of every x86-64 (x86-64 psABI, table 3.1).
 LEVELS = {
-    "x86-64-v3": "cx16 sahf popcnt sse3 ssse3 sse4.1 sse4.2 avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave".split()
+    "x86-64-v3": (
+        "cx16",
+        "sahf",
+        "popcnt",
+        "sse3",
+        "ssse3",
+        "sse4.1",
+        "sse4.2",
+        "avx",
+        "avx2",
+        "bmi",
+        "bmi2",
+        "f16c",
+        "fma",
+        "lzcnt",
+        "movbe",
+        "xsave",
+    )
 }
 
 
@@ -30,7 +47,7 @@ class Processor(NamedTuple):
 
 @cache
 def processor() -> Processor:
-    """The processor that kernels are compiled for: a level, or what NUMBA_CPU_NAME and NUMBA_CPU_FEATURES say, or the one that is here."""
+    """The processor that kernels are compiled for: a level, or what numba's variables NUMBA_CPU_... say, or the one that is here."""
     from llvmlite import binding
 
     has = binding.get_host_cpu_features()

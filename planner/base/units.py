@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 
-MM_PER_INCH = 25.4
+MM_PER_INCH = 25.4  # by definition
+# Of F words [mm/min] and of angles in files [deg].
 SECONDS_PER_MINUTE = 60.0
 RAD_PER_DEG = math.pi / 180.0
 MICROMETRE = 1e-3  # [mm]

@@ -23,6 +23,7 @@ from planner.commands.interrupt import INTERRUPTED
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+# Exit codes. The last two are those of sysexits.h (EX_SOFTWARE) and of a shell (128 + SIGPIPE).
 FAILED, BAD_INPUT, NOT_SOLVED, BUG, BROKEN_PIPE = 1, 2, 3, 70, 141
 PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
 LINE_EVERY = 10.0  # [s] between lines of progress where there is no terminal

@@ -46,7 +46,7 @@ ROOM_LEAST = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Places:
+class Violations:
     """Where the filtered motion leaves the tolerance.
 
     time      : (n,) time behind the filters [s]
@@ -117,14 +117,14 @@ class Behind:
         near = self.errors(motion, ())[3]
         return self._worst, near
 
-    def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Places:
+    def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Violations:
         """Where a motion leaves the tolerance behind the filters.
 
         path : `path_shares` (N,), (N+1,) of any motion along the same path
         """
         t, ratio, piece, near, near_time = self.errors(motion, self.filters.times)
         missed = np.flatnonzero(near > 1.0 - SPARE)
-        return Places(
+        return Violations(
             time=np.concatenate([t, near_time[missed]]),
             ratio=np.concatenate([ratio, near[missed]]),
             path=np.concatenate([path[0][piece], path[1][missed]]),

@@ -29,7 +29,7 @@ from planner.base.errors import InputError
 from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
 from planner.machine import LINEAR_AXES
 from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
-from planner.nc.program import Kind, PathControl, Program, Splines
+from planner.nc.program import Kind, PathControl, Program, SplineTable
 
 # Gauss points of an arc length, and steps of a knot span that they are applied to: good to 1e-9 of the butterfly's length (tested).
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -243,7 +243,7 @@ class Nurbs:
         pieces = cubic_pieces(homogeneous(self.points, self.weights), self.knots, self.degree)
         points, weights = pieces[..., :-1] / pieces[..., -1:], pieces[..., -1]
         program = chords(points[[0, -1], [0, -1]], self.axes, feed, source)
-        splines = Splines(block=np.zeros(len(pieces)), points=points, weights=weights)
+        splines = SplineTable(block=np.zeros(len(pieces)), points=points, weights=weights)
         return dataclasses.replace(program, kind=np.full(1, Kind.SPLINE), splines=splines)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
 
-DEGREE = 5
+DEGREE = 5  # of every span: r''' is continuous where spans meet, so that jerk is, and r'''' jumps
 
 
 def span_dtype(axes: int) -> np.dtype:

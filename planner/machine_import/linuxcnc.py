@@ -16,8 +16,9 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.machine_import.ini_file import IniFile, read_ini
 from planner.machine_import.settings import ControlSettings, Sourced, least
 
+# mm in a LINEAR_UNITS.
 _MM = {"mm": 1.0, "metric": 1.0, "inch": MM_PER_INCH, "in": MM_PER_INCH, "imperial": MM_PER_INCH}
-_NANOSECOND = 1e-9
+_NANOSECOND = 1e-9  # [s]: periods of HAL's threads are in them
 _INCLUDE = re.compile(r"^#INCLUDE\s+(\S+)", re.IGNORECASE)
 
 

@@ -20,7 +20,7 @@ from planner.corners.elements import GAUSS_NODES, GAUSS_WEIGHTS, is_straight
 from planner.geometry.spline import DEGREE
 from planner.motion.sampling import COEFFICIENTS, LENGTH_ROUNDING, ONE_STEP, interval_of, place_of, room_for
 
-LANES = 16
+LANES = 16  # samples of a lot: a multiple of the 4 or 8 doubles that one instruction takes
 
 # Of each sample: share q of its interval; w0, w1 - w0 and length of the interval; parameter; speed, acceleration and jerk along the
 # path; sums over the nodes of Gauss' rule and over the axes. And the polynomial of its interval, as `inverses` has it.

@@ -16,6 +16,7 @@ from planner.nc.state import State
 from planner.nc.store import Store
 
 Note = Callable[[str, int], None]
+# By ten times the G code.
 _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
 # Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
 # make room for themselves.

@@ -16,9 +16,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 
-DEGREE_MAX = 3
+DEGREE_MAX = 3  # of the pieces: higher degrees are refused (splines.py)
+# Nodes on every step, and steps of a piece, for its length: good to 1e-9 of the length of the butterfly of paper 001 (tested).
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(16)
-# Steps of a piece for its length: good to 1e-9 of the length of the butterfly of paper 001 (tested).
 LENGTH_STEPS = 8
 
 

@@ -57,10 +57,11 @@ G_GROUP: dict[int, str] = {
 # Codes that are kept as events: what S means, revolutions per minute or surface speed.
 G_EVENTS = frozenset((960, 970))
 
+# Motion codes of a kind, ten times the G code.
 ARCS = frozenset((20, 30))
 CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS = 50, 51, 52, 53, 62
 SPLINES = frozenset((CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS))
-THREADS = frozenset((330, 331))
+THREADS = frozenset((330, 331))  # G33 and G33.1
 THREADING = 760  # the cycle of many passes
 CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
 

@@ -13,14 +13,15 @@ from planner.nc.store import Store
 
 Note = Callable[[str, int], None]
 
+# Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
 _OFF = 400
 _LEFT = (410, 411)
 _DYNAMIC = (411, 421)
 _REFUSED_GROUPS = ("plane", "work offset", "tool length", "path control", "retract mode")
-_REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)
+_REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while it is on
 
 
-def check_words(state: State, block: Block) -> None:
+def check_unchanged(state: State, block: Block) -> None:
     """What must not change while compensation is on. Raises WordFault."""
     for group in _REFUSED_GROUPS:
         code = block.g.get(group)

@@ -47,7 +47,7 @@ class CutterFault(ValueError):
 
 
 @dataclass(frozen=True)
-class Side:
+class OffsetMove:
     """An offset move: where it would end, its tangent there and at its start, and its line or circle.
 
     turning : +1 counter-clockwise, -1 clockwise, 0 for a line
@@ -79,7 +79,7 @@ class _Open:
     fixed : its end is not moved any more
     """
 
-    side: Side
+    side: OffsetMove
     row: int
     arc: int
     begin: complex
@@ -87,7 +87,7 @@ class _Open:
     fixed: bool = False
 
 
-def meeting(before: Side, after: Side, sense: float) -> complex | None:
+def meeting(before: OffsetMove, after: OffsetMove, sense: float) -> complex | None:
     """Where two offset moves cross in a sense (the sign of the turn from the one to the other), or None."""
     crossing = [
         p for p in _crossings(before, after) if _cross(before.tangent(p), after.tangent(p)) * sense > 0
@@ -95,7 +95,7 @@ def meeting(before: Side, after: Side, sense: float) -> complex | None:
     return min(crossing, key=lambda p: abs(p - before.end)) if crossing else None
 
 
-def _crossings(one: Side, other: Side) -> Sequence[complex]:
+def _crossings(one: OffsetMove, other: OffsetMove) -> Sequence[complex]:
     if not one.turning and not other.turning:
         slope = _cross(one.first, other.first)
         along = _cross(other.end - one.end, other.first) / slope
@@ -148,7 +148,7 @@ class Cutter:
             self._stay(target, kind, line)
             return
         tangent = (end - start) / length
-        side = Side(self._beside(end, tangent), tangent, tangent)
+        side = OffsetMove(self._beside(end, tangent), tangent, tangent)
         if not self.started:
             if length <= self._radius:
                 raise CutterFault(
@@ -171,7 +171,7 @@ class Cutter:
             raise CutterFault(
                 f"the arc's radius, {size:.6g} mm, must be larger than the tool's, {self._radius:.6g} mm, where the tool is inside"
             )
-        side = Side(self._beside(end, last), first, last, turning, centre, size - nearer)
+        side = OffsetMove(self._beside(end, last), first, last, turning, centre, size - nearer)
         sweep = arc.sweep
         if not self.started:
             side, sweep = self._entry_arc(side, start, sweep)
@@ -190,7 +190,7 @@ class Cutter:
 
     # --- corners ------------------------------------------------------------------------------------------------------------
 
-    def _corner(self, corner: complex, side: Side, kind: Kind, line: int) -> bool:
+    def _corner(self, corner: complex, side: OffsetMove, kind: Kind, line: int) -> bool:
         """Join the open move to the next at a programmed corner; True for an inner one."""
         assert self._open is not None
         before = self._open.side
@@ -205,7 +205,7 @@ class Cutter:
             self._outer_corner(corner, self._beside(corner, side.first), kind, line)
         return inner
 
-    def _inner_corner(self, side: Side) -> None:
+    def _inner_corner(self, side: OffsetMove) -> None:
         open_ = self._open
         assert open_ is not None
         point = meeting(open_.side, side, self._sign)
@@ -248,7 +248,7 @@ class Cutter:
 
     # --- blocks -------------------------------------------------------------------------------------------------------------
 
-    def _add(self, side: Side, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
+    def _add(self, side: OffsetMove, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
         state, store = self._state, self._store
         assert state.actual is not None
         begin, before = self._plane(state.actual), state.actual
@@ -263,7 +263,7 @@ class Cutter:
             store.add(kind, line, state)
         self._open = _Open(side, row, arc, begin, sweep)
 
-    def _left_out(self, side: Side, allowed_back: float) -> float:
+    def _left_out(self, side: OffsetMove, allowed_back: float) -> float:
         """What the corner at the start of an arc takes off its sweep [rad]."""
         assert self._state.actual is not None
         start = side.centre + side.radius * side.first / (1j * side.turning)
@@ -272,7 +272,7 @@ class Cutter:
             raise CutterFault(_GOUGE)
         return left_out
 
-    def _entry_arc(self, side: Side, start: complex, sweep: float) -> tuple[Side, float]:
+    def _entry_arc(self, side: OffsetMove, start: complex, sweep: float) -> tuple[OffsetMove, float]:
         """The arc from where the tool is that ends at the offset end with the programmed tangent."""
         inwards = 1j * side.turning * side.last  # from the end towards the centre
         chord = start - side.end
@@ -328,7 +328,7 @@ class Cutter:
         return point + self._sign * self._radius * 1j * tangent
 
 
-def _turn(start: complex, end: complex, side: Side) -> float:
+def _turn(start: complex, end: complex, side: OffsetMove) -> float:
     """The angle from one point to another about the centre, at most half a turn either way [rad]."""
     return cmath.phase((end - side.centre) / (start - side.centre))
 

@@ -65,7 +65,7 @@ class Hole:
 
 
 @dataclass(frozen=True)
-class Step:
+class CycleStep:
     """One thing a cycle does: a move to (a, b, c), a dwell of so many seconds, a stop, or a spindle code (3, 4, 5)."""
 
     kind: Kind | None
@@ -74,26 +74,26 @@ class Step:
     spindle: int = 0
 
 
-def steps(hole: Hole) -> Iterator[Step]:
+def steps(hole: Hole) -> Iterator[CycleStep]:
     """What is done from above the hole at R on."""
     a, b = hole.place
-    down, up = Step(Kind.LINE, (a, b, hole.bottom)), Step(Kind.RAPID, (a, b, hole.retract))
-    dwell, stop = Step(Kind.DWELL, seconds=hole.dwell), Step(None, spindle=5)
-    again = Step(None, spindle=3 if hole.turning > 0 else 4)
+    down, up = CycleStep(Kind.LINE, (a, b, hole.bottom)), CycleStep(Kind.RAPID, (a, b, hole.retract))
+    dwell, stop = CycleStep(Kind.DWELL, seconds=hole.dwell), CycleStep(None, spindle=5)
+    again = CycleStep(None, spindle=3 if hole.turning > 0 else 4)
     if hole.code in PECKING:
         yield from _pecks(hole)
         yield from (down, up)
     elif hole.code in TAPPING:
-        other = Step(None, spindle=4 if hole.turning > 0 else 3)
-        yield from (down, stop, other, dwell, Step(Kind.LINE, (a, b, hole.retract)), stop, again)
+        other = CycleStep(None, spindle=4 if hole.turning > 0 else 3)
+        yield from (down, stop, other, dwell, CycleStep(Kind.LINE, (a, b, hole.retract)), stop, again)
     elif hole.code == 850:
-        yield from (down, Step(Kind.LINE, (a, b, hole.clear)), up)
+        yield from (down, CycleStep(Kind.LINE, (a, b, hole.clear)), up)
     elif hole.code == 890:
-        yield from (down, dwell, Step(Kind.LINE, (a, b, hole.retract)))
+        yield from (down, dwell, CycleStep(Kind.LINE, (a, b, hole.retract)))
     elif hole.code == 870:
         yield from _back_bore(hole, stop, again)
     elif hole.code in (860, 880):
-        halt = (Step(Kind.STOP),) if hole.code == 880 else ()
+        halt = (CycleStep(Kind.STOP),) if hole.code == 880 else ()
         yield from (down, dwell, stop, *halt, up, again)
     elif hole.code == 820:
         yield from (down, dwell, up)
@@ -101,23 +101,23 @@ def steps(hole: Hole) -> Iterator[Step]:
         yield from (down, up)
 
 
-def _pecks(hole: Hole) -> Iterator[Step]:
+def _pecks(hole: Hole) -> Iterator[CycleStep]:
     """Everything before the last feed down."""
     a, b = hole.place
     depth = hole.clear - hole.peck
     while depth > hole.bottom:
-        yield Step(Kind.LINE, (a, b, depth))
+        yield CycleStep(Kind.LINE, (a, b, depth))
         if hole.code == 830:
-            yield Step(Kind.RAPID, (a, b, hole.clear))
-        yield Step(Kind.RAPID, (a, b, depth + CLEARANCE / hole.unit))
+            yield CycleStep(Kind.RAPID, (a, b, hole.clear))
+        yield CycleStep(Kind.RAPID, (a, b, depth + CLEARANCE / hole.unit))
         depth -= hole.peck
 
 
-def _back_bore(hole: Hole, stop: Step, again: Step) -> Iterator[Step]:
+def _back_bore(hole: Hole, stop: CycleStep, again: CycleStep) -> Iterator[CycleStep]:
     (a, b), c = hole.place, hole.bottom
     aside = a + hole.beside[0], b + hole.beside[1]
-    yield Step(Kind.RAPID, (*aside, hole.clear))
-    yield from (stop, Step(Kind.RAPID, (*aside, c)), Step(Kind.RAPID, (a, b, c)), again)
-    yield from (Step(Kind.LINE, (a, b, hole.counterbore)), Step(Kind.LINE, (a, b, c)), stop)
-    yield from (Step(Kind.RAPID, (*aside, c)), Step(Kind.RAPID, (*aside, hole.retract)))
-    yield from (Step(Kind.RAPID, (a, b, hole.retract)), again)
+    yield CycleStep(Kind.RAPID, (*aside, hole.clear))
+    yield from (stop, CycleStep(Kind.RAPID, (*aside, c)), CycleStep(Kind.RAPID, (a, b, c)), again)
+    yield from (CycleStep(Kind.LINE, (a, b, hole.counterbore)), CycleStep(Kind.LINE, (a, b, c)), stop)
+    yield from (CycleStep(Kind.RAPID, (*aside, c)), CycleStep(Kind.RAPID, (*aside, hole.retract)))
+    yield from (CycleStep(Kind.RAPID, (a, b, hole.retract)), again)

@@ -10,10 +10,10 @@ import numpy as np
 from planner.nc import codes, cycles
 from planner.nc.arcs import AXES, IN_PLANE
 from planner.nc.block import Block
-from planner.nc.cycles import Hole, Step
+from planner.nc.cycles import CycleStep, Hole
 from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind
-from planner.nc.state import Series, State
+from planner.nc.state import CycleSeries, State
 from planner.nc.store import Store
 
 Note = Callable[[str, int], None]
@@ -21,8 +21,9 @@ Note = Callable[[str, int], None]
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _BY_HAND = 880  # G88
 _PER_HOLE = 16  # steps of a hole without pecks, at most
-_PER_PECK = 3
+_PER_PECK = 3  # down, out and back in
 _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
+# How the spindle turns after M3, M4 and M5.
 _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 
@@ -37,7 +38,7 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
     hole = _hole(state, block, series, words)
     repeats = _repeats(block, hole)
     if series.level < hole.clear - _ROUNDING:
-        _to(state, store, block.line, Step(Kind.RAPID, (here[a], here[b], hole.clear)))
+        _to(state, store, block.line, CycleStep(Kind.RAPID, (here[a], here[b], hole.clear)))
         here[c] = hole.clear
     for _ in range(repeats):
         for axis in (a, b):
@@ -46,8 +47,8 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
                 here[axis] = length + (0.0 if state.absolute else here[axis])
         hole = replace(hole, place=(float(here[a]), float(here[b])))
         height = float(here[c]) if here[c] > hole.clear + _ROUNDING else hole.retract
-        _to(state, store, block.line, Step(Kind.RAPID, (*hole.place, height)))
-        _to(state, store, block.line, Step(Kind.RAPID, (*hole.place, hole.clear)))
+        _to(state, store, block.line, CycleStep(Kind.RAPID, (*hole.place, height)))
+        _to(state, store, block.line, CycleStep(Kind.RAPID, (*hole.place, hole.clear)))
         for step in cycles.steps(hole):
             _to(state, store, block.line, step)
         here[c] = hole.retract
@@ -66,7 +67,7 @@ def _check_words(state: State, block: Block, words: dict[str, float]) -> None:
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
 
 
-def _hole(state: State, block: Block, series: Series, words: dict[str, float]) -> Hole:
+def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, float]) -> Hole:
     """The hole of the words in force, at no place yet. Raises WordFault if it would begin below its depth."""
     a, b = IN_PLANE[state.normal]
     axis = state.normal
@@ -119,18 +120,18 @@ def _say(state: State, block: Block, note: Note) -> None:
         note(f"{name} is synchronised with the spindle: {found}", block.line)
 
 
-def _series(state: State, code: int, level: float) -> Series:
+def _series(state: State, code: int, level: float) -> CycleSeries:
     """The series the line belongs to; the words in force are those of its code only."""
     series = state.series
     if series is None:
-        series = Series(code, {}, level)
+        series = CycleSeries(code, {}, level)
     elif series.code != code:
-        series = Series(code, {}, series.level)
+        series = CycleSeries(code, {}, series.level)
     state.series = series
     return series
 
 
-def _words(state: State, block: Block, series: Series) -> dict[str, float]:
+def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
     """The words in force. Raises WordFault for one that is missing."""
     code, axis = series.code, "XYZ"[state.normal]
     for letter in f"{axis}RPQIJK":
@@ -164,7 +165,7 @@ def _check_spindle(state: State, code: int, word: int) -> None:
         raise WordFault(word, f"{name} stops the spindle, which does not turn; write M3 or M4 before it")
 
 
-def _to(state: State, store: Store, line: int, step: Step) -> None:
+def _to(state: State, store: Store, line: int, step: CycleStep) -> None:
     """Execute a step."""
     store.make_room(1)
     if step.kind is None:

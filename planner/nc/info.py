@@ -23,6 +23,7 @@ from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program
 from planner.nc.reader import interpret, load
 from planner.nc.reading import AS_USUAL, Reading
 
+# What `planner info` counts: corners that turn by more than each of these [deg], and quantiles of the moves' lengths [-].
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 PLACES_SHOWN = 100  # of what is not supported, in tables and summaries; the others are counted

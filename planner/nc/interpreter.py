@@ -32,6 +32,7 @@ from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
 from planner.nc.store import Store
 
+# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
 _COVET_AXES = (100, 280, 300, 520, 920)
 _WHY_NO_MOTION = {
     NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
@@ -159,7 +160,7 @@ class Interpreter:
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
         if self._cutter is not None:
-            compensation.check_words(self.state, block)
+            compensation.check_unchanged(self.state, block)
         feeds.set_feed(self.state, block, self.note)
         auxiliary.events(self.state, self.store, block, self.note)
         if block.g.get("one-shot") == 40:

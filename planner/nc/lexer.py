@@ -147,6 +147,7 @@ def text_alone(data: bytes) -> Words:
     )
 
 
+# Characters by their codes: what a compiled loop compares bytes with.
 _NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
 _OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
 _LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR = 79, 69, 101, 58, 36

@@ -22,6 +22,7 @@ from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.store import Store
 
+# Letters by their codes.
 _F, _G, _N, _O, _S, _X, _Z = 70, 71, 78, 79, 83, 88, 90
 _RAPID, _LINE = int(Kind.RAPID), int(Kind.LINE)
 

@@ -27,8 +27,9 @@ class Kind(IntEnum):
     SPLINE = 5  # along a spline (G5, G5.1, G5.2, G6.2)
 
 
+# Kinds of blocks that move the machine.
 MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.SPLINE)
-FEED_MOVES = MOVES[1:]
+FEED_MOVES = MOVES[1:]  # without rapids
 
 
 class PathControl(IntEnum):
@@ -81,7 +82,7 @@ class Expansion:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Splines:
+class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
 
     block   : (K,) block of each, not decreasing: a block has one after the other
@@ -105,9 +106,9 @@ class Splines:
         return len(self.block)
 
 
-def no_splines(axes: int) -> Splines:
+def no_splines(axes: int) -> SplineTable:
     """The splines of a program that has none, over `axes` axes."""
-    return Splines(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
+    return SplineTable(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,7 +152,7 @@ class Program:
     arc_center: FloatArray
     arc_normal: Array
     arc_sweep: FloatArray
-    splines: Splines = field(default_factory=lambda: no_splines(0))
+    splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))

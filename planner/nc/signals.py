@@ -6,6 +6,7 @@ from planner.nc.block import Block
 from planner.nc.moves import WordFault
 from planner.nc.store import Store
 
+# Ten times M codes: the one that reads an input, and the words that each needs.
 _READ_INPUT = 660
 _NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
 

@@ -26,7 +26,7 @@ from planner.nc.lexer import Words
 from planner.nc.moves import WordFault, target
 from planner.nc.state import State
 
-ORDERS = (2, 3, 4)
+ORDERS = (2, 3, 4)  # of G5.2 and G6.2: degree + 1, at most that of cubic pieces
 # A first control point this near is where the machine stands [mm]: the least digit of metric programs.
 SAME_PLACE = 1e-3
 

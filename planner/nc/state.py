@@ -27,6 +27,7 @@ _PATH_CONTROL = {
     "exact_path": PathControl.EXACT_PATH,
     "exact_stop": PathControl.EXACT_STOP,
 }
+# Ten times the G code of a work coordinate system, by its name in the machine file.
 _SYSTEMS = {f"g{n}": 10 * n for n in range(54, 60)} | {"g59.1": 591, "g59.2": 592, "g59.3": 593}
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
 FeedMode = Literal["per minute", "inverse time", "per turn"]
@@ -69,7 +70,7 @@ class Spindle:
 
 
 @dataclass(slots=True)
-class Series:
+class CycleSeries:
     """Canned cycles one after the other: the motion code, the words of that code in force, and the level before the first of them,
     all as programmed."""
 
@@ -132,7 +133,7 @@ class State:
     tool_loaded: int = 0
     to_level: bool = False
     retract_given: bool = False
-    series: Series | None = None
+    series: CycleSeries | None = None
     cycle_dwell: float = 0.0
     actual: FloatArray | None = None
     in_thread: bool = False

@@ -11,7 +11,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
-from planner.nc.program import FEED_MOVES, Frame, Kind, Program, Splines
+from planner.nc.program import FEED_MOVES, Frame, Kind, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
@@ -154,7 +154,7 @@ class Store:
             arc_center=np.array([arc[1] for arc in self.arcs]).reshape(-1, 3),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
-            splines=Splines(
+            splines=SplineTable(
                 block=np.array([spline[0] for spline in self.splines], dtype=np.int64),
                 points=np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3),
                 weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),

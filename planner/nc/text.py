@@ -13,6 +13,7 @@ from planner.nc.program import Kind, PathControl, Program
 from planner.nc.writer import FEED_MIN, round_down
 
 DECIMALS = 7  # of a coordinate in mm
+# Characters that must not stand in a comment, and what stands there instead.
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
 

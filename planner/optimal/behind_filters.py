@@ -17,7 +17,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.constraints.limits import FILTER_ERROR
 from planner.constraints.problem import FeedrateProblem
-from planner.delivery.filters import ROOM_LEAST, Behind, Places, kept, rested
+from planner.delivery.filters import ROOM_LEAST, Behind, Violations, kept, rested
 from planner.job.job import Job
 from planner.motion.timing import Motion
 from planner.optimal.on_path import OnPath
@@ -79,7 +79,7 @@ def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> t
     return last if best is None or last[1].end < best[1].end else best
 
 
-def _change(places: Places, path: FloatArray) -> FloatArray:
+def _change(places: Violations, path: FloatArray) -> FloatArray:
     """(N+1,) by what the square of the feed at every vertex may change."""
     room = np.maximum(1.0 - AIM - path, ROOM_LEAST)
     return np.clip(room / np.maximum(places.near - path, room / 4.0), CHANGE_MIN, CHANGE_MAX)
@@ -104,7 +104,7 @@ def _zones(
 
 
 def _elsewhere(
-    bound: FloatArray, problem: FeedrateProblem, motion: Motion, behind: Behind, places: Places
+    bound: FloatArray, problem: FeedrateProblem, motion: Motion, behind: Behind, places: Violations
 ) -> FloatArray:
     """The bound (P,), smaller where the filtered motion leaves the contour."""
     bound, now = bound.copy(), np.square(motion.law.feed)

@@ -83,7 +83,7 @@ def with_corners(
         return dataclasses.replace(planned, shape=shape) if planned.solution.solved else best, none
     piece = np.searchsorted(best.samples.stop, shape.runs.joint_first) - 1
     chosen = np.zeros(len(corners.time), dtype=bool)
-    chosen[piece[shape.laid.fits]] = True  # elsewhere there is nothing to choose
+    chosen[piece[shape.splines.fits]] = True  # elsewhere there is nothing to choose
     gain = best.stop_to_stop() - corners.time
     chosen &= gain > 0.0
     ranked = np.flatnonzero(chosen)[np.argsort(-(gain / corners.points)[chosen], kind="stable")]
@@ -105,6 +105,8 @@ def with_corners(
         chosen[chosen] = faster
     if not chosen.any() or (before - time)[faster].sum() < FASTER * best.solution.cycle_time:
         return best, left
-    mixed = dataclasses.replace(shape, laid=shape.laid._replace(fits=shape.laid.fits & ~chosen[piece]))
+    mixed = dataclasses.replace(
+        shape, splines=shape.splines._replace(fits=shape.splines.fits & ~chosen[piece])
+    )
     planned = order.solve(with_spline(rounded, mixed), job, grids.final, [best])
     return dataclasses.replace(planned, shape=mixed) if planned.faster_than(best) else best, left

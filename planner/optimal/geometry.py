@@ -58,11 +58,11 @@ def splined_with_stops(
 
 
 def _tell_of(shape: SplineShape, tell: Tell, stops: int) -> None:
-    fits = shape.laid.fits
+    fits = shape.splines.fits
     tell(
         "splines",
         runs=len(fits),
         with_a_spline=int(fits.sum()),
-        spans=int(shape.laid.span_first[-1]),
+        spans=int(shape.splines.span_first[-1]),
         stops_added=stops,
     )

@@ -153,7 +153,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         return order.solve(given, job, grids_for(given, job, settings)[0].final)
     with job.stage("geometry"):
         rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
-    if not splines.laid.fits.any():
+    if not splines.splines.fits.any():
         cornered = order.solve(given, job, grids_for(given, job, settings)[0].final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
@@ -209,7 +209,7 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
     rounds = settings.rounds
     if rounds is None:
         rounds = min(settings.effort.work // len(best.samples), settings.effort.rounds)
-    pull, gap = np.full(len(shape.laid.fits), FIRST_PULL), FIRST_GAP
+    pull, gap = np.full(len(shape.splines.fits), FIRST_PULL), FIRST_GAP
     reached = [best.solution.cycle_time]
     for n in range(1, rounds + 1):
         if len(reached) > ROUNDS_SEEN and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - ROUNDS_SEEN]:
@@ -224,7 +224,7 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
         faster = gained > 0.0
         if tried.faster_than(best):
             best = tried
-        if faster.any() and not (faster | ~shape.laid.fits).all():
+        if faster.any() and not (faster | ~shape.splines.fits).all():
             mixed = solve(chosen(before, shape, faster), before, tried)
             _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
             if mixed.faster_than(best):

@@ -38,7 +38,7 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
 
 def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
     """That no run of corners got a spline, if there are any."""
-    runs = len(shape.laid.fits)
+    runs = len(shape.splines.fits)
     if not runs:
         return ()
     line = _line(rounded, int(rounded.legs.first[shape.runs.joint_first[0]]))

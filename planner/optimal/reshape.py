@@ -33,7 +33,7 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE
 from planner.smoothing.forms import SplineMotion, motion_bands
-from planner.smoothing.joint import Limits, improve
+from planner.smoothing.joint import MotionLimits, improve
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
@@ -47,24 +47,24 @@ UNBOUNDED = 1e12  # stands for a feed or an acceleration that nothing bounds [mm
 
 def run_times(planned: OnPath) -> FloatArray:
     """(Q,) time on each run of splines [s]; 0 for runs that have none."""
-    laid = _shape(planned).laid
+    splines = _shape(planned).splines
     span = planned.samples.element - len(planned.samples.table.legs)
     on = np.flatnonzero(span >= 0)
-    kept = np.flatnonzero(laid.fits)
+    kept = np.flatnonzero(splines.fits)
     run = kept[np.searchsorted(planned.path.spline.first, span[on], side="right") - 1]
-    return np.asarray(np.bincount(run, planned.solution.duration[on], len(laid.fits)), dtype=np.float64)
+    return np.asarray(np.bincount(run, planned.solution.duration[on], len(splines.fits)), dtype=np.float64)
 
 
 def chosen(planned: OnPath, new: SplineShape, better: Array) -> SplineShape:
     """The new shape in the runs (Q,) that are better, else that of `planned`."""
     old = _shape(planned)
-    of_control = np.repeat(better, np.diff(old.laid.span_first) + DEGREE)
-    of_site = np.repeat(better, np.diff(old.laid.site_first))
-    of_span = np.repeat(better, np.diff(old.laid.span_first))
-    control = np.where(of_control[:, None], new.laid.control, old.laid.control)
+    of_control = np.repeat(better, np.diff(old.splines.span_first) + DEGREE)
+    of_site = np.repeat(better, np.diff(old.splines.site_first))
+    of_span = np.repeat(better, np.diff(old.splines.span_first))
+    control = np.where(of_control[:, None], new.splines.control, old.splines.control)
     return dataclasses.replace(
         old,
-        laid=old.laid._replace(control=control),
+        splines=old.splines._replace(control=control),
         used=np.where(of_site, new.used, old.used),
         left=np.where(of_span, new.left, old.left),
     )
@@ -77,33 +77,33 @@ def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape,
     gap : of the convex problem, share of the time [-]
     """
     shape, problem = _shape(planned), planned.problem
-    axes, laid, scale = problem.machine_axes, shape.laid, _jerk_scale(planned)
+    axes, splines, scale = problem.machine_axes, shape.splines, _jerk_scale(planned)
     jerk = problem.jerk if planned.solution.jerk_limited else np.full(len(problem.jerk), UNBOUNDED)
     limits = np.stack([problem.velocity[:axes], problem.acceleration[:axes], jerk[:axes]])
     motion, on = _motion(planned, _ends)
     step = improve(
         shape.corridor,
-        laid,
+        splines,
         shape.runs,
         shape.used,
         motion,
         _bounds(planned, on),
-        Limits(limits, scale[:axes].copy()),
+        MotionLimits(limits, scale[:axes].copy()),
         pull,
         gap,
         AGAIN,
     )
     # where the curve leaves the tolerance between its sites, the nearest one that does not
-    new = laid._replace(control=step.control)
+    new = splines._replace(control=step.control)
     inside, _ = _motion(planned, _inside)
-    _, Q = motion_bands(laid, inside, np.stack([problem.acceleration[:axes], scale[:axes]]))
-    one = np.ones(len(laid.fits))
+    _, Q = motion_bands(splines, inside, np.stack([problem.acceleration[:axes], scale[:axes]]))
+    one = np.ones(len(splines.fits))
     goal = Goal(np.zeros_like(Q), Q, one, GAP * run_times(planned), 0.0, np.ones(axes))
     kept = relax(shape.corridor, new, shape.runs, step.used, shape.left, goal, only_outside=True)
-    laid = laid._replace(control=kept.control)
-    used = np.minimum(kept.used, USED * laid.sites.radius)
-    found = dataclasses.replace(shape, laid=laid, used=used, left=kept.left)
-    return chosen(planned, found, kept.certified & ~cusps(laid)), step.gain
+    splines = splines._replace(control=kept.control)
+    used = np.minimum(kept.used, USED * splines.sites.radius)
+    found = dataclasses.replace(shape, splines=splines, used=used, left=kept.left)
+    return chosen(planned, found, kept.certified & ~cusps(splines)), step.gain
 
 
 def _bounds(planned: OnPath, on: Array) -> FloatArray:
@@ -124,8 +124,8 @@ def corridor_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
     H, Q = price_bands(planned)
     corridor = shape.corridor
     corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
-    goal = Goal(H, Q, np.full(len(shape.laid.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
-    relaxed = relax(corridor, shape.laid, shape.runs, shape.used + more, shape.left + more, goal)
+    goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
+    relaxed = relax(corridor, shape.splines, shape.runs, shape.used + more, shape.left + more, goal)
     return np.asarray(-relaxed.multiplier / relaxed.used, dtype=np.float64)
 
 
@@ -137,7 +137,7 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     motion, on = _motion(planned, _inside)
     motion = motion._replace(price=_inside(*np.moveaxis(_prices(problem, planned.solution, on), 1, 0)))
     limits = np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]])
-    H, Q = motion_bands(_shape(planned).laid, motion, limits)
+    H, Q = motion_bands(_shape(planned).splines, motion, limits)
     return H, Q
 
 
@@ -147,14 +147,14 @@ def _motion(
     """The motion on the splines, which pays nothing, at `places` of each interval, and the intervals of the grid (I,) that are on
     them."""
     samples, problem, solution = planned.samples, planned.problem, planned.solution
-    laid = _shape(planned).laid
+    splines = _shape(planned).splines
     span = samples.element - len(samples.table.legs)
     on = np.flatnonzero((span >= 0) & problem.interval)
-    kept = np.flatnonzero(laid.fits)
+    kept = np.flatnonzero(splines.fits)
     row = np.searchsorted(planned.path.spline.first, span[on], side="right") - 1
     duration, jerk = solution.duration[on], solution.jerk_s[on]
     motion = SplineMotion(
-        interval=np.searchsorted(kept[row], np.arange(len(laid.fits) + 1)),
+        interval=np.searchsorted(kept[row], np.arange(len(splines.fits) + 1)),
         span=span[on] - planned.path.spline.first[row],
         tau=places(samples.w0[on], samples.w1[on]),
         feed=np.sqrt(places(solution.feed_sq[on], solution.feed_sq[on + 1])),

@@ -63,5 +63,5 @@ def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
         # where even this slope all along would save next to nothing, the least is nothing
         worth = -now.sum() * MORE_TOLERANCE >= WORTH * best.solution.cycle_time
         wider = corridor_prices(best, MORE_TOLERANCE) if worth else np.zeros(len(now))
-        by_site = SitePrices(place=best.shape.laid.sites.place, now=now, wider=wider)
+        by_site = SitePrices(place=best.shape.splines.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 CALLS_SHOWN = 10  # subprograms that `info` names
 CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.corners` has them all
+# Lines of each, so that a table fits a terminal of 24 rows.
 FAULTS_SHOWN = 8
 NOTES_SHOWN = 8
 

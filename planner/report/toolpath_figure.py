@@ -28,7 +28,7 @@ POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are n
 DENSE = 60_000  # points from which on thick lines would hide each other
 FLAT = 0.12  # third extent over the largest below which a path is shown from the side it is thinnest on
 GREY, LIGHT = "#8c8c8c", "#b5b5b5"
-DASHED = (0, (3, 2))
+DASHED = (0, (3, 2))  # of a line: from its start, 3 widths drawn and 2 not
 
 
 def toolpath_figure(plan: Plan) -> Figure:

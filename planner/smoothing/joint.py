@@ -50,7 +50,7 @@ HELD = (
 )
 
 
-class Limits(NamedTuple):
+class MotionLimits(NamedTuple):
     """What the motion of A axes keeps."""
 
     axes: FloatArray  # (3, A) velocity, acceleration and jerk
@@ -66,7 +66,7 @@ class Improved(NamedTuple):
     iterations: FloatArray  # (Q,) of its windows together
 
 
-class Run(NamedTuple):
+class JointRun(NamedTuple):
     """One run that is improved: n control points."""
 
     corridor: Corridor
@@ -174,7 +174,7 @@ def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, ag
         places = places_of_run(knots, own, motion, bound, limits.axes, first, last)
         sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
         free = _free(len(own), own.shape[1], (runs.fixed_first[q], runs.fixed_last[q]))
-        run = Run(
+        run = JointRun(
             run_corridor(corridor, q), knots, sites, own, places, free, limits.pulled, pull[q], gap, again
         )
         y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)
@@ -192,7 +192,7 @@ def improve(
     used: FloatArray,
     motion: SplineMotion,
     bound: FloatArray,
-    limits: Limits,
+    limits: MotionLimits,
     pull: FloatArray,
     gap: float,
     again: int,

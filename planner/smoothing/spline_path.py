@@ -32,7 +32,7 @@ RELATIVE_GAP = 0.1
 class SplineShape:
     """The splines of a path with what is needed to change their shape within the tolerance.
 
-    runs, corridor, laid : what the splines replace, the corridor along which they are laid, and the splines
+    runs, corridor, splines : what the splines replace, the corridor along which they are laid, and the splines
     left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]; negative where a run has none
     reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
     used       : (J,) radius that each site may use [mm]
@@ -40,7 +40,7 @@ class SplineShape:
 
     runs: SplineRuns
     corridor: Corridor
-    laid: Splines
+    splines: Splines
     left: FloatArray
     reserve: float
     used: FloatArray
@@ -67,28 +67,28 @@ def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None =
     corridor = find_corridor(path, runs, tol)
     # the longest span of a run: of its slowest leg
     of_run = _smallest(longest, runs)
-    laid = lay(corridor, of_run)
+    splines = lay(corridor, of_run)
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
-    H, nothing = third_derivative_bands(laid, weights), np.zeros(len(of_run))
+    H, nothing = third_derivative_bands(splines, weights), np.zeros(len(of_run))
     goal = Goal(H, np.zeros_like(H), nothing, nothing, RELATIVE_GAP, weights)
-    left = np.full(laid.span_first[-1], np.inf)
+    left = np.full(splines.span_first[-1], np.inf)
     same = None if known is None else _same_runs(runs, known)
     if same is not None:
-        laid.fits[same.new] = False  # not to be relaxed again
-    relaxed = relax(corridor, laid, runs, USED * laid.sites.radius, left, goal)
+        splines.fits[same.new] = False  # not to be relaxed again
+    relaxed = relax(corridor, splines, runs, USED * splines.sites.radius, left, goal)
     control, used, left = relaxed.control, relaxed.used, relaxed.left
-    laid = laid._replace(control=control)
-    fits = relaxed.certified & ~cusps(laid)
+    splines = splines._replace(control=control)
+    fits = relaxed.certified & ~cusps(splines)
     if same is not None and known is not None:
-        old = known.laid
-        same.put(control, laid.span_first, old.control, old.span_first, DEGREE)
-        same.put(used, laid.site_first, known.used, old.site_first)
-        same.put(left, laid.span_first, known.left, old.span_first)
+        old = known.splines
+        same.put(control, splines.span_first, old.control, old.span_first, DEGREE)
+        same.put(used, splines.site_first, known.used, old.site_first)
+        same.put(left, splines.span_first, known.left, old.span_first)
         fits[same.new] = True
-    laid = laid._replace(control=control, fits=fits)
+    splines = splines._replace(control=control, fits=fits)
     reserve = float((tolerance - tol).min())
-    return SplineShape(runs=runs, corridor=corridor, laid=laid, left=left, reserve=reserve, used=used)
+    return SplineShape(runs=runs, corridor=corridor, splines=splines, left=left, reserve=reserve, used=used)
 
 
 class _Same(NamedTuple):
@@ -110,21 +110,25 @@ class _Same(NamedTuple):
 
 def _same_runs(runs: SplineRuns, known: SplineShape) -> _Same:
     """The runs that replace the same parts of the same legs, with the same ends, as some that have a spline."""
-    found = {one: k for k, one in enumerate(zip(*known.runs, strict=True)) if known.laid.fits[k]}
+    found = {one: k for k, one in enumerate(zip(*known.runs, strict=True)) if known.splines.fits[k]}
     pairs = [(q, found[one]) for q, one in enumerate(zip(*runs, strict=True)) if one in found]
     new, old = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     return _Same(new, old)
 
 
-def cusps(laid: Splines) -> Array:
+def cusps(splines: Splines) -> Array:
     """(Q,) True for runs with a cusp (`cusp_spans`)."""
-    return np.logical_or.reduceat(cusp_spans(laid), laid.span_first[:-1]) if len(laid.fits) else laid.fits
+    return (
+        np.logical_or.reduceat(cusp_spans(splines), splines.span_first[:-1])
+        if len(splines.fits)
+        else splines.fits
+    )
 
 
-def cusp_spans(laid: Splines) -> Array:
+def cusp_spans(splines: Splines) -> Array:
     """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are
     looked at: no motion along it has a direction there."""
-    return np.asarray(_cusp_spans(laid))
+    return np.asarray(_cusp_spans(splines))
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,11 +159,11 @@ def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Ar
     """(k,) joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the corridor, without a
     certificate or with a cusp, of the joints around it the one that turns most, or those on both sides of it (`fence`), which leave
     a run of a few joints there."""
-    laid, runs = shape.laid, shape.runs
-    lost = np.repeat(~laid.fits, np.diff(laid.span_first))
-    spans = np.flatnonzero(lost & (laid.outside | (shape.left < 0.0) | cusp_spans(laid)))
-    run = np.searchsorted(laid.span_first, spans, side="right") - 1
-    begin, end = laid.breaks[spans + run], laid.breaks[spans + run + 1]
+    splines, runs = shape.splines, shape.runs
+    lost = np.repeat(~splines.fits, np.diff(splines.span_first))
+    spans = np.flatnonzero(lost & (splines.outside | (shape.left < 0.0) | cusp_spans(splines)))
+    run = np.searchsorted(splines.span_first, spans, side="right") - 1
+    begin, end = splines.breaks[spans + run], splines.breaks[spans + run + 1]
     place = path.legs.place[path.legs.first]
     first = np.searchsorted(place, begin - (end - begin), side="left")
     last = np.searchsorted(place, end + (end - begin), side="right") - 1
@@ -177,10 +181,10 @@ def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Ar
     return path.legs.first[np.unique(np.array(most, dtype=np.int64))]
 
 
-def _polynomials(laid: Splines, q: int) -> tuple[FloatArray, FloatArray]:
+def _polynomials(splines: Splines, q: int) -> tuple[FloatArray, FloatArray]:
     """Breaks (S+1,) of run q, and its spans as polynomials (S, 6, A) (geometry/spline.py)."""
-    breaks, basis = run_knots(laid, q)
-    of_span = run_control(laid, q)[np.arange(len(basis))[:, None] + np.arange(ORDER)]
+    breaks, basis = run_knots(splines, q)
+    of_span = run_control(splines, q)[np.arange(len(basis))[:, None] + np.arange(ORDER)]
     return breaks, np.einsum("sbm,sbk->smk", basis, of_span)
 
 
@@ -202,17 +206,17 @@ def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:
 
 def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
     """The path with the splines of the runs that fit in place of their corners, each span as a polynomial (geometry/spline.py)."""
-    runs, laid = shape.runs, shape.laid
+    runs, splines = shape.runs, shape.splines
     axes = len(path.toolpath.axes)
-    kept = np.flatnonzero(laid.fits)
+    kept = np.flatnonzero(splines.fits)
     tables = []
     for q in kept:
-        cut, coef = _polynomials(laid, int(q))
+        cut, coef = _polynomials(splines, int(q))
         table = np.zeros(len(coef), span_dtype(axes))
         table["begin"], table["width"], table["coef"] = cut[:-1], np.diff(cut), coef
         tables.append(table)
-    count = laid.span_first[kept + 1] - laid.span_first[kept]
-    of_span = np.repeat(laid.fits, np.diff(laid.span_first))
+    count = splines.span_first[kept + 1] - splines.span_first[kept]
+    of_span = np.repeat(splines.fits, np.diff(splines.span_first))
     spline = Spline(
         first=np.concatenate([[0], np.cumsum(count)]),
         joint_first=runs.joint_first[kept],

@@ -32,7 +32,7 @@ STEP = 0.2  # [rad] of the mode's phase between two looks: a peak is missed by l
 DEFLECTION, SLOPE, MOST = range(
     3
 )  # of an axis in a mode: where it is, how fast, and the largest deflection so far
-STATE = 3
+STATE = 3  # numbers of a state
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

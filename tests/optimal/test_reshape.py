@@ -70,7 +70,7 @@ def test_prices_are_the_derivatives_of_the_time(name):
     rounded, shape = shaped(JOBS[name])
     before = planned_on(with_spline(rounded, shape), shape=shape)
     H, _ = price_bands(before)
-    control, rng = shape.laid.control, np.random.default_rng(1)
+    control, rng = shape.splines.control, np.random.default_rng(1)
     gradient = np.zeros_like(control)
     for k in range(control.shape[1]):
         for d in range(6):
@@ -86,9 +86,11 @@ def test_prices_are_the_derivatives_of_the_time(name):
         change *= 2e-3 / np.abs(change).max()
         times = []
         for sign in (1.0, -1.0):
-            laid = shape.laid._replace(control=control + sign * change)
+            splines = shape.splines._replace(control=control + sign * change)
             times.append(
-                planned_on(with_spline(rounded, dataclasses.replace(shape, laid=laid))).solution.cycle_time
+                planned_on(
+                    with_spline(rounded, dataclasses.replace(shape, splines=splines))
+                ).solution.cycle_time
             )
         expected = float((gradient * change).sum())
         slack = 2e-2 * float(np.abs(gradient * change).sum()) + 2e-5 * times[0]
@@ -159,7 +161,7 @@ def test_corners_that_win_are_planned_by_themselves_on_both_grids_and_then_with_
     best, left = with_corners(rounded, slow, slow.stop_to_stop(), corners, QUIET, order, GRIDS)
     assert not len(left)
     assert [len(path.legs) for path in order.paths] == [8, 8, 9]
-    assert not best.shape.laid.fits.any()
+    assert not best.shape.splines.fits.any()
     assert best.solution.cycle_time < slow.solution.cycle_time
 
 

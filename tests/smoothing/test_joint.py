@@ -165,7 +165,7 @@ def test_a_window_ends_at_the_optimum_of_its_problem():
 def test_what_a_short_step_promises_comes_true(pentagon):
     """To first order the time changes by the promise: against the motion solved again on the new shape."""
     rounded, _, before = pentagon
-    shape, promised = reshape(before, np.full(len(before.shape.laid.fits), 20.0), 1e-6)
+    shape, promised = reshape(before, np.full(len(before.shape.splines.fits), 20.0), 1e-6)
     gained = run_times(before).sum() - run_times(planned(rounded, shape)).sum()
     assert promised.sum() > 2e-4 * before.solution.cycle_time
     assert gained == pytest.approx(promised.sum(), rel=0.25)
@@ -173,8 +173,8 @@ def test_what_a_short_step_promises_comes_true(pentagon):
 
 def test_a_shape_keeps_its_certificate(pentagon):
     _, _, before = pentagon
-    shape, promised = reshape(before, np.full(len(before.shape.laid.fits), 0.5), 1e-4)
-    assert shape.laid.fits.all()
+    shape, promised = reshape(before, np.full(len(before.shape.splines.fits), 0.5), 1e-4)
+    assert shape.splines.fits.all()
     assert (shape.left >= 0.0).all()
-    assert (shape.used < shape.laid.sites.radius).all()
+    assert (shape.used < shape.splines.sites.radius).all()
     assert promised.sum() > 0.0

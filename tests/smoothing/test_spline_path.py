@@ -62,7 +62,7 @@ def test_certificate_holds_against_brute_force(seed):
     rng = np.random.default_rng(seed)
     points = random_polyline(rng, 4, shortest=-1.0)
     path, shape = splined(problems.polyline(points))
-    assert shape.laid.fits.all()
+    assert shape.splines.fits.all()
     out = np.empty((4, len(path.toolpath.axes)))
     for q in range(len(path.spline)):
         curve = []
@@ -150,18 +150,18 @@ def test_a_cusp_is_found_at_the_joint_that_turns_there(before):
     toolpath = toolpath_from_program(problems.polyline(np.vstack([straight, corners])), MACHINE, None)
     path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     shape = spline_shape(path, MACHINE)
-    assert not cusps(shape.laid).any()
+    assert not cusps(shape.splines).any()
     assert not len(lost_joints(path, shape))
     # six control points in one place: the curve stands still on the span between them
     span = len(shape.left) // 2
-    control = shape.laid.control.copy()
+    control = shape.splines.control.copy()
     control[span : span + DEGREE + 1] = control[span]
-    laid = shape.laid._replace(control=control)
-    assert cusps(laid).all()
-    lost = dataclasses.replace(shape, laid=laid._replace(fits=np.zeros(1, bool)))
+    splines = shape.splines._replace(control=control)
+    assert cusps(splines).all()
+    lost = dataclasses.replace(shape, splines=splines._replace(fits=np.zeros(1, bool)))
     joints = lost_joints(path, lost)
     place = path.legs.place[joints]
-    begin, end = laid.breaks[span], laid.breaks[span + 1]
+    begin, end = splines.breaks[span], splines.breaks[span + 1]
     near = np.abs(path.legs.place - (begin + end) / 2).min()
     assert len(joints)
     assert np.abs(place - (begin + end) / 2).min() <= max(near, 2.0 * (end - begin))
@@ -176,14 +176,14 @@ def test_stops_at_cusps_keep_the_splines_around_them(shared_dir):
     before = spline_shape(path, MACHINE)
     assert len(lost_joints(path, before))
     after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
-    assert shape.laid.fits.all()
+    assert shape.splines.fits.all()
     assert (after.joint == Joint.STOP).sum() > (path.joint == Joint.STOP).sum()
 
 
 def used_of_corridor(shape):
     """(J,) share of its radius that each site of the first spline uses."""
-    assert len(shape.laid.fits) == 1
-    return used_share(shape.laid.sites, shape.laid.control)
+    assert len(shape.splines.fits) == 1
+    return used_share(shape.splines.sites, shape.splines.control)
 
 
 def one_run():
@@ -215,7 +215,7 @@ def test_a_first_spline_inside_the_corridor_is_one_however_much_room_it_should_h
     assert lay.ROOM < first.max() < lay.INSIDE
     loose_knots.setattr(spline_path, "relax", relax)
     shape = spline_shape(path, MACHINE)
-    assert shape.laid.fits.all()
+    assert shape.splines.fits.all()
     assert (shape.left >= 0.0).all()
 
 
@@ -225,8 +225,8 @@ def test_a_place_outside_of_the_corridor_costs_a_full_stop_there_and_nothing_els
     used = used_of_corridor(first)
     loose_knots.setattr(lay, "INSIDE", np.sort(used)[-2])  # all but the worst site are inside
     whole = spline_shape(path, MACHINE)
-    assert not whole.laid.fits.any()
-    place = first.laid.sites.place[np.argmax(used)]
+    assert not whole.splines.fits.any()
+    place = first.splines.sites.place[np.argmax(used)]
     joints = lost_joints(path, whole)
     assert len(joints) == 1
     assert np.abs(path.legs.place[joints] - place).max() < 1.0
@@ -234,7 +234,7 @@ def test_a_place_outside_of_the_corridor_costs_a_full_stop_there_and_nothing_els
     stops = np.flatnonzero((after.joint == Joint.STOP) & (path.joint != Joint.STOP))
     assert 1 <= len(stops) <= 6
     corners = shape.runs.joint_last - shape.runs.joint_first + 1
-    assert corners[shape.laid.fits].sum() >= 0.8 * len(path.d)
+    assert corners[shape.splines.fits].sum() >= 0.8 * len(path.d)
 
 
 def test_a_place_that_never_gets_a_certificate_loses_its_own_corners_only(monkeypatch):
@@ -254,8 +254,8 @@ def test_a_place_that_never_gets_a_certificate_loses_its_own_corners_only(monkey
     monkeypatch.setattr(spline_path, "relax", no_certificate)
     after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
     corners = shape.runs.joint_last - shape.runs.joint_first + 1
-    assert corners[~shape.laid.fits].sum() <= 8
-    assert corners[shape.laid.fits].sum() >= 0.75 * len(path.d)
+    assert corners[~shape.splines.fits].sum() <= 8
+    assert corners[shape.splines.fits].sum() >= 0.75 * len(path.d)
     assert (after.joint == Joint.STOP).sum() <= 12
 
 
@@ -272,8 +272,8 @@ def test_feed_changes_on_a_straight_leg_keep_their_place():
 
 def test_tightening_leaves_every_site_inside_and_widens_none():
     _, shape = splined(problems.zigzag())
-    sites, control = shape.laid.sites, shape.laid.control.copy()
-    middle = greville_control(shape.corridor, shape.laid.breaks)
+    sites, control = shape.splines.sites, shape.splines.control.copy()
+    middle = greville_control(shape.corridor, shape.splines.breaks)
     e = np.empty(control.shape[1])
 
     def distances():
@@ -305,14 +305,14 @@ def test_runs_that_stay_the_same_are_taken_over_to_the_last_digit():
     known = spline_shape(rounded([60, 150]), MACHINE)
     whole = spline_shape(rounded([60, 150, 220]), MACHINE)
     taken = spline_shape(rounded([60, 150, 220]), MACHINE, known)
-    assert len(whole.laid.fits) == len(known.laid.fits) + 1
+    assert len(whole.splines.fits) == len(known.splines.fits) + 1
     for name in ("control", "fits"):
-        assert np.array_equal(getattr(whole.laid, name), getattr(taken.laid, name))
+        assert np.array_equal(getattr(whole.splines, name), getattr(taken.splines, name))
     assert np.array_equal(whole.used, taken.used)
     assert np.array_equal(whole.left, taken.left)
     # and the others are not: with other control points known, only those of the first two runs are others
-    moved = dataclasses.replace(known, laid=known.laid._replace(control=known.laid.control + 1.0))
+    moved = dataclasses.replace(known, splines=known.splines._replace(control=known.splines.control + 1.0))
     other = spline_shape(rounded([60, 150, 220]), MACHINE, moved)
-    first = whole.laid.span_first[2] + 2 * DEGREE
-    np.testing.assert_allclose(other.laid.control[:first] - whole.laid.control[:first], 1.0)
-    assert np.array_equal(other.laid.control[first:], whole.laid.control[first:])
+    first = whole.splines.span_first[2] + 2 * DEGREE
+    np.testing.assert_allclose(other.splines.control[:first] - whole.splines.control[:first], 1.0)
+    assert np.array_equal(other.splines.control[first:], whole.splines.control[first:])

@@ -21,7 +21,7 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.feedrate.jerk.columns import ProblemColumns
 
-LANES = 32
+LANES = 32  # intervals of a block: a multiple of the 4 or 8 doubles that one instruction takes
 # What the compiler may do to the arithmetic of a block: multiply and add in one instruction, multiply by the inverse of a constant,
 # take -0 for 0. Sums keep their order, NaN stays NaN.
 LANE_MATH = {"contract", "arcp", "nsz"}

@@ -70,6 +70,7 @@ from planner.feedrate.reference.piecewise import (
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 
+# Gauss' rule for the time of an interval: off by 4e-5 where feed^2 grows fourfold in it, 1e-3 where tenfold.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 NODES, WEIGHTS = (1.0 + NODES) / 2.0, WEIGHTS / 2.0  # of the unit interval
 NEAR = 100.0  # distance from rest up to which the acceleration is shaped like a cube root [lengths of the interval]

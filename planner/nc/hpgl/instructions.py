@@ -26,6 +26,7 @@ class Form:
         return f"{self.name} {self.numbers}".rstrip()
 
 
+# By their names: the numbers that each takes, and how many of them there may be (None for any number of pairs).
 FORMS = {
     form.name: form
     for form in (

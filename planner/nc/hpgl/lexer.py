@@ -27,6 +27,7 @@ _INSTRUCTION = re.compile(rb"([A-Za-z]{2})([-+.,\d\s]*)")
 _NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)")
 _SEPARATOR = re.compile(rb"\s*,?\s*")
 _NO_NUMBER = re.compile(rb"\A\s*,|,\s*,")
+# Bytes that no instruction holds.
 _NO_INSTRUCTION = bytes(c for c in range(256) if not chr(c).isascii() or not chr(c).isalnum())
 
 Report = Callable[[int, int, str], None]  # from, to, message

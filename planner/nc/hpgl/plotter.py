@@ -33,7 +33,7 @@ from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import Setup
 
-MM_PER_CM = 10.0
+MM_PER_CM = 10.0  # the speed of VS is in cm/s
 FULL_TURN = 360.0  # [deg]
 WORD_SHOWN = 20  # characters of an instruction in a message
 # Below this an arc is a straight line [rad]: NC programs take so short an arc for a full turn.

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from planner.nc.hpgl.instructions import FORMS
 
 SAME_FACTOR = 1e-9  # of two axes [-]: the rounding of the file's numbers
+# The fifth number of SC: what the scales of the two axes are.
 _ANISOTROPIC, _ISOTROPIC, _POINT_FACTOR = 0.0, 1.0, 2.0
 _MIDDLE = (50.0, 50.0)  # percent
 

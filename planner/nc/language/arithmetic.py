@@ -16,7 +16,7 @@ def modulo(a: float, b: float) -> float:
     return rest + abs(b) if rest < 0.0 else rest
 
 
-def nearest(x: float) -> float:
+def rounded(x: float) -> float:
     """ROUND: halves go away from zero."""
     return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
 

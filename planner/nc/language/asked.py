@@ -18,10 +18,12 @@ from planner.nc.state import System
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
 
+# What parameters answer with: work coordinate systems in their order (ten times the G code), and the G codes in force.
 _SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 _PATH = {PathControl.EXACT_PATH: 61.0, PathControl.EXACT_STOP: 61.1, PathControl.BLEND: 64.0}
 _PLANE = {2: 17.0, 1: 18.0, 0: 19.0}
 _ROTATION = 9  # behind the axes of a work coordinate system
+# G code of a feed mode.
 _FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
 _AXES = 9  # x y z a b c u v w; the last six are zero here
 

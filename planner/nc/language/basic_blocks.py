@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from planner.nc.language.tree import Place
+from planner.nc.language.tree import SourcePlace
 
 
 @dataclass
@@ -13,7 +13,7 @@ class _End:
     With `computed` it goes to the label of the program whose number that text gives.
     """
 
-    place: Place
+    place: SourcePlace
     label: int | None
     condition: str = ""
     otherwise: int = 0
@@ -22,11 +22,11 @@ class _End:
 
 @dataclass
 class _Block:
-    lines: list[tuple[str, Place]] = field(default_factory=list)
+    lines: list[tuple[str, SourcePlace]] = field(default_factory=list)
     end: _End | None = None
 
 
-class Blocks:
+class BasicBlocks:
     """The basic blocks of one function, while they are written.
 
     place    : of what the source stands for, where a line has no place of its own
@@ -34,14 +34,14 @@ class Blocks:
     numbers  : labels of the program in their order: number, label
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: SourcePlace) -> None:
         self.place = place
         self.blocks = [_Block()]
         self.block_of: dict[int, int] = {}
         self.labels = 0
         self.numbers: list[tuple[int, int]] = []
 
-    def put(self, text: str, place: Place) -> None:
+    def put(self, text: str, place: SourcePlace) -> None:
         """Add a line to the block that is being written."""
         self.blocks[-1].lines.append((text, place))
 
@@ -56,15 +56,15 @@ class Blocks:
             self.blocks.append(_Block())
         self.block_of[label] = len(self.blocks) - 1
 
-    def go(self, place: Place, label: int, condition: str = "", otherwise: int = 0) -> None:
+    def go(self, place: SourcePlace, label: int, condition: str = "", otherwise: int = 0) -> None:
         """End the block: go on at the label, or at `otherwise` if the condition does not hold."""
         self._leave(_End(place, label, condition, otherwise))
 
-    def jump(self, number: str, place: Place) -> None:
+    def jump(self, number: str, place: SourcePlace) -> None:
         """Go to the label of the program whose number that text gives."""
         self._leave(_End(place, None, computed=number))
 
-    def leave(self, place: Place) -> None:
+    def leave(self, place: SourcePlace) -> None:
         """Leave the function."""
         self._leave(_End(place, None))
 
@@ -72,7 +72,7 @@ class Blocks:
         self.blocks[-1].end = end
         self.blocks.append(_Block())
 
-    def source(self) -> list[tuple[str, Place]]:
+    def source(self) -> list[tuple[str, SourcePlace]]:
         """Lines of Python with their places; the last block leaves the function."""
         self.blocks[-1].end = _End(self.place, None)
         if len(self.blocks) == 1:
@@ -81,7 +81,7 @@ class Blocks:
         self._choose(0, len(self.blocks), "  ", lines)
         return lines
 
-    def _choose(self, low: int, high: int, indent: str, lines: list[tuple[str, Place]]) -> None:
+    def _choose(self, low: int, high: int, indent: str, lines: list[tuple[str, SourcePlace]]) -> None:
         """Add the source that finds block `pc` among the blocks `low` to `high` - 1 by halving."""
         if high - low > 1:
             middle = (low + high) // 2

@@ -20,9 +20,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from planner.nc.language.basic_blocks import Blocks
+from planner.nc.language.basic_blocks import BasicBlocks
 from planner.nc.language.expressions import Expressions
-from planner.nc.language.rows import Rows
+from planner.nc.language.rows import AppendedRows
 from planner.nc.language.tree import (
     Break,
     Call,
@@ -38,11 +38,11 @@ from planner.nc.language.tree import (
     Named,
     Number,
     Parameter,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
     Return,
+    SourcePlace,
     Statement,
 )
 
@@ -73,11 +73,11 @@ class Compiled:
     """Python functions of procedures, by name, and the place of each line of their source."""
 
     functions: dict[str, Callable[..., float | None]] = field(default_factory=dict)
-    places: list[Place] = field(default_factory=list)
+    places: list[SourcePlace] = field(default_factory=list)
 
 
 def compile_procedures(
-    procedures: Sequence[Procedure], language: Language, rows: Rows, marker: str
+    procedures: Sequence[Procedure], language: Language, rows: AppendedRows, marker: str
 ) -> Compiled:
     """Compile procedures; the rows that they append are added to `rows`.
 
@@ -101,15 +101,15 @@ def compile_procedures(
 class _Function:
     """The Python source of one procedure."""
 
-    def __init__(self, procedure: Procedure, language: Language, rows: Rows):
+    def __init__(self, procedure: Procedure, language: Language, rows: AppendedRows):
         self.procedure, self.language, self.rows = procedure, language, rows
         self.say = Expressions(language)
-        self.blocks = Blocks(procedure.place)
+        self.blocks = BasicBlocks(procedure.place)
         self.loops: list[tuple[str, int, int]] = []  # name, label of the next turn, label after the loop
         self.counters = 0
         self._seen = 0  # of `numbers`
 
-    def source(self, name: str) -> list[tuple[str, Place]]:
+    def source(self, name: str) -> list[tuple[str, SourcePlace]]:
         """Lines of Python with their places."""
         place = self.procedure.place
         self._number_labels(self.procedure.body)
@@ -149,7 +149,7 @@ class _Function:
         if any(letter == ord("M") and number in (None, *ENDS) for letter, _, number in words):
             self.blocks.put("run.turns+=n;n=0;run.flush()", line.place)
 
-    def _assign(self, target: Parameter, value: str, place: Place) -> str:
+    def _assign(self, target: Parameter, value: str, place: SourcePlace) -> str:
         if isinstance(target, Named):
             if target.shared and target.name in self.language.asked_names:
                 raise ProgramFault(place, f"the control sets #<{target.name}> itself; it can only be read")
@@ -235,11 +235,11 @@ class _Function:
         self._tick(goto.place)
         self.blocks.jump(self.say.value(goto.target), goto.place)
 
-    def _tick(self, place: Place) -> None:
+    def _tick(self, place: SourcePlace) -> None:
         self.blocks.put("n+=1", place)
         self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", place)
 
-    def _target(self, place: Place, number: int) -> int:
+    def _target(self, place: SourcePlace, number: int) -> int:
         """The label of that number: the next one, or else the first of the procedure."""
         found = [(k, label) for k, (known, label) in enumerate(self.blocks.numbers) if known == number]
         if not found:

@@ -16,15 +16,15 @@ from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, Position
 from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.fanuc import text as fanuc_text
 from planner.nc.language.fanuc.calls import files as fanuc_files
-from planner.nc.language.fanuc.parser import Parser as FanucParser
+from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
-from planner.nc.language.heidenhain.parser import Parser as HeidenhainParser
+from planner.nc.language.heidenhain.parser import HeidenhainParser
 from planner.nc.language.linuxcnc import text as linuxcnc_text
-from planner.nc.language.linuxcnc.parser import Parser as LinuxcncParser
-from planner.nc.language.rows import Rows
-from planner.nc.language.run import Run
+from planner.nc.language.linuxcnc.parser import LinuxcncParser
+from planner.nc.language.rows import AppendedRows
+from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import text as siemens_text
-from planner.nc.language.siemens.parser import Parser as SiemensParser
+from planner.nc.language.siemens.parser import SiemensParser
 from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
 from planner.nc.lexer import Words, split_words
@@ -50,9 +50,9 @@ def expand(
 
     Nothing is run if a line cannot be read; otherwise the program is run to its end, or to what stops it.
     """
-    rows = Rows()
+    rows = AppendedRows()
     front = _FRONTS[dialect]
-    run = Run(interpreter, rows, front.language, front.asked(interpreter))
+    run = ProgramRun(interpreter, rows, front.language, front.asked(interpreter))
     run.tee = tee or run.tee
     files = _Files(run, rows, front, integers)
     found = files.read(words, interpreter.source)
@@ -94,7 +94,7 @@ _FRONTS = {
 class _Files:
     """The files of a program: its own, and those in its folder that it calls."""
 
-    def __init__(self, run: Run, rows: Rows, front: _Front, integers: Integers):
+    def __init__(self, run: ProgramRun, rows: AppendedRows, front: _Front, integers: Integers):
         self.run, self.rows, self.front, self.integers = run, rows, front, integers
         self.sources: list[Source] = []
         run.load = self.load

@@ -18,10 +18,11 @@ from planner.nc.program import Program
 from planner.nc.reader import execute, interpret
 from planner.nc.reading import FANUC, Reading
 
-DECIMALS = 7  # of a number
+DECIMALS = 7  # of a flat_number
 _LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
 _LENGTHS = "".join(map(chr, sorted(LENGTHS)))
 _ENDS = ("M2", "M02", "M30")
+# Characters that must not stand in a comment, and what stands there instead.
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 
 
@@ -42,7 +43,8 @@ class Flat:
         known: dict[float, str] = {}
         for row in range(len(first) - 1):
             text = " ".join(
-                chr(letters[w]) + (known.get(values[w]) or known.setdefault(values[w], number(values[w])))
+                chr(letters[w])
+                + (known.get(values[w]) or known.setdefault(values[w], flat_number(values[w])))
                 for w in range(first[row], first[row + 1])
                 if letters[w] not in _LEFT_OUT
             )
@@ -63,8 +65,8 @@ def _with_points(text: str) -> str:
     )
 
 
-def number(value: float) -> str:
-    """A number without exponent, rounded to `DECIMALS`."""
+def flat_number(value: float) -> str:
+    """A flat_number without exponent, rounded to `DECIMALS`."""
     text = repr(round(value, DECIMALS) + 0.0)
     return plain(float(text)) if "e" in text else text.removesuffix(".0")
 

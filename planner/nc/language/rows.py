@@ -31,7 +31,7 @@ class _Tables:
     end: Array  # one after its last row
 
 
-class Rows:
+class AppendedRows:
     """Rows that were appended and not yet executed.
 
     pending : entries in their order, by number

@@ -17,8 +17,8 @@ from types import TracebackType
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
-from planner.nc.language.rows import NotFinite, Rows
-from planner.nc.language.tree import Language, Place, ProgramFault
+from planner.nc.language.rows import AppendedRows, NotFinite
+from planner.nc.language.tree import Language, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
@@ -37,7 +37,7 @@ class Ended(Exception):
     """The program has come to its end."""
 
 
-class Run:
+class ProgramRun:
     """One run of a compiled program.
 
     numbered : values of the numbered parameters, by number
@@ -45,7 +45,7 @@ class Run:
     resume   : the label where the caller of a procedure goes on, or None
     """
 
-    def __init__(self, interpreter: Interpreter, rows: Rows, language: Language, asked: Asked):
+    def __init__(self, interpreter: Interpreter, rows: AppendedRows, language: Language, asked: Asked):
         self.interpreter, self.rows, self.language, self.asked = interpreter, rows, language, asked
         self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
         if language.vacant is None:
@@ -80,7 +80,7 @@ class Run:
         except ProgramFault as fault:
             return self._stopped(fault)
         except NotFinite as fault:
-            place = Place(self._file_at(fault.at), fault.line, fault.at)
+            place = SourcePlace(self._file_at(fault.at), fault.line, fault.at)
             return ProgramFault(place, f"the computed {fault.letter} word is infinite")
         except (ArithmeticError, ValueError, KeyError) as fault:
             return self._stopped(ProgramFault(self._place(fault.__traceback__), _sentence(fault)))
@@ -271,7 +271,7 @@ class Run:
             self.flush()
         return ProgramFault(fault.place, message)
 
-    def _place(self, traceback: TracebackType | None) -> Place:
+    def _place(self, traceback: TracebackType | None) -> SourcePlace:
         """The statement that a traceback ends in."""
         place = None
         while traceback is not None:

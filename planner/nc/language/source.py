@@ -15,7 +15,7 @@ import numpy as np
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.language.detect import bare, computes, may_compute, row_text
-from planner.nc.language.tree import Place, PlainRows, ProgramFault
+from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 
 _BOM = b"\xef\xbb\xbf"
@@ -37,7 +37,7 @@ class SourceLine:
     """
 
     row: int
-    place: Place
+    place: SourcePlace
     start: int
     text: str
     scale: float = 1.0
@@ -68,7 +68,7 @@ class Source:
         for number in np.unique(np.searchsorted(newlines, found)).tolist():
             start = int(newlines[number - 1]) + 1 if number else 0
             end = int(newlines[number]) if number < len(newlines) else len(data)
-            place = Place(self.file, number + 1, self.begin + start)
+            place = SourcePlace(self.file, number + 1, self.begin + start)
             row = int(np.searchsorted(self.words.line, number + 1))
             lines.append((row, SourceLine(row, place, start + self.begin, data[start:end].decode("latin-1"))))
         return lines
@@ -82,7 +82,7 @@ class Source:
         text = words.data[start : end if end >= 0 else len(words.data)]
         if start == 0 and text.startswith(_BOM):
             start, text = len(_BOM), text[len(_BOM) :]
-        place = Place(self.file, int(words.line[row]), self.begin + at)
+        place = SourcePlace(self.file, int(words.line[row]), self.begin + at)
         return SourceLine(row, place, start + self.begin, text.decode("latin-1"), float(self.scale[row]))
 
     def in_order(self) -> Iterator[SourceLine | PlainRows]:
@@ -128,7 +128,7 @@ class Source:
         return bool(((words.letter[span] == ord("M")) & np.isin(words.value[span], (2, 30))).any())
 
     def _run(self, first: int, last: int, *, may_end: bool) -> PlainRows:
-        place = Place(
+        place = SourcePlace(
             self.file, int(self.words.line[first]), self.begin + int(self.words.at[self.words.first[first]])
         )
         return PlainRows(place, self.first_row + first, self.first_row + last, may_end)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 
-class Place(NamedTuple):
+class SourcePlace(NamedTuple):
     """Where a statement stands: its file (0 for the main program), its 1-based line, and the byte offset of its first letter."""
 
     file: int
@@ -26,6 +26,9 @@ class Number(NamedTuple):
     """A number as it is written."""
 
     value: float
+
+
+ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
 
 
 class Numbered(NamedTuple):
@@ -64,7 +67,7 @@ Parameter = Numbered | Named
 class PlainRows(NamedTuple):
     """Rows `first` to `last` - 1 of a file's words, as they are; they may hold the end of the program."""
 
-    place: Place
+    place: SourcePlace
     first: int
     last: int
     may_end: bool = False
@@ -81,7 +84,7 @@ class Word(NamedTuple):
 class Line(NamedTuple):
     """A row of words and assignments; all values are computed before any is assigned."""
 
-    place: Place
+    place: SourcePlace
     words: tuple[Word, ...]
     assignments: tuple[tuple[Parameter, Expression], ...] = ()
 
@@ -89,7 +92,7 @@ class Line(NamedTuple):
 class If(NamedTuple):
     """The body of the first condition that holds, else `otherwise`."""
 
-    place: Place
+    place: SourcePlace
     branches: tuple[tuple[Expression, list[Statement]], ...]
     otherwise: list[Statement]
 
@@ -97,7 +100,7 @@ class If(NamedTuple):
 class Loop(NamedTuple):
     """`while` asks before each turn, `do` after it, `repeat` counts; `name` is what Break and Continue say."""
 
-    place: Place
+    place: SourcePlace
     kind: str
     name: str
     condition: Expression
@@ -107,28 +110,28 @@ class Loop(NamedTuple):
 class Break(NamedTuple):
     """Leave the loop of that name."""
 
-    place: Place
+    place: SourcePlace
     loop: str
 
 
 class Continue(NamedTuple):
     """Go to the next turn of the loop of that name."""
 
-    place: Place
+    place: SourcePlace
     loop: str
 
 
 class Label(NamedTuple):
     """A place that Goto names."""
 
-    place: Place
+    place: SourcePlace
     number: int
 
 
 class Goto(NamedTuple):
     """Go to the label whose number the expression gives, in the same procedure."""
 
-    place: Place
+    place: SourcePlace
     target: Expression
 
 
@@ -140,7 +143,7 @@ class Call(NamedTuple):
     word      : as the program writes it, for messages
     """
 
-    place: Place
+    place: SourcePlace
     procedure: str | Expression
     arguments: tuple[tuple[int, Expression], ...] | None
     word: str
@@ -150,7 +153,7 @@ class Call(NamedTuple):
 class Return(NamedTuple):
     """Leave the procedure, with a value or None; `label` is where the caller goes on, else after its call."""
 
-    place: Place
+    place: SourcePlace
     value: Expression | None = None
     label: Expression | None = None
 
@@ -158,14 +161,14 @@ class Return(NamedTuple):
 class Message(NamedTuple):
     """A text for the user, with parameters in it."""
 
-    place: Place
+    place: SourcePlace
     pieces: tuple[str | Parameter, ...]
 
 
 class Modes(NamedTuple):
     """What happens to the modal state: "save", "forget", "restore" or "save until return"."""
 
-    place: Place
+    place: SourcePlace
     action: str
 
 
@@ -183,7 +186,7 @@ class Procedure:
     """
 
     name: str
-    place: Place
+    place: SourcePlace
     body: list[Statement]
 
 
@@ -227,6 +230,6 @@ class Parser(Protocol):
 class ProgramFault(Exception):
     """A program that cannot be run, or not further; carries the place and the sentence."""
 
-    def __init__(self, place: Place, message: str):
+    def __init__(self, place: SourcePlace, message: str):
         super().__init__(message)
         self.place, self.message = place, message

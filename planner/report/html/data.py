@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
 
-SAMPLES_MAX = 150_000
+SAMPLES_MAX = 150_000  # of the motion: the page of a program of 250,000 blocks then has less than 20 MB
 PROGRAMMED_MAX = 60_000  # points of the programmed path that are shown
 ARC_POINTS = 24  # of every arc and curve that are shown
 NO_LIMIT = "none"

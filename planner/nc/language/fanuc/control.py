@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from planner.nc.language.source import SourceLine
 from planner.nc.language.spelling import LineReader
-from planner.nc.language.tree import Expression, Loop, Number, Place, ProgramFault, Statement
+from planner.nc.language.tree import Expression, Loop, Number, ProgramFault, SourcePlace, Statement
 
 _NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
 _ALWAYS = Number(1.0)  # the condition of DO without WHILE
 
 
-class Control:
+class FanucControl:
     """The statements so far, and the loops that are open.
 
     body : where the next statement goes
@@ -19,7 +19,7 @@ class Control:
 
     def __init__(self) -> None:
         self.body: list[Statement] = []
-        self.open: list[tuple[int, Place, Expression, list[Statement]]] = []
+        self.open: list[tuple[int, SourcePlace, Expression, list[Statement]]] = []
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()

@@ -18,7 +18,7 @@ import re
 
 from planner.base.units import MILLISECOND
 from planner.nc.language.fanuc import calls
-from planner.nc.language.fanuc.control import Control
+from planner.nc.language.fanuc.control import FanucControl
 from planner.nc.language.fanuc.text import SPELLING
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader, Unspelled
@@ -35,10 +35,10 @@ from planner.nc.language.tree import (
     Numbered,
     Operation,
     Parameter,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
+    SourcePlace,
     Statement,
     Word,
 )
@@ -51,7 +51,7 @@ _STOP = 3006.0  # parameter: stop with a message
 _CALLS = ("M98", "M97", "M99", "G65", "G66")
 
 
-class Parser(Control):
+class FanucParser(FanucControl):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
@@ -60,7 +60,7 @@ class Parser(Control):
         self.faults: list[ProgramFault] = []
         self.procedures: list[Procedure] = []
         self.modal: Call | None = None  # G66
-        self.local: list[tuple[int, Place, Procedure]] = []  # M97
+        self.local: list[tuple[int, SourcePlace, Procedure]] = []  # M97
         self.numbers: frozenset[str] = frozenset()
         self.targets: frozenset[int] | None = frozenset()  # labels that are used; None for all
         self.calls_blocks = False  # M97 is used: an M99 may return from it
@@ -75,7 +75,7 @@ class Parser(Control):
         )
         self.targets = _targets(texts)
         self.calls_blocks = any("M97" in text for text in texts)
-        self._begin("" if self.source.file == 0 else "file", Place(self.source.file, 1, 0))
+        self._begin("" if self.source.file == 0 else "file", SourcePlace(self.source.file, 1, 0))
         for item in items:
             try:
                 if isinstance(item, PlainRows):
@@ -92,7 +92,7 @@ class Parser(Control):
             self._local_call(number, place, procedure)
         return self.procedures
 
-    def _begin(self, name: str, place: Place) -> None:
+    def _begin(self, name: str, place: SourcePlace) -> None:
         self.body = []
         self.procedures.append(Procedure(name, place, self.body))
 
@@ -103,7 +103,7 @@ class Parser(Control):
             self.open.clear()
         self.modal = None
 
-    def _local_call(self, number: int, place: Place, procedure: Procedure) -> None:
+    def _local_call(self, number: int, place: SourcePlace, procedure: Procedure) -> None:
         at = next(
             (k for k, s in enumerate(procedure.body) if isinstance(s, Label) and s.number == number), None
         )
@@ -144,7 +144,7 @@ class Parser(Control):
     def _part(self, rows: PlainRows, first: int, last: int) -> PlainRows:
         row = first - self.source.first_row
         words = self.source.words
-        place = Place(
+        place = SourcePlace(
             self.source.file, int(words.line[row]), self.source.begin + int(words.at[words.first[row]])
         )
         return PlainRows(place, first, last, rows.may_end and last == rows.last)

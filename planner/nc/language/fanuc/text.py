@@ -9,10 +9,11 @@ from planner.nc.language.asked import FanucAsked
 from planner.nc.language.spelling import Spelling
 from planner.nc.language.tree import Language
 
-LOCALS = 33
+LOCALS = 33  # #1 to #33 are a call's own
 _FUNCTIONS = (
     "ABS", "ACOS", "ADP", "ASIN", "ATAN", "BCD", "BIN", "COS", "EXP", "FIX", "FUP", "LN", "ROUND", "SIN", "SQR", "SQRT", "TAN",
 )  # fmt: skip
+# Operators of a higher rank bind first.
 _RANKS = {
     **dict.fromkeys(("*", "/", "MOD", "AND"), 3),
     **dict.fromkeys(("+", "-", "OR", "XOR"), 2),

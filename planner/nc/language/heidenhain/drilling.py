@@ -11,14 +11,16 @@ clearance above the depth already drilled, but not deeper than 0.2 mm above it.
 
 from __future__ import annotations
 
-from planner.nc.language.heidenhain.items import ONE, ZERO, Z, word
+from planner.nc.language.heidenhain.items import Z, word
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, parameter, plus
-from planner.nc.language.tree import Expression, If, Line, Loop, Number, Statement
+from planner.nc.language.tree import ONE, ZERO, Expression, If, Line, Loop, Number, Statement
 
-CYCLES = (1, 200, 201, 203, 240)
+CYCLES = (1, 200, 201, 203, 240)  # that are read
+# Q parameters (module text).
 _CLEARANCE, _DEPTH, _INFEED, _SURFACE, _SECOND, _FEED = 200, 201, 202, 203, 204, 206
 PECKING = (_CLEARANCE, _DEPTH, _INFEED, 211, _FEED)  # what the lines 1.1 to 1.5 of cycle 1 give
+# ... and those of some cycles only.
 _FEED_OUT, _DWELL_ABOVE, _DWELL_BELOW = 208, 210, 211
 _BEFORE = 0.2  # mm above the depth already drilled, where feed begins again
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from planner.nc.language.heidenhain.items import ONE, ZERO
 from planner.nc.language.heidenhain.text import (
     PARAMETERS,
     ConversationalBlock,
@@ -17,6 +16,8 @@ from planner.nc.language.heidenhain.text import (
     value,
 )
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Call,
     Expression,
     Goto,
@@ -33,6 +34,7 @@ _REPEAT = re.compile(r"\s*REP\s*(\d+)", re.IGNORECASE)
 _IF = re.compile(r"\s*IF\s", re.IGNORECASE)
 _THEN = re.compile(r"\s*GOTO\s+LBL\s*", re.IGNORECASE)
 _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
+# FN functions by their numbers: comparisons, and operations on two values and on one.
 _FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
 _FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
 _FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}

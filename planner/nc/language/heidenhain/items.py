@@ -20,7 +20,6 @@ POLE = own("cx"), own("cy")
 DIRECTION = own("dx"), own("dy")
 POLAR = own("pr"), own("pa")
 CORNER = own("px"), own("py")  # of a rounding or chamfer
-ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)
 
 
 @dataclass

@@ -14,12 +14,9 @@ from __future__ import annotations
 from planner.nc.language.heidenhain.items import (
     CORNER,
     DIRECTION,
-    ONE,
     POLAR,
     POLE,
     POSITION,
-    TWO,
-    ZERO,
     Items,
     X,
     Y,
@@ -37,13 +34,16 @@ from planner.nc.language.heidenhain.text import (
 )
 from planner.nc.language.spelling import NEGATIVE
 from planner.nc.language.tree import (
+    ONE,
+    TWO,
+    ZERO,
     Expression,
     If,
     Line,
     Named,
     Number,
     Parameter,
-    Place,
+    SourcePlace,
     Statement,
     Word,
 )
@@ -268,7 +268,7 @@ class Moves:
             raise block.fault("after RND or CHF a straight move is expected; write the tangent points out")
 
 
-def _unit(place: Place, vector: tuple[Named, Named]) -> Line:
+def _unit(place: SourcePlace, vector: tuple[Named, Named]) -> Line:
     """Divide a vector by its length."""
     length = of("LEN", *vector)
     return Line(

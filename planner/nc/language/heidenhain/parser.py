@@ -15,12 +15,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from planner.nc.language.heidenhain.definitions import Definitions
 from planner.nc.language.heidenhain.flow import procedure_name
 from planner.nc.language.heidenhain.items import (
     CORNER,
     POLAR,
     POLE,
-    ZERO,
     Items,
     X,
     Y,
@@ -31,18 +31,18 @@ from planner.nc.language.heidenhain.items import (
     refuse_arc_axes,
     word,
 )
-from planner.nc.language.heidenhain.settings import Settings
 from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, plus, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
+    ZERO,
     Expression,
     Line,
     Number,
     Parameter,
-    Place,
     Procedure,
     ProgramFault,
     Return,
+    SourcePlace,
     Statement,
 )
 
@@ -51,11 +51,11 @@ _FUNCTION = re.compile(
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
-_TILTED = (128, 129, 144)
-_AT_END = (2, 30)
+_TILTED = (128, 129, 144)  # M codes that follow or leave the tilt of the tool
+_AT_END = (2, 30)  # M codes that end the program
 
 
-class Parser(Settings):
+class HeidenhainParser(Definitions):
     """Statements of a conversational program. Faults of all its blocks are kept in `faults`."""
 
     def __init__(self, source: Source):
@@ -68,7 +68,7 @@ class Parser(Settings):
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
-        start = Place(self.source.file, 1, self.source.begin)
+        start = SourcePlace(self.source.file, 1, self.source.begin)
         main = self._body(0, len(self.blocks))
         procedures = []
         done: set[int] = set()
@@ -280,21 +280,23 @@ class Parser(Settings):
 
 
 _REMEDY = "let the CAM system write the moves out as L, C and CC"
-_READ: dict[str, Callable[[Parser, ConversationalBlock, int], list[Statement]]] = {
-    "BEGIN PGM": Parser._begin,
-    "END PGM": Parser._end,
-    **dict.fromkeys(("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), Parser._nothing),
-    "TOOL CALL": Parser._tool,
-    **dict.fromkeys(("L", "LP"), Parser._nothing),
-    **dict.fromkeys(("C", "CR", "CT", "CP"), Parser._arc),
-    "CC": Parser._pole,
-    **dict.fromkeys(("RND", "CHF"), Parser._lonely_corner),
-    "LBL": Parser._label_here,
-    "CALL LBL": Parser._call,
-    "Q": Parser._parameter,
-    "FN": Parser._fn,
-    **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), Parser._define),
-    "CYCL CALL": Parser._cycle_call,
-    "STOP": Parser._stop,
-    "M": Parser._code,
+_READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Statement]]] = {
+    "BEGIN PGM": HeidenhainParser._begin,
+    "END PGM": HeidenhainParser._end,
+    **dict.fromkeys(
+        ("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing
+    ),
+    "TOOL CALL": HeidenhainParser._tool,
+    **dict.fromkeys(("L", "LP"), HeidenhainParser._nothing),
+    **dict.fromkeys(("C", "CR", "CT", "CP"), HeidenhainParser._arc),
+    "CC": HeidenhainParser._pole,
+    **dict.fromkeys(("RND", "CHF"), HeidenhainParser._lonely_corner),
+    "LBL": HeidenhainParser._label_here,
+    "CALL LBL": HeidenhainParser._call,
+    "Q": HeidenhainParser._parameter,
+    "FN": HeidenhainParser._fn,
+    **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), HeidenhainParser._define),
+    "CYCL CALL": HeidenhainParser._cycle_call,
+    "STOP": HeidenhainParser._stop,
+    "M": HeidenhainParser._code,
 }

@@ -24,13 +24,13 @@ from planner.nc.language.tree import (
     Number,
     Numbered,
     Operation,
-    Place,
     ProgramFault,
+    SourcePlace,
 )
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
 
-
+# What operators and functions mean.
 LANGUAGE = Language(
     name="heidenhain",
     operations=ARITHMETIC
@@ -67,6 +67,7 @@ LANGUAGE = Language(
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
 _Q = re.compile(r"([+-]?)\s*Q(\d+)(?!\d)", re.IGNORECASE)
 _TOKEN = re.compile(r"\s*(?:(\d+(?:\.\d*)?|\.\d+)|(Q[LRS]?\d*|[A-Z]+)|(.))", re.IGNORECASE)
+# Operators of a higher rank bind first.
 _RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 3}
 _NAMES = {"^": "**"}
 _FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SQRT", "ABS", "INT", "FRAC", "LN", "LOG", "EXP")
@@ -116,7 +117,7 @@ class ConversationalBlock:
     at : byte offset of the first character of each part, and where the part begins in `text`
     """
 
-    place: Place
+    place: SourcePlace
     text: str
     at: tuple[tuple[int, int], ...]
 
@@ -140,7 +141,7 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
 
     file, begin : its number among the files, and where its bytes begin in the words' data
     """
-    waiting: tuple[Place, str, list[tuple[int, int]]] | None = None
+    waiting: tuple[SourcePlace, str, list[tuple[int, int]]] | None = None
     open_end = False
     at = 0
     for number, raw in enumerate(data.split(b"\n"), start=1):
@@ -163,7 +164,7 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
         elif content:
             if waiting is not None:
                 yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
-            waiting = (Place(file, number, start + first), content, [(start + first, 0)])
+            waiting = (SourcePlace(file, number, start + first), content, [(start + first, 0)])
         open_end = ends_open or (open_end and not content)
     if waiting is not None:
         yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))

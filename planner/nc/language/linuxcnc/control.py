@@ -11,10 +11,10 @@ from planner.nc.language.tree import (
     Expression,
     If,
     Loop,
-    Place,
     Procedure,
     ProgramFault,
     Return,
+    SourcePlace,
     Statement,
 )
 
@@ -31,13 +31,13 @@ class _Open:
 
     kind: str
     label: str
-    place: Place
+    place: SourcePlace
     condition: Expression | None
     body: list[Statement]
     branches: list[tuple[Expression, list[Statement]]]
 
 
-class Control:
+class LinuxcncControl:
     """The statements so far, and those that are open.
 
     procedures : subprograms by their labels
@@ -52,7 +52,7 @@ class Control:
         self.open: list[_Open] = []
         self.base = self.body = self.main
 
-    def _add(self, label: str, place: Place, body: list[Statement]) -> None:
+    def _add(self, label: str, place: SourcePlace, body: list[Statement]) -> None:
         if label in self.procedures:
             first = self.procedures[label].place.line
             raise ProgramFault(place, f"a second subprogram o{label}; the first is on line {first}")

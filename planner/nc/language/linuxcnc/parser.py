@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 
-from planner.nc.language.linuxcnc.control import KEYWORDS, Control, end_of
+from planner.nc.language.linuxcnc.control import KEYWORDS, LinuxcncControl, end_of
 from planner.nc.language.linuxcnc.text import ARGUMENTS_MAX, LANGUAGE, SPELLING
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader, Unspelled
@@ -29,18 +29,19 @@ from planner.nc.language.tree import (
     Named,
     Number,
     Numbered,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
     Return,
+    SourcePlace,
 )
 
+# What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _PROGRAM = ""
 
 
-class Parser(Control):
+class LinuxcncParser(LinuxcncControl):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
@@ -69,7 +70,10 @@ class Parser(Control):
                     left.place, f"this {left.kind} has no end; write o{left.label} {end_of(left.kind)}"
                 )
             )
-        return [Procedure(_PROGRAM, Place(self.source.file, 1, 0), self.main), *self.procedures.values()]
+        return [
+            Procedure(_PROGRAM, SourcePlace(self.source.file, 1, 0), self.main),
+            *self.procedures.values(),
+        ]
 
     def _plain(self, rows: PlainRows) -> None:
         in_main = self.body is self.main

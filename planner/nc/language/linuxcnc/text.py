@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from planner.nc.language.arithmetic import ARITHMETIC, DEGREES, modulo, nearest
+from planner.nc.language.arithmetic import ARITHMETIC, DEGREES, modulo, rounded
 from planner.nc.language.asked import LinuxcncAsked
 from planner.nc.language.spelling import Spelling
 from planner.nc.language.tree import Language
 
-ARGUMENTS_MAX = 30
+ARGUMENTS_MAX = 30  # #1 to #30 are a call's own
 EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
 _FUNCTIONS = (
     "ABS",
@@ -27,6 +27,7 @@ _FUNCTIONS = (
     "SQRT",
     "TAN",
 )
+# Operators of a higher rank bind first.
 _RANKS = {
     "**": 5,
     **dict.fromkeys(("*", "/", "MOD"), 4),
@@ -51,13 +52,13 @@ LANGUAGE = Language(
         ("ATAN", 2): "atan2({0},{1})",
         ("FIX", 1): "float(floor({0}))",
         ("FUP", 1): "float(ceil({0}))",
-        ("ROUND", 1): "nearest({0})",
+        ("ROUND", 1): "rounded({0})",
     },
     conditions=frozenset(("EQ", "NE", "GT", "GE", "LT", "LE", "AND", "OR", "XOR")),
     functions=DEGREES
     | {
         "exp": math.exp, "log": math.log, "sqrt": math.sqrt, "power": math.pow, "floor": math.floor, "ceil": math.ceil,
-        "modulo": modulo, "nearest": nearest,
+        "modulo": modulo, "rounded": rounded,
     },
     locals=ARGUMENTS_MAX,
     largest=5601,

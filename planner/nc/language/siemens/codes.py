@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-# Letters and G codes of words with the same meaning in RS274NGC.
+# Letters of words with the same meaning in RS274NGC.
 PLAIN_LETTERS = "NGXYZIJKFSM"
+# G codes with the same meaning.
 SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 40, 54, 55, 56, 57, 90, 91, 94)
 # G codes of Siemens that are others here; an empty tuple changes nothing.
 CODES: dict[int, tuple[float, ...]] = {

@@ -5,22 +5,14 @@ from __future__ import annotations
 import re
 
 from planner.nc.language.siemens import codes, drilling
-from planner.nc.language.siemens.control import ZERO, Control
+from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
-from planner.nc.language.tree import (
-    Expression,
-    Line,
-    Message,
-    Number,
-    Parameter,
-    Statement,
-    Word,
-)
+from planner.nc.language.tree import ZERO, Expression, Line, Message, Number, Parameter, Statement, Word
 
 _TYPES = frozenset(("REAL", "INT", "BOOL"))
 
 
-class Commands(Control):
+class Commands(SiemensControl):
     """What commands have set.
 
     names    : of the variables

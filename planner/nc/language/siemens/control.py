@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Expression,
     Goto,
     If,
@@ -14,11 +16,10 @@ from planner.nc.language.tree import (
     Loop,
     Number,
     Parameter,
-    Place,
+    SourcePlace,
     Statement,
 )
 
-ZERO, ONE = Number(0.0), Number(1.0)
 _NESTED_MAX = 100  # loops and branches in each other
 
 
@@ -27,14 +28,14 @@ class _Open:
     """A control statement whose end has not come."""
 
     kind: str
-    place: Place
+    place: SourcePlace
     condition: Expression | None
     body: list[Statement]
     branches: list[tuple[Expression, list[Statement]]]
     count: tuple[Parameter, Expression] | None = None  # of FOR: its variable and last value
 
 
-class Control:
+class SiemensControl:
     """The statements so far, and those that are open.
 
     main, body : statements of the program, and where the next one goes
@@ -50,7 +51,7 @@ class Control:
         self.labels: dict[str, int] = {}
         self.counters = 0
 
-    def _label(self, name: str, place: Place) -> None:
+    def _label(self, name: str, place: SourcePlace) -> None:
         self.body.append(Label(place, self._number_of(name)))
 
     def _number_of(self, label: str) -> int:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from planner.nc.language.siemens.text import operation, variable
-from planner.nc.language.tree import Expression, If, Line, Loop, Number, Place, Statement, Word
+from planner.nc.language.tree import ZERO, Expression, If, Line, Loop, Number, SourcePlace, Statement, Word
 
 ARGUMENTS = {
     "CYCLE81": ("RTP", "RFP", "SDIS", "DP", "DPR"),
@@ -22,10 +22,11 @@ ARGUMENTS = {
 }
 _BREAK = 1.0  # mm by which the tool goes back to break a chip
 _BEFORE = 1.0  # mm above the depth already drilled, where feed begins again
-ZERO, ONE = Number(0.0), Number(1.0)
 
 
-def drilled_rows(place: Place, name: str, given: Sequence[Expression | None], unit: float) -> list[Statement]:
+def drilled_rows(
+    place: SourcePlace, name: str, given: Sequence[Expression | None], unit: float
+) -> list[Statement]:
     """A cycle with its arguments.
 
     unit : mm per unit of the program

@@ -22,18 +22,19 @@ import numpy as np
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.siemens import codes, drilling
 from planner.nc.language.siemens.commands import Commands, as_word
-from planner.nc.language.siemens.control import ONE, ZERO
 from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Expression,
     Line,
     Number,
     Parameter,
-    Place,
     PlainRows,
     Procedure,
     ProgramFault,
+    SourcePlace,
     Word,
 )
 
@@ -41,7 +42,7 @@ _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
-class Parser(Commands):
+class SiemensParser(Commands):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
@@ -51,7 +52,7 @@ class Parser(Commands):
 
     def parse(self) -> list[Procedure]:
         """The main program, under the empty name."""
-        start = Place(self.source.file, 1, self.source.begin)
+        start = SourcePlace(self.source.file, 1, self.source.begin)
         special = self._special()
         done, rows = 0, len(self.source.words.line)
         for row in [*special, rows]:
@@ -258,25 +259,25 @@ def _without_comment(text: str) -> str:
     return re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", text.rstrip("\r\n\x1a"))
 
 
-_STATEMENTS: dict[str, Callable[[Parser, TokenReader], None]] = {
-    "DEF": Parser._define,
-    "IF": Parser._if,
-    "ELSE": Parser._else,
-    "ENDIF": Parser._end_if,
-    "WHILE": Parser._while,
-    "LOOP": Parser._loop,
-    **dict.fromkeys(("ENDWHILE", "ENDLOOP"), Parser._end_loop),
-    "FOR": Parser._for,
-    "ENDFOR": Parser._end_for,
-    "REPEAT": Parser._repeat,
-    "UNTIL": Parser._until,
-    **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), Parser._goto),
-    **dict.fromkeys(("TRANS", "ATRANS"), Parser._shift),
-    "MCALL": Parser._modal_call,
-    "MSG": Parser._message,
-    **dict.fromkeys(("EXTERN", "PROC", "WORKPIECE"), Parser._idle),
+_STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
+    "DEF": SiemensParser._define,
+    "IF": SiemensParser._if,
+    "ELSE": SiemensParser._else,
+    "ENDIF": SiemensParser._end_if,
+    "WHILE": SiemensParser._while,
+    "LOOP": SiemensParser._loop,
+    **dict.fromkeys(("ENDWHILE", "ENDLOOP"), SiemensParser._end_loop),
+    "FOR": SiemensParser._for,
+    "ENDFOR": SiemensParser._end_for,
+    "REPEAT": SiemensParser._repeat,
+    "UNTIL": SiemensParser._until,
+    **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
+    **dict.fromkeys(("TRANS", "ATRANS"), SiemensParser._shift),
+    "MCALL": SiemensParser._modal_call,
+    "MSG": SiemensParser._message,
+    **dict.fromkeys(("EXTERN", "PROC", "WORKPIECE"), SiemensParser._idle),
     **dict.fromkeys(
         codes.REFUSED,
-        Parser._refused,
+        SiemensParser._refused,
     ),
 }

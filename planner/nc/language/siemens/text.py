@@ -15,7 +15,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from planner.nc.language.arithmetic import ARITHMETIC, DEGREES, nearest
+from planner.nc.language.arithmetic import ARITHMETIC, DEGREES, rounded
 from planner.nc.language.asked import FIRST_POSITION, PositionAsked
 from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
 from planner.nc.language.tree import (
@@ -25,13 +25,13 @@ from planner.nc.language.tree import (
     Number,
     Numbered,
     Operation,
-    Place,
     ProgramFault,
+    SourcePlace,
 )
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
 
-
+# What operators and functions mean.
 LANGUAGE = Language(
     name="siemens",
     operations=ARITHMETIC
@@ -51,7 +51,7 @@ LANGUAGE = Language(
         ("ATAN2", 2): "atan2({0},{1})",
         ("POT", 1): "({0})**2",
         ("TRUNC", 1): "float(trunc({0}))",
-        ("ROUND", 1): "nearest({0})",
+        ("ROUND", 1): "rounded({0})",
         ("MIN", 2): "min({0},{1})",
         ("MAX", 2): "max({0},{1})",
     },
@@ -63,7 +63,7 @@ LANGUAGE = Language(
         "sqrt": math.sqrt,
         "trunc": math.trunc,
         "fmod": math.fmod,
-        "nearest": nearest,
+        "rounded": rounded,
     },
     locals=0,
     largest=FIRST_POSITION + 2,
@@ -71,6 +71,7 @@ LANGUAGE = Language(
     asked=PositionAsked.numbers,
 )
 
+# Operators of a higher rank bind first.
 _RANKS = {
     **dict.fromkeys(("OR", "XOR"), 1),
     "AND": 2,
@@ -80,6 +81,7 @@ _RANKS = {
 }
 _FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "POT", "TRUNC", "ROUND", "LN", "EXP")
 _TWO = ("ATAN2", "MIN", "MAX")
+# Names of numbers.
 _CONSTANTS = {"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi}
 _TOKEN = re.compile(
     r"\s*(?:(?P<word>[XYZIJKFSTMDGHABC][-+]?(?:\d+\.?\d*|\.\d+)(?![\d_.])(?!\w*\s*[=(\[]))|"
@@ -125,7 +127,7 @@ class TokenReader:
     names : variables that the program has declared
     """
 
-    def __init__(self, text: str, place: Place, start: int, names: set[str]):
+    def __init__(self, text: str, place: SourcePlace, start: int, names: set[str]):
         self.text, self.place, self.start, self.names = text, place, start, names
         self.tokens: list[Token] = []
         self.next = self.nested = 0

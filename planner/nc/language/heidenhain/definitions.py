@@ -23,7 +23,7 @@ from planner.nc.language.tree import (
 _PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
 
 
-class Settings(Flow):
+class Definitions(Flow):
     """What has been set.
 
     moves  : path functions, with the feed of the tool call

@@ -27,9 +27,11 @@ from planner.base import kept
 
 FIRST, LAST = (0, 68), (0, 68)  # versions of numba that the tests have run with
 PLATFORM = "linux"  # where they have
-# What numba's type of an array depends on besides its dtype and dimensions: bits of `flags.num` for contiguous in C's and in Fortran's
-# order, aligned, writable.
-_LAYOUT = 0x0001 | 0x0002 | 0x0100 | 0x0400
+# What numba's type of an array depends on besides its dtype and dimensions: bits of `flags.num` for contiguous in C's order, if not in
+# that then in Fortran's, aligned, writable.
+_IN_C_S = 0x0001
+_LAYOUT_IN_C_S = _IN_C_S | 0x0100 | 0x0400
+_LAYOUT = _LAYOUT_IN_C_S | 0x0002
 # Arguments whose type says all of numba's type; numbers of NumPy's are told by their dtype.
 _SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "none", str: "str"}
 
@@ -177,7 +179,8 @@ def _kind(value: Any) -> Hashable:
     """What numba's type of an argument depends on."""
     of = type(value)
     if of is np.ndarray:
-        return value.dtype, value.ndim, value.flags.num & _LAYOUT
+        flags = value.flags.num
+        return value.dtype, value.ndim, flags & (_LAYOUT_IN_C_S if flags & _IN_C_S else _LAYOUT)
     if of in _SCALARS:
         return _SCALARS[of]
     if isinstance(value, tuple):

@@ -60,6 +60,8 @@ def test_llvm_gives_a_level_the_features_listed() -> None:
     }
     declare <4 x double> @llvm.fma.v4f64(<4 x double>, <4 x double>, <4 x double>)
     """
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
     target = binding.Target.from_triple(binding.get_process_triple())
     codes = {}
     for name in (LEVEL, "x86-64"):

@@ -44,7 +44,7 @@ def test_a_package_that_was_built_plans_without_compiling(tmp_path: Path) -> Non
     assert len(built) > 30
     assert all(name.endswith(".kernel") for name in built)
     job = tmp_path / "job.ngc"
-    job.write_text("G21 G90 G64 P0.05 F2000\nG1 X10\nX12 Y5\nG3 X4 Y9 I-5 J1\nM2\n", encoding="utf-8")
+    job.write_text("G21 G90 G64 P0.05 F2000\nG1 X10\nX12 Y5\nG3 X6 Y11 I-5 J1\nM2\n", encoding="utf-8")
     cache = tmp_path / "cache"
     assert cycle_time(job, build, NUMBA_CACHE_DIR=str(cache)) == cycle_time(job, ROOT)
     assert not cache.exists()  # nothing was compiled

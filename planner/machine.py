@@ -89,9 +89,11 @@ class ToolData(_Record):
 
 
 class DialectData(_Record):
-    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit."""
+    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit; `lathe`
+    says whether they are a lathe's, or None: their words tell."""
 
     least_increment: Positive | None = None
+    lathe: bool | None = None
 
 
 class Machine(_Record):

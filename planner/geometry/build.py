@@ -17,6 +17,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.geometry.curves import CHORD_SHARE, CurveSegments, curve_segments
+from planner.geometry.run_in import require_room
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import Machine
 from planner.nc.bezier import homogeneous
@@ -89,7 +90,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     theta = np.zeros(len(block) + 1)
     theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
     joint, dwell = _joints(program, machine, block, theta)
-    return Toolpath(
+    toolpath = Toolpath(
         source=program.source,
         axes=axes,
         start=start[:, axis],
@@ -110,8 +111,11 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         theta=theta,
         tolerance=of_block[np.append(block[:1], block)],
         dwell=dwell,
+        held=np.isin(block, program.synchronised),
         zero_length=np.flatnonzero(moves & ~real),
     )
+    require_room(toolpath, machine)
+    return toolpath
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
@@ -215,10 +219,10 @@ def _curvature_bound(arcs: Arcs) -> FloatArray:
 
 
 def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
-    """Programmed feed (M,) [mm/s] of the segments, at most `feed_max` of the machine."""
+    """Programmed feed (M,) [mm/s] of the segments, at most `feed_max` of the machine; of threads as it is, to be refused."""
     feed = program.feed[block].copy()
     if machine.feed_max is not None:
-        cut = program.kind[block] != Kind.RAPID
+        cut = (program.kind[block] != Kind.RAPID) & ~np.isin(block, program.synchronised)
         feed[cut] = np.minimum(feed[cut], machine.feed_max)
     return feed
 

@@ -102,6 +102,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
         length=length,
         feed=toolpath.feed[segment],
         rapid=toolpath.rapid[segment],
+        held=toolpath.held[segment],
         block=toolpath.block[segment],
         line=toolpath.line[segment],
         arc=np.where(straight | chord, -1, toolpath.arc[segment]),

@@ -6,6 +6,7 @@ for every point n a link i(n) that never goes back, within the link's budget, su
 
     sum of |point - link|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
                               +  budget^2 for every point that is faster than its block's feed allows
+                              +  `TOO_FAR` budget^2 for every vertex that is missed by more than its budget
 
 is found by dynamic programming over the links that can be reached from the point before, a window of about two budgets, so that
 time and memory are linear in points and links. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
@@ -30,6 +31,9 @@ SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry
 SAME_FEED = 1e-6  # [-] a feed above another by less is the same: rounding
 # Vertices may be missed by so many budgets [-]: a vertex passed at 1.01 must not hold up what follows.
 MISSED = 2.0
+# Price of a vertex missed by more than its budget [budget^2]: more than that of all points around it. Small moves inside the tolerance
+# would else be entered before their first vertex is reached, at their own, higher feed.
+TOO_FAR = 1e6
 FIRST_WIDER, WIDEST = (
     1.05,
     100.0,
@@ -222,6 +226,8 @@ def _forward(chain, before, point, feed, fresh, low, high, cost):
                 if i > low:
                     off_sq, _ = _from_chord(before, point[n], vertex[i])
                     within = off_sq <= (wide * MISSED * at_vertex[i] + SAME_PLACE) ** 2
+                    if off_sq > (wide * at_vertex[i] + SAME_PLACE) ** 2:
+                        off_sq += TOO_FAR * at_vertex[i] * at_vertex[i]
                     enter = off_sq + min(stay, enter + skipped[i - 1]) if within else np.inf
                 stay = cost[i] if not begins and i <= high else np.inf
                 if i > high and enter == np.inf:

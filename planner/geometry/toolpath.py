@@ -75,6 +75,7 @@ class Toolpath:
     theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
+    held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
     zero_length     : (Z,) blocks that move nowhere, kept as events
     """
 
@@ -98,6 +99,7 @@ class Toolpath:
     theta: FloatArray
     tolerance: FloatArray
     dwell: FloatArray
+    held: Array
     zero_length: Array
 
     def __post_init__(self) -> None:
@@ -108,6 +110,7 @@ class Toolpath:
             freeze(self, name, np.float64, (segments,))
         freeze(self, "feed", np.float64, (segments,), finite=False)
         freeze(self, "rapid", np.bool_, (segments,))
+        freeze(self, "held", np.bool_, (segments,))
         freeze(self, "block", np.int64, (segments,))
         freeze(self, "line", np.int32, (segments,))
         freeze(self, "arc", np.int64, (segments,))
@@ -141,7 +144,7 @@ class Toolpath:
             return self
         last = np.append(first[1:], len(self)) - 1
         at = np.append(first, len(self))
-        of_segment = ("start", "feed", "rapid", "block", "line", "tangent_start")
+        of_segment = ("start", "feed", "rapid", "held", "block", "line", "tangent_start")
         return dataclasses.replace(
             self,
             end=self.end[last],

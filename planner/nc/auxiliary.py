@@ -58,6 +58,7 @@ def events(state: State, store: Store, block: Block, note: Note) -> None:
         state.spindle.surface_speed = block.g["spindle mode"] == 960
         if state.spindle.surface_speed and "S" not in block.value:
             raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
+        state.spindle.speed_max = abs(block.value.get("D", 0.0))
     for code in block.g.values():
         if code in codes.G_EVENTS:
             store.add_event("G", code / 10, line)

@@ -4,12 +4,14 @@
     G95    feed = F S                 S in revolutions per minute
     G93    feed = length F            F on every line that moves at a feed
 
-A change of the mode forgets the feed. With G96 S is a surface speed: the turns, and with them the feed of G95, depend on the diameter
-that is being cut, and are refused.
+A change of the mode forgets the feed. With G96 S is a surface speed v, in metres or feet per minute: the turns,
+and with them the feed of G95, depend on the radius r that is being cut, n = v / (2 pi r), up to D of G96. Straight moves are divided so
+that n changes by at most `SURFACE_STEP` in a part, and a part has the feed of its larger radius; an arc has that of its largest.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from planner.base.units import SECONDS_PER_MINUTE
@@ -21,6 +23,11 @@ from planner.nc.state import FeedMode, State
 Note = Callable[[str, int], None]
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
+SURFACE_STEP = (
+    0.05  # by which the spindle's speed changes in a part of a move: as much as overrides are set to
+)
+_LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
+_MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8
 _SLOWEST = (
     0.1  # feed of a block under G93, at least [programmed units per minute]: as LinuxCNC has it, and never 0
 )
@@ -75,22 +82,54 @@ def check_feed(state: State, block: Block) -> None:
             )
         return
     if state.feed_mode == "per turn" and state.feed_per_turn > 0:
-        if state.spindle.surface_speed:
-            raise WordFault(
-                word,
-                f"{name} with a feed per turn (G95) under a constant surface speed (G96) has no feed that is known; "
-                "write G97 and S, or G94 and F",
-            )
         if not state.spindle.speed > 0:
             raise WordFault(
                 word, f"{name} with a feed per turn (G95) needs a spindle speed; write an S word before it"
             )
+        if state.spindle.surface_speed:
+            return  # its feed depends on the diameter: `surface_feed`
         state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
     if not state.feed > 0:
         raise WordFault(
             word,
             f"{name} moves without a feed; write an F word on this line or before it, or feed_default into the machine file",
         )
+
+
+def on_surface(state: State) -> bool:
+    """Whether the feed depends on the diameter: a feed per turn (G95) under a constant surface speed (G96)."""
+    return state.spindle.surface_speed and state.feed_mode == "per turn" and state.feed_per_turn > 0
+
+
+def surface_feed(state: State, radius: float, word: int) -> float:
+    """The feed [mm/s] at a radius from the spindle's axis [mm]. Raises WordFault on the axis, if the speed has no bound."""
+    spindle = state.spindle
+    per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
+    turns = per_minute / (2.0 * math.pi * abs(radius)) if radius else math.inf
+    turns = min(turns, spindle.speed_max or math.inf)
+    if math.isinf(turns):
+        raise WordFault(
+            word,
+            "a move to the spindle's axis under a constant surface speed (G96) without a largest speed has no feed; "
+            "write G50 S, or D beside G96",
+        )
+    return state.feed_per_turn * turns / SECONDS_PER_MINUTE
+
+
+def surface_parts(state: State, start: float, end: float) -> list[float]:
+    """Where a straight move between two radii [mm] is divided, as parts of it, 1 included, so that the speed of the spindle changes by
+    at most `SURFACE_STEP` in each."""
+    largest = max(abs(start), abs(end))
+    spindle = state.spindle
+    per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
+    least = max(per_minute / (2.0 * math.pi * spindle.speed_max) if spindle.speed_max else 0.0, _LEAST_RADIUS)
+    parts = {1.0}
+    if start != end and largest > least:
+        count = math.ceil(math.log(largest / least) / math.log1p(SURFACE_STEP))
+        for n in range(1, count + 1):
+            radius = max(largest / (1.0 + SURFACE_STEP) ** n, least)
+            parts |= {(sign * radius - start) / (end - start) for sign in (1.0, -1.0)}
+    return sorted(part for part in parts if 0.0 < part <= 1.0)
 
 
 def feed_of_time(state: State, block: Block, length: float) -> None:

@@ -46,6 +46,7 @@ class Interpreter:
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
     open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
+    by_word : rows that were executed word by word, not by the compiled loop
     ended : M2, M30 or a second % was executed; later chunks are not
     """
 
@@ -59,6 +60,7 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
+        self.by_word = 0
         self._cutter: Cutter | None = None
         self._words: Words | None = None  # of the last chunk
         self._splines = SplineReader()
@@ -96,6 +98,7 @@ class Interpreter:
             after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
             self._begun |= after > row
             if after < rows:
+                self.by_word += 1
                 self.store.frame = int(words.frame[after])
                 block = read_block(words, after, self.report, self.assumed)
                 if block is not None and block.ended:
@@ -300,11 +303,29 @@ class Interpreter:
             return
         if kind == Kind.LINE:
             feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+        if kind == Kind.LINE and feeds.on_surface(state):
+            radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
+            state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
+            if cutter is None:
+                self._on_surface(block, target, *radii)
+                return
         if cutter is not None:
             cutter.line(target, kind, block.line)
             return
         state.position[:], state.actual = target, None
         self.store.add(kind, block.line, state)
+
+    def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
+        """A straight move in parts, each with the feed of its larger radius."""
+        state, start, at = self.state, self.state.place.copy(), begin
+        parts = feeds.surface_parts(state, begin, end)
+        self.store.make_room(len(parts))
+        for part in parts:
+            there = begin + part * (end - begin)
+            state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
+            state.position[:] = target if part == 1.0 else start + part * (target - start)
+            state.actual, at = None, there
+            self.store.add(Kind.LINE, block.line, state)
 
     def _arc(self, block: Block, target: FloatArray) -> None:
         state = self.state
@@ -315,6 +336,10 @@ class Interpreter:
             )
         try:
             arc, normal = moves.arc(state, block, target)
+            if feeds.on_surface(state):
+                centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
+                size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
+                state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
             feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
             if self._cutter is not None:
                 self._cutter.arc(target, arc, block.line)

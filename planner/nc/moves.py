@@ -145,9 +145,13 @@ def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
 
 def arc_length(start: FloatArray, end: FloatArray, arc: Arc, normal: int) -> float:
     """Length of an arc from start to end (3,), the rise along its axis included [mm]."""
+    return math.hypot(arc_radius(start, arc, normal) * arc.sweep, end[normal] - start[normal])
+
+
+def arc_radius(start: FloatArray, arc: Arc, normal: int) -> float:
+    """Radius of an arc from start (3,) [mm]."""
     a, b = IN_PLANE[normal]
-    radius = math.hypot(start[a] - arc.centre[a], start[b] - arc.centre[b])
-    return math.hypot(radius * arc.sweep, end[normal] - start[normal])
+    return math.hypot(start[a] - arc.centre[a], start[b] - arc.centre[b])
 
 
 def _centre(state: State, block: Block, *, absolute: bool) -> FloatArray:

@@ -129,6 +129,7 @@ class Program:
     arc_center   : (K, A) centre in the plane; the axial coordinate is that of the start [mm]
     arc_normal   : (K,) index of the axis normal to the plane of the arc: 2 for G17, 1 for G18, 0 for G19
     arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
+    synchronised : (K,) indices of the blocks that are cut in step with the spindle, at their feed and no other, ascending
     splines      : of the blocks of kind SPLINE
     events       : words without influence on the motion
     notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
@@ -152,6 +153,7 @@ class Program:
     arc_center: FloatArray
     arc_normal: Array
     arc_sweep: FloatArray
+    synchronised: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
@@ -173,6 +175,7 @@ class Program:
         freeze(self, "path_control", np.uint8, (blocks,))
         freeze(self, "tolerance", np.float64, (blocks,), finite=False)
         freeze(self, "arc_block", np.int64, (arcs,))
+        freeze(self, "synchronised", np.int64, (None,))
         freeze(self, "arc_center", np.float64, (arcs, axes))
         freeze(self, "arc_normal", np.int64, (arcs,))
         freeze(self, "arc_sweep", np.float64, (arcs,))

@@ -15,11 +15,11 @@ from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.detect import dialect_of
+from planner.nc.language.detect import LATHE_NOTE, dialect_of, is_turned
 from planner.nc.leader import without_leader
 from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.program import Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, SIEMENS, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, LATHE, SIEMENS, Reading
 
 
 def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
@@ -97,6 +97,9 @@ def execute(
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
+    if is_turned(words, dialect, reading, machine):
+        dialect = LATHE
+        interpreter.note(LATHE_NOTE, int(words.line[0]))
     integers = integers_of(machine, dialect)
     words = integers.applied(words)
     if dialect is not None:

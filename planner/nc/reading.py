@@ -19,6 +19,7 @@ ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
 REFUSE, IGNORE = "refuse", "ignore"
 EXTRUDERS = (REFUSE, IGNORE)
 LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
+LATHE = "lathe"  # Fanuc's on a lathe, which the program's words tell
 DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
 
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")

@@ -62,11 +62,13 @@ class System:
 
 @dataclass(slots=True)
 class Spindle:
-    """What the spindle does: speed [1/min], turning (+1 M3, -1 M4, 0), and whether S is a surface speed (G96)."""
+    """What the spindle does: speed [1/min], turning (+1 M3, -1 M4, 0), whether S is a surface speed (G96) [m/min or ft/min], and the
+    largest speed then [1/min], 0 where it has no bound."""
 
     speed: float = 0.0
     turning: int = 0
     surface_speed: bool = False
+    speed_max: float = 0.0
 
 
 @dataclass(slots=True)

@@ -78,6 +78,7 @@ class Store:
         self.dwells: list[tuple[int, float]] = []
         self.splines: list[tuple[int, FloatArray, FloatArray]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
+        self.synchronised: list[int] = []
 
     def begin(self, words: int) -> None:
         """Be ready for a chunk of so many words."""
@@ -150,6 +151,7 @@ class Store:
             line=self.block.line[used].copy(),
             path_control=self.block.path_control[used].copy(),
             tolerance=self.block.tolerance[used].copy(),
+            synchronised=np.array(self.synchronised, dtype=np.int64),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
             arc_center=np.array([arc[1] for arc in self.arcs]).reshape(-1, 3),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),

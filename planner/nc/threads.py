@@ -1,8 +1,9 @@
 """Motion in step with the spindle: G33, G33.1 and the threading cycle G76 (thread_cycle.py).
 
-The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A control follows the spindle as
-it turns, from the first moment of the cut; a plan starts and ends at rest. What is planned is that feed as an upper limit, with full
-stops at both ends of the cut. G33.1 taps: along the thread and back to its start.
+The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan starts and ends at rest:
+with full stops at both ends of the cut the feed is reached behind the run-in and held up to the run-out, whose lengths the machine's
+acceleration and jerk give (geometry/run_in.py, which refuses a cut without room for them; the verdict looks at the feed between).
+LinuxCNC accelerates in the synchronised move, too. G33.1 taps: along the thread and back to its start.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ def _cut(state: State, store: Store, line: int, target: FloatArray, feed: float)
     programmed, state.feed = state.feed, feed
     state.position[:], state.actual = target, None
     store.make_room(1)
+    store.synchronised.append(store.blocks)
     store.add(Kind.LINE, line, state)
     state.feed, state.in_thread = programmed, True
 
@@ -90,8 +92,8 @@ def _rapid(state: State, store: Store, line: int, place: FloatArray) -> None:
 
 def _say(state: State, block: Block, note: Note) -> None:
     note(
-        f"G{codes.number(state.motion)} is synchronised with the spindle: planned with the feed of S as its upper limit and full "
-        "stops at both ends, not at constant feed",
+        f"G{codes.number(state.motion)} is in step with the spindle: its feed is pitch times S, between a run-in and a run-out "
+        "that begin and end with full stops",
         block.line,
     )
 

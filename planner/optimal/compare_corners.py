@@ -14,7 +14,7 @@ import dataclasses
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import Array
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
@@ -32,8 +32,8 @@ COMPARED_POINTS = 1_000_000  # some 10 s and 1 GB
 # usual one's points (22.7 and 213 for each corner on chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 
-# Corners that take so many times as long as splines on the coarse grid are not tried on the final one [-]: times on the coarse grid are
-# up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
+# Corners that on the grid of the rounds take so many times as long as splines on the final one are not tried there [-]: times on the
+# coarse grid are up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
 CLOSE = 1.01
 FASTER = (
     1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap
@@ -59,7 +59,6 @@ def corner_bounds(
 def with_corners(
     rounded: SmoothPath,
     best: OnPath,
-    coarse: FloatArray,
     corners: CornerBounds,
     job: Job,
     order: Order,
@@ -69,7 +68,6 @@ def with_corners(
     out.
 
     rounded : the path with the corners that the splines of `best` replace
-    coarse  : (G,) times between full stops on the same splines on the grid of the rounds, on which most corners are ruled out [s]
     corners : bounds on the motion on them
     grids   : of the rounds, and the final one, of `best`
     """
@@ -90,10 +88,8 @@ def with_corners(
     left = np.sort(ranked[np.cumsum(corners.points[ranked]) > COMPARED_POINTS])
     chosen[left] = False
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
-    for resolution, splines, fraction in (
-        (grids.rounds, coarse, CLOSE),
-        (grids.final, best.stop_to_stop(), 1.0),
-    ):
+    splines = best.stop_to_stop()
+    for resolution, fraction in ((grids.rounds, CLOSE), (grids.final, 1.0)):
         if not chosen.any():
             return best, left
         planned = order.solve(rounded.part(chosen), job, resolution)

@@ -158,17 +158,17 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
     # Solve and reshape in turns, on a coarse grid; then once on the final one. The coarse motion is let go of before: 0.5 kB a point.
-    best, grids = _first(with_spline(rounded, splines), splines, job, settings)
-    best = reshaped(rounded, best, job, settings, grids.rounds)
-    coarse = best.stop_to_stop() if best.solution.solved else np.zeros(0)
-    if best.solution.solved:
-        path, splined = best.path, best.shape
+    # Where not one round is worth its work the final grid is the first one.
+    best, grids, resolution = _first(with_spline(rounded, splines), splines, job, settings)
+    if best.solution.solved and resolution != grids.final:
+        best = reshaped(rounded, best, job, settings, resolution)
+        path, splined, coarse = best.path, best.shape, best.solution.cycle_time
         del best
         best = dataclasses.replace(order.solve(path, job, grids.final), shape=splined)
         job.tell(
             "final grid",
             found=best.solution.cycle_time,
-            before=float(coarse.sum()),
+            before=coarse,
             kept=best.solution.solved,
         )
     notes: tuple[str, ...] = ()
@@ -178,7 +178,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         with job.stage("solve"):
             bounds = corner_bounds(rounded, machine, order.jerk_limited)
             of_given = bounds if rounded is given else corner_bounds(given, machine, order.jerk_limited)
-        best, left = with_corners(rounded, best, coarse, bounds, job, order, grids)
+        best, left = with_corners(rounded, best, bounds, job, order, grids)
         notes = not_compared_note(rounded, left, bounds.points)
         small = of_given.points.sum() <= COMPARED_POINTS
         if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
@@ -239,13 +239,15 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
     return best
 
 
-def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids]:
-    """The motion on the first splines, and the grids."""
+def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
+    """The motion on the first splines, the grids, and the resolution of the one that it is on."""
     grids, samples = grids_for(path, job, settings)
-    known = samples if grids.rounds == COARSE else None
+    reshaped_at_all = settings.effort.work >= len(samples) if settings.rounds is None else settings.rounds > 0
+    resolution = grids.rounds if reshaped_at_all else grids.final
+    known = samples if resolution == COARSE else None
     del samples
-    planned = settings.order.solve(path, job, grids.rounds, samples=known)
-    return dataclasses.replace(planned, shape=shape), grids
+    planned = settings.order.solve(path, job, resolution, samples=known)
+    return dataclasses.replace(planned, shape=shape), grids, resolution
 
 
 def grids_for(path: SmoothPath, job: Job, settings: Settings) -> tuple[Grids, PathSamples]:

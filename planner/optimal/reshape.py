@@ -117,11 +117,13 @@ def _bounds(planned: OnPath, on: Array) -> FloatArray:
     return np.stack([feed, np.minimum(across[on], across[on + 1])], axis=1)
 
 
-def corridor_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
+Bands = tuple[FloatArray, FloatArray]
+
+
+def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0) -> FloatArray:
     """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a corridor wider by `more` [mm], in a round from the present
-    shape."""
-    shape = _shape(planned)
-    H, Q = price_bands(planned)
+    shape, with its `price_bands`."""
+    shape, (H, Q) = _shape(planned), bands
     corridor = shape.corridor
     corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
     goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
@@ -129,7 +131,7 @@ def corridor_prices(planned: OnPath, more: float = 0.0) -> FloatArray:
     return np.asarray(-relaxed.multiplier / relaxed.used, dtype=np.float64)
 
 
-def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
+def price_bands(planned: OnPath) -> Bands:
     """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives at the present shape
     (module text) [s/mm2], and Q, of the integral of the squared jerks over their limits."""
     problem = planned.problem

@@ -13,7 +13,7 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import Motion
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.optimal.reshape import corridor_prices
+from planner.optimal.reshape import corridor_prices, price_bands
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
 from planner.sensitivity.prices import MORE_TOLERANCE, WORTH, SitePrices, price_list
@@ -59,9 +59,10 @@ def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
     by_site = None
     # what the corridor of the splines costs
     if best.shape is not None and len(best.path.spline) and not machine.own:
-        now = corridor_prices(best)
+        bands = price_bands(best)
+        now = corridor_prices(best, bands)
         # where even this slope all along would save next to nothing, the least is nothing
         worth = -now.sum() * MORE_TOLERANCE >= WORTH * best.solution.cycle_time
-        wider = corridor_prices(best, MORE_TOLERANCE) if worth else np.zeros(len(now))
+        wider = corridor_prices(best, bands, MORE_TOLERANCE) if worth else np.zeros(len(now))
         by_site = SitePrices(place=best.shape.splines.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

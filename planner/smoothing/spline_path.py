@@ -132,6 +132,29 @@ def cusp_spans(splines: Splines) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
+def turns_little(poly, control, i, h):
+    """Whether a span has no cusp at first sight: its derivative by tau, sum_m m C_m tau^(m-1), is never more than |C_1|/2 away from
+    C_1, and that is more than twice of a cusp's.
+
+    poly    : (6, 6) basis polynomials of span i of length h [mm]
+    control : (n, A) control points of its spline [mm]
+    """
+    first, others = 0.0, 0.0
+    for m in range(1, ORDER):
+        square = 0.0
+        for k in range(control.shape[1]):
+            value = 0.0
+            for b in range(1, ORDER):  # they sum up to 0 for m > 0: from the first control point on
+                value += poly[b, m] * (control[i + b, k] - control[i, k])
+            square += value * value
+        if m == 1:
+            first = np.sqrt(square)
+        else:
+            others += m * np.sqrt(square)
+    return others <= 0.5 * first and first > 2.0 * CUSP * h
+
+
+@njit(cache=True, error_model="numpy")
 def _cusp_spans(splines):
     """(S,) `cusp_spans`."""
     span_first, axes = splines.span_first, splines.control.shape[1]
@@ -141,6 +164,8 @@ def _cusp_spans(splines):
         cut, basis = run_knots(splines, q)
         control = run_control(splines, q)
         for i in range(len(cut) - 1):
+            if turns_little(basis[i], control, i, cut[i + 1] - cut[i]):
+                continue
             for place in range(CUSP_PLACES):
                 derivatives(basis[i], place / (CUSP_PLACES - 1.0), cut[i + 1] - cut[i], rows)
                 square, forward = 0.0, 0.0

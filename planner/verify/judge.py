@@ -15,6 +15,7 @@ from planner.verify import contour, error_allocation, findings, samples
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES
 from planner.verify.given import DERIVATIVES, Given
+from planner.verify.held import held_faults
 from planner.verify.limits import NORMAL_NAME, normal_limit
 from planner.verify.pieces import program_pieces, widened
 from planner.verify.reading import Reader
@@ -85,6 +86,7 @@ def verify(
     faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    faults += held_faults(trajectory, looks, toolpath, pieces, machine)
     after = after_filters(trajectory, motion, toolpath, machine, pieces)
     faults += after.faults if after is not None else ()
     corners = error_allocation.check_corners(

@@ -11,7 +11,7 @@ from benchmarks.jerk_campaign import faults, small_problem
 from benchmarks.random_paths import long_path, random_path
 from planner.base.threads import use_threads
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk import piece, solver
+from planner.feedrate.jerk import part, solver
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.solver import JerkLimited
@@ -30,7 +30,7 @@ def _threads_as_before():
 
 def window_of(problem: FeedrateProblem) -> int:
     """So small that the problem is solved from both ends."""
-    return (len(problem) - 2) // piece.LONG
+    return (len(problem) - 2) // part.LONG
 
 
 @pytest.mark.parametrize("points", [2000, 3000, 5000])
@@ -77,7 +77,7 @@ def test_where_the_middle_does_not_converge_the_profile_goes_on_from_the_start(m
     solve = JerkLimited(window=window_of(problem)).solve
     found = solve(problem)
     assert found.effort["joined"] == 0
-    monkeypatch.setattr(piece, "LONG", len(problem))
+    monkeypatch.setattr(part, "LONG", len(problem))
     forward = solve(problem)
     assert not faults(problem, found)
     assert found.cycle_time == pytest.approx(forward.cycle_time, rel=1e-4)

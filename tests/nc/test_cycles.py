@@ -144,7 +144,7 @@ REFUSED = [
     ("G93 G1 X5", 3, "needs an F word on its line"),
     ("G95 G1 X5", 3, "without a feed"),
     ("S0 G95 F1 G1 X5", 3, "needs a spindle speed"),
-    ("G96 S30\nG95 F1 G1 X5", 4, "feed that is known"),
+    ("G96 S30\nG95 F1 G1 X0", 4, "without a largest speed"),
     ("G96", 3, "as an S word"),
     ("G94 F1 G93\nG94 G1 X5", 3, "same group"),
     ("M66 P1 L3 Q5", 3, "waits for an input"),

@@ -158,7 +158,7 @@ def test_corners_that_win_are_planned_by_themselves_on_both_grids_and_then_with_
     pieces = len(splines.samples.piece) - 1
     assert pieces == 2
     corners = CornerBounds(np.zeros(pieces), np.full(pieces, 100.0))
-    best, left = with_corners(rounded, slow, slow.stop_to_stop(), corners, QUIET, order, GRIDS)
+    best, left = with_corners(rounded, slow, corners, QUIET, order, GRIDS)
     assert not len(left)
     assert [len(path.legs) for path in order.paths] == [8, 8, 9]
     assert not best.shape.splines.fits.any()
@@ -184,7 +184,7 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     splines = planned_on(with_spline(rounded, shape), shape=shape)
     corners = CornerBounds(np.zeros(2), np.array([2.0 * COMPARED_POINTS, 10.0]))
     order = Recorded()
-    best, left = with_corners(rounded, splines, splines.stop_to_stop(), corners, QUIET, order, GRIDS)
+    best, left = with_corners(rounded, splines, corners, QUIET, order, GRIDS)
     assert not order.paths
     assert list(left) == [0]
     assert best is splines

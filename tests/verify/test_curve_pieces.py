@@ -7,7 +7,7 @@ import pytest
 from judging import M, fault, judge
 from motions import along, rest_to_rest
 from numba import njit
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
@@ -83,6 +83,42 @@ def test_the_distance_from_a_curve_is_the_searched_one() -> None:
             far = lambda u, q=q: float(np.linalg.norm(point(u) - q))  # noqa: E731
             searched = minimize_scalar(far, bounds=ends, method="bounded", options={"xatol": 1e-10}).fun
             assert distance_from(pieces, i, q) == pytest.approx(min(searched, *map(far, ends)), abs=1e-8)
+
+
+@njit
+def part_within(pieces, i, q, radius):
+    return reach_piece(pieces, i, q, radius)
+
+
+def test_the_part_of_a_curve_within_a_radius_is_the_searched_one() -> None:
+    """Of a point beside the curve, on its hollow side and on the other: its nearest place is known, and so is how fast the distance
+    grows from there, which the bend of the curve changes by a tenth."""
+    pieces = program_pieces(toolpath())
+    seen = 0
+    for i, piece in enumerate(pieces.piece):
+        k = -2 - piece["arc"]
+        control, weights = pieces.frame[k], np.array([1, *pieces.turn[k], 1])
+
+        def point(u, control=control, weights=weights):
+            basis = weights * np.array([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3])
+            return basis @ control / basis.sum()
+
+        span = piece["x1"] - piece["x0"]
+        for part in (0.3, 0.7):
+            u = piece["x0"] + part * span
+            tangent = point(u + 1e-6) - point(u - 1e-6)
+            across = np.array([-tangent[1], tangent[0], 0.0]) / np.linalg.norm(tangent)
+            for side in (0.5, -0.5):
+                q = point(u) + side * across
+                radius = np.linalg.norm(point(u) - q) + 1e-6
+                beyond = lambda v, q=q, radius=radius: float(np.linalg.norm(point(v) - q) - radius)  # noqa: E731
+                ends = [brentq(beyond, u, u + way * 0.25 * span, xtol=1e-13) for way in (-1, 1)]
+                low, high, _ = part_within(pieces, i, q, radius)
+                width = ends[1] - ends[0]
+                assert piece["x0"] + low * span == pytest.approx(ends[0], abs=0.01 * width)
+                assert piece["x0"] + high * span == pytest.approx(ends[1], abs=0.01 * width)
+                seen += 1
+    assert seen >= 8
 
 
 def test_pieces_turn_by_little() -> None:

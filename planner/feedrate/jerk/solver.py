@@ -16,7 +16,10 @@ says that more speed would help (chain.py). A start during hard braking into a b
 points, and multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window
 per thread.
 
-**Threads.** Pieces are independent, and a long one is solved from both of its ends (piece.py). What can be done side by side is, on as
+**Held ranges.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py). That divides a piece
+into parts with given feeds at their ends.
+
+**Threads.** Parts are independent, and a long one is solved from both of its ends (part.py). What can be done side by side is, on as
 many cores as planner/base/threads.py says; the kernels let go of Python's lock. The solution is the same, byte by byte, on any number.
 
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into smaller ones if it starts
@@ -117,6 +120,7 @@ class JerkLimited:
                 + sum(len(piece.joined) for piece in pieces),
                 "other starts": sum(chain.other_starts for chain in chains),
                 "joined": sum(piece.met for piece in pieces),
+                "held": sum(held.last - held.first for piece in pieces for held in piece.held),
                 "divided": sum(chain.divided for chain in chains),
                 "standstills": len(stops),
             },
@@ -145,8 +149,8 @@ class JerkLimited:
             for first, beyond in pairwise(problem.piece.tolist())
         ]
         # The longest first, so that none is left to one core at the end.
-        order = sorted(pieces, key=lambda piece: piece.first - piece.last)
-        work = [task for piece in order for task in piece.work]
+        sized = [task for piece in pieces for task in piece.work]
+        work = [task for _, task in sorted(sized, key=lambda one: -one[0])]
         if threads() == 1 or len(work) == 1 or len(problem) < POINTS_SHARED:
             room = Room()
             for task in work:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,7 +50,11 @@ POLISHING_ROUNDS = 3  # of the result, onto exact kinematics: a defect of 1e-9 i
 POLISHED = 1e-14  # defect, share of the largest feed [-]
 
 
-Way = tuple[FloatArray, FloatArray]  # x, u at some points in a row
+class Way(NamedTuple):
+    """x and u at some points in a row."""
+
+    x: FloatArray
+    u: FloatArray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -127,14 +132,16 @@ class ScaledWindow:
             settings=settings,
         )
 
-    def solve(self, behind: Window | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
+    def solve(self, behind: Way | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
         Also the iterations of the longest try, and from how many starts it was tried."""
-        return self._from(self._starts(None if behind is None else (behind.x, behind.u)), tol, iterations)
+        return self._from(self._starts(behind), tol, iterations)
 
-    def between(self, left: Way, right: Way, tol: float, iterations: int) -> tuple[Window | None, int, int]:
-        """The fastest profile between two ways to rest, `left` from the window's first point on and `right` from its last point on,
-        backward; as `solve`."""
+    def between(
+        self, left: Way | None, right: Way, tol: float, iterations: int
+    ) -> tuple[Window | None, int, int]:
+        """The fastest profile between two ways to rest, `left` from the window's first point on, None from rest, and `right` from its
+        last point on, backward; as `solve`."""
         return self._from(self._starts(left, right), tol, iterations)
 
     def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
@@ -169,15 +176,15 @@ class ScaledWindow:
         right : the same from the last point on, backward
         """
         for x, u in self._from_rest():
-            if left is None:
-                yield x, u
+            if left is None and right is None:
+                yield Way(x, u)
                 continue
-            joined = self._joined(left, x, u)
+            joined = Way(x, u) if left is None else self._joined(left, x, u)
             if right is not None:
                 back, rate = self._joined(right, *_mirrored(x, u))
-                faster = back[::-1] > joined[0]
+                faster = back[::-1] > joined.x
                 faster[0], faster[-1] = False, True  # these states are given
-                joined = np.where(faster, back[::-1], joined[0]), np.where(faster, -rate[::-1], joined[1])
+                joined = Way(np.where(faster, back[::-1], joined.x), np.where(faster, -rate[::-1], joined.u))
             yield self._tracked(*joined) or joined
 
     def _from_rest(self) -> Iterator[Way]:
@@ -192,9 +199,9 @@ class ScaledWindow:
 
     def _joined(self, way: Way, x: FloatArray, u: FloatArray) -> Way:
         """A profile from rest put behind a way in the problem's units, which leads to the last point where it is faster."""
-        ahead, rate = way[0][: len(x)] / self.feed**2, way[1] * self.time / self.feed
+        ahead, rate = way.x[: len(x)] / self.feed**2, way.u * self.time / self.feed
         beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
-        return np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:])
+        return Way(np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:]))
 
     def _track(self, smoothing: float, rounds: int, defect_max: float) -> float:
         """`track` with the jerk of the slowest axis as the machine's."""
@@ -204,19 +211,19 @@ class ScaledWindow:
         """A profile near to the given one with exact kinematics; None where that is not found."""
         put(self.blocks, x, u)
         defect = self._track(1.0, TRACKING_ROUNDS, self.settings.defect)
-        return profile(self.blocks) if defect <= self.settings.defect else None
+        return Way(*profile(self.blocks)) if defect <= self.settings.defect else None
 
     def _plain(self, fastest: float) -> Way:
         """The plain start with a largest feed^2, whatever its limits."""
         x, u = plain_start(self.s / (self.feed * self.time))
-        return fastest * x, fastest * u
+        return Way(fastest * x, fastest * u)
 
     def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> Way:
         """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
         feed_sq, rate = x * self.feed**2, u * self.feed / self.time
         jerk = jerk_of(self.s, feed_sq, rate)
         slower = min(float(slower_by(self.columns, self.begin, feed_sq, rate, jerk, START_ROOM)), most)
-        return x / slower**2, u / slower**2
+        return Way(x / slower**2, u / slower**2)
 
     def _without_multipliers(self) -> Window:
         self.blocks.rows[:] = 0.0
@@ -241,7 +248,7 @@ class ScaledWindow:
 
 def _mirrored(x: FloatArray, u: FloatArray) -> Way:
     """A profile passed backward."""
-    return x[::-1].copy(), -u[::-1].copy()
+    return Way(x[::-1].copy(), -u[::-1].copy())
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from planner.nc.language.basic_blocks import BasicBlocks
+from planner.nc.language.endless import never_ends
 from planner.nc.language.expressions import Expressions
 from planner.nc.language.rows import AppendedRows
 from planner.nc.language.tree import (
@@ -44,6 +45,7 @@ from planner.nc.language.tree import (
     Return,
     SourcePlace,
     Statement,
+    Turning,
 )
 
 # Turns of loops between two looks at the limits and at the length of what is pending.
@@ -191,6 +193,8 @@ class _Function:
         self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", loop.place)
         if loop.kind == "repeat":
             self.blocks.put(f"{left}-=1", loop.place)
+        elif never_ends(loop, self.language):
+            self.blocks.put(f"if {condition}:run.goes_on()", loop.place)
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 
@@ -285,6 +289,10 @@ class _Function:
     def _modes(self, modes: Modes) -> None:
         self.blocks.put(f"run.modes({modes.action!r},{tuple(modes.place)!r})", modes.place)
 
+    def _turning(self, turning: Turning) -> None:
+        place = tuple(turning.place)
+        self.blocks.put(f"run.turning({turning.action!r},{turning.letters!r},{place!r})", turning.place)
+
 
 _WRITE: dict[type, Callable[..., None]] = {
     PlainRows: _Function._plain_rows,
@@ -299,4 +307,5 @@ _WRITE: dict[type, Callable[..., None]] = {
     Return: _Function._return,
     Message: _Function._message,
     Modes: _Function._modes,
+    Turning: _Function._turning,
 }

@@ -13,10 +13,15 @@ import re
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.machine import Machine
 from planner.nc.lexer import FAULT, Words
 from planner.nc.reading import AUTO, FANUC, LINUXCNC, Reading
 
 # Codes that call and return, save and restore modes.
+LATHE_NOTE = (
+    "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
+    "([dialect] lathe = false in the machine file if it is none)"
+)
 _CALLS = {ord("M"): (70, 71, 72, 73, 97, 98, 99), ord("G"): (65, 66, 67)}
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 _O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
@@ -66,6 +71,32 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
             found = FANUC
         found = found or LINUXCNC
     return found
+
+
+def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
+    """Whether a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of the machine decides.
+
+    Otherwise it has no Y and V, and U or W beside X and Z, a cycle G70 to G73 with P and Q, or a G76 with K and D.
+    """
+    if reading.strict or reading.dialect not in (AUTO, FANUC):
+        return False
+    if dialect == LINUXCNC and any(
+        _LINUXCNC.search(bare(row_text(words, row))) for row in may_compute(words).tolist()
+    ):
+        return False
+    if machine is not None and machine.dialect is not None and machine.dialect.lathe is not None:
+        return machine.dialect.lathe
+    letters = {chr(c) for c in np.unique(words.letter) if c}
+    if letters & set("YV"):
+        return False
+    if letters >= set("XZ") and letters & set("UW"):
+        return not letters & set(reading.ignore)
+    for codes, needed in (((70.0, 71.0, 72.0, 73.0), "PQ"), ((76.0,), "KD")):
+        cycles = np.flatnonzero((words.letter == ord("G")) & np.isin(words.value, codes))
+        for row in np.unique(np.searchsorted(words.first, cycles, side="right") - 1).tolist():
+            if np.isin([ord(c) for c in needed], words.letter[words.first[row] : words.first[row + 1]]).all():
+                return True
+    return False
 
 
 def _first_end(words: Words) -> int:

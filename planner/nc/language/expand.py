@@ -16,6 +16,8 @@ from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, Position
 from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.fanuc import text as fanuc_text
 from planner.nc.language.fanuc.calls import files as fanuc_files
+from planner.nc.language.fanuc.lathe import LatheParser
+from planner.nc.language.fanuc.lathe_words import LatheAsked
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
 from planner.nc.language.heidenhain.parser import HeidenhainParser
@@ -29,7 +31,7 @@ from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
-from planner.nc.reading import FANUC, HEIDENHAIN, LINUXCNC, SIEMENS
+from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS
 
 ENTRIES_MAX = 10_000  # files and folders that are looked at for a called file
 FILE_MAX = 100_000_000  # bytes of a called file
@@ -65,7 +67,10 @@ def expand(
     program = dataclasses.replace(
         interpreter.program(run.frames),
         expansion=Expansion(
-            dialect=dialect, calls=tuple(run.calls.items()), turns=run.turns, rows=run.executed
+            dialect=FANUC if dialect == LATHE else dialect,
+            calls=tuple(run.calls.items()),
+            turns=run.turns,
+            rows=run.executed,
         ),
     )
     return program, [*faults, *interpreter.faults()]
@@ -86,6 +91,7 @@ _FRONTS = {
         linuxcnc_text.LANGUAGE, LinuxcncAsked, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
     ),
     FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
+    LATHE: _Front(fanuc_text.LANGUAGE, LatheAsked, LatheParser, fanuc_files),
     HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, lambda name: frozenset()),
 }

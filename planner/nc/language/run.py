@@ -3,8 +3,8 @@
 Rows go to the interpreter in chunks. A parameter that holds the state of the control (a position, an offset, the tool) is asked of the
 interpreter after everything pending has been executed.
 
-A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows, `IDLE_MAX` rows without a
-move, or at `DEPTH_MAX` open calls, with a sentence that names the line.
+A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows (`BY_WORD_MAX` that are no
+plain straight moves), `IDLE_MAX` rows without a move, or at `DEPTH_MAX` open calls, with a sentence that names the line.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
@@ -23,12 +24,17 @@ from planner.nc.lexer import Words
 from planner.nc.program import Frame
 
 TURNS_MAX = 50_000_000  # turns of loops, jumps and calls: some ten seconds of computing
-IDLE_MAX = 100_000  # rows one after the other that neither move nor stop: a loop that only switches something never ends
+IDLE_MAX = 20_000  # rows one after the other that neither move nor stop: a loop that only switches something never ends
 ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
 DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
-ROWS_AT_ONCE = 100_000  # rows that are executed together
+BY_WORD_MAX = 500_000  # rows that are no plain straight moves: they take 0.1 ms each, a minute in all
+ROWS_AT_ONCE = 100_000  # rows that are executed together, at most
+IDLE_AT_ONCE = 2_000  # rows that are executed together at first, and as long as nothing moves
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
+
+if TYPE_CHECKING:
+    from planner.nc.language.fanuc.lathe_cycles import LatheCycles
 
 Load = Callable[[str], bool]
 
@@ -69,6 +75,8 @@ class ProgramRun:
         self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
+        self._lathe: LatheCycles | None = None
+        self._at_once = IDLE_AT_ONCE
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
@@ -110,15 +118,23 @@ class ProgramRun:
         if self.turns > TURNS_MAX:
             raise _Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
-        if pending > ROWS_AT_ONCE:
+        if pending > self._at_once:
             blocks = self.interpreter.store.blocks
             self.flush()
-            self.idle = 0 if self.interpreter.store.blocks > blocks else self.idle + pending
+            moved = self.interpreter.store.blocks > blocks
+            self.idle = 0 if moved else self.idle + pending
+            self._at_once = min(2 * self._at_once, ROWS_AT_ONCE) if moved else IDLE_AT_ONCE
             if self.idle > IDLE_MAX:
                 raise _Endless(f"{self.idle:,} lines executed without a move")
+            if self.interpreter.by_word > BY_WORD_MAX:
+                raise _Endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
         if self.executed + pending > ROWS_MAX:
             raise _Endless(f"{ROWS_MAX:,} lines executed")
         return 0
+
+    def goes_on(self) -> None:
+        """A loop that cannot end goes on. Raises ValueError."""
+        raise ValueError("this loop never ends: nothing in it changes its condition, and nothing leaves it")
 
     def call(
         self,
@@ -142,7 +158,7 @@ class ProgramRun:
         for _ in range(count):
             self.turns += 1
             self.calls[str(name)] += 1
-            if not self.turns & 127 or len(self.rows.pending) > ROWS_AT_ONCE:
+            if not self.turns & 127 or len(self.rows.pending) > self._at_once:
                 self.tick(0)
             if arguments is None:
                 value = function(self, {})
@@ -221,6 +237,14 @@ class ProgramRun:
         elif not self._restored_at_return[-1]:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
 
+    def turning(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
+        """Do a part of a lathe's cycle."""
+        if self._lathe is None:
+            from planner.nc.language.fanuc.lathe_cycles import LatheCycles  # 3 ms, for lathes
+
+            self._lathe = LatheCycles(self)
+        self._lathe.act(action, letters, place)
+
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""
         if whole(number) not in blocks:
@@ -290,7 +314,7 @@ class _Endless(ValueError):
     def __init__(self, what: str):
         super().__init__(
             f"stopped after {what}: does this loop end? if it does, split the program "
-            "(limits: TURNS_MAX, ROWS_MAX in planner.nc.language.run)"
+            "(limits: TURNS_MAX, ROWS_MAX, BY_WORD_MAX in planner.nc.language.run)"
         )
 
 

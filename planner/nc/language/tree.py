@@ -172,8 +172,16 @@ class Modes(NamedTuple):
     action: str
 
 
+class Turning(NamedTuple):
+    """A part of a lathe's cycle (`lathe_cycles.LatheCycles.act`); the letters whose values stand in shared names."""
+
+    place: SourcePlace
+    action: str
+    letters: str = ""
+
+
 Statement = (
-    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes
+    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning
 )  # fmt: skip
 
 

@@ -58,8 +58,22 @@ def test_a_program_that_computes_nothing_is_read_as_before() -> None:
 # --- where programs fail --------------------------------------------------------------------------------------------------------
 
 FAULTS = [
-    ("#1=0\no1 while [1]\n#1=[#1+1]\no1 endwhile", 4, "stopped after .* turns of loops"),
-    ("o1 while [1]\nG1 X1\no1 endwhile", 3, "stopped after 1,000 lines executed"),
+    ("#1=0\no1 while [#1 GE 0]\n#1=[#1+1]\no1 endwhile", 4, "stopped after .* turns of loops"),
+    ("o1 while [#1 GE 0]\nG1 X1\n#1=[#1+1]\no1 endwhile", 3, "stopped after 1,000 lines executed"),
+    ("#1=0\no1 while [#1 GE 0]\nM8\n#1=[#1+1]\no1 endwhile", 4, "lines executed without a move"),
+    (
+        "#1=0\no1 while [#1 GE 0]\nG4 P1\n#1=[#1+1]\no1 endwhile",
+        4,
+        "50 lines that are no plain straight moves",
+    ),
+    ("o1 while [1]\nG1 X1\no1 endwhile", 3, "this loop never ends"),
+    ("o1 do\nG1 X1\n#2=[#2+1]\no1 while [#1 LT 5]", 3, "this loop never ends"),
+    (
+        "o1 while [EXISTS[#<a>] EQ 0]\no2 repeat [2]\nG1 X1\no2 endrepeat\no1 endwhile",
+        3,
+        "this loop never ends",
+    ),
+    ("WHILE [#1 LT 5] DO 1\nM83\nM201 X500\nEND 1", 3, "this loop never ends"),
     ("o1 sub\no1 call\no1 endsub\no1 call", 4, "100 calls are open; .*called from line 4"),
     ("o1 while [1]\nG1 X1", 3, "this while has no end; write o1 endwhile"),
     ("o1 if [1]\no2 while [1]\no1 endif", 5, "o1 endif has no o1 if before it: o2 while on line 4 is open"),
@@ -89,11 +103,32 @@ FAULTS = [
 @pytest.mark.parametrize(("text", "line", "message"), FAULTS, ids=lambda value: str(value)[:25])
 def test_faults_name_the_line(text: str, line: int, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "TURNS_MAX", 100_000)
-    monkeypatch.setattr(run, "ROWS_MAX", 1_000)
+    monkeypatch.setattr(run, "ROWS_MAX", 1_000 if "M8" not in text else 10_000)
+    monkeypatch.setattr(run, "BY_WORD_MAX", 50 if "G4" in text else 1_000_000)
+    monkeypatch.setattr(run, "IDLE_AT_ONCE", 100)
+    monkeypatch.setattr(run, "IDLE_MAX", 300)
     with pytest.raises(InputError, match=message) as found:
         parse_program(f"G21 F100\nG1 X0\n{text}\nM30\n")
     assert found.value.line == line
     assert found.value.column is not None
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "#1=[#1+1]", "##3=9", "o2 if [#2 EQ 3]\no1 break\no2 endif", "o2 repeat [2]\no3 if [1]\n#1=9\no3 endif\no2 endrepeat",
+        "o2 if [#2 EQ 3]\nM2\no2 endif", "o9 call",
+    ],
+)  # fmt: skip
+def test_a_loop_that_may_end_is_run(inside: str) -> None:
+    program = (
+        parse_program(
+            f"o9 sub\n#31=1\no9 endsub\n#3=1\no1 while [#1 LT 5]\n#2=[#2+1]\nG0 X#2\n{inside}\no1 endwhile\nM2"
+        )
+        if "call" not in inside
+        else parse_program("o9 sub\n#40=9\no9 endsub\no1 while [#40 LT 5]\nG0 X1\no9 call\no1 endwhile\nM2")
+    )
+    assert len(program)
 
 
 def test_what_was_done_before_a_fault_is_kept() -> None:

@@ -1,0 +1,87 @@
+"""Loops that cannot end, told from their text: nothing that they do changes their condition, and nothing leaves them.
+
+A loop that may end, as far as this tells, is bounded while it runs (run.py). Where this says that it cannot, it cannot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from planner.nc.language.tree import (
+    Break,
+    Call,
+    Exists,
+    Expression,
+    Goto,
+    If,
+    Language,
+    Line,
+    Loop,
+    Named,
+    Number,
+    Numbered,
+    Operation,
+    Parameter,
+    PlainRows,
+    Return,
+    Statement,
+)
+
+_LEAVES = (Break, Call, Goto, Return)  # a called subprogram may change anything
+_ENDS = (2.0, 30.0)  # M codes
+
+
+def never_ends(loop: Loop, language: Language) -> bool:
+    """Whether the loop goes on for ever once its condition holds after a turn."""
+    if loop.kind == "repeat":
+        return False
+    read = list(_parameters(loop.condition))
+    if any(not _is_kept(parameter, language) for parameter in read):
+        return False
+    return all(_stays(statement, set(read)) for statement in _all(loop.body))
+
+
+def _parameters(expression: Expression) -> Iterator[Parameter]:
+    """Parameters that an expression reads."""
+    if isinstance(expression, Operation):
+        for operand in expression.operands:
+            yield from _parameters(operand)
+    elif isinstance(expression, Exists):
+        yield expression.parameter
+    elif not isinstance(expression, Number):
+        yield expression
+
+
+def _is_kept(parameter: Parameter, language: Language) -> bool:
+    """Whether only assignments that name the parameter change it."""
+    if isinstance(parameter, Named):
+        return not (
+            parameter.shared
+            and (parameter.name in language.asked_names or parameter.name.startswith("_value"))
+        )
+    return isinstance(parameter.index, Number) and parameter.index.value not in language.asked
+
+
+def _all(body: Sequence[Statement]) -> Iterator[Statement]:
+    """The statements of a body and of those in it."""
+    for statement in body:
+        yield statement
+        if isinstance(statement, Loop):
+            yield from _all(statement.body)
+        elif isinstance(statement, If):
+            for inner in (*(inner for _, inner in statement.branches), statement.otherwise):
+                yield from _all(inner)
+
+
+def _stays(statement: Statement, read: set[Parameter]) -> bool:
+    """Whether a statement leaves the parameters as they are, and the loop going on."""
+    if isinstance(statement, _LEAVES) or (isinstance(statement, PlainRows) and statement.may_end):
+        return False
+    if not isinstance(statement, Line):
+        return True
+    for word in statement.words:
+        if chr(word.letter) == "M" and not (isinstance(word.value, Number) and word.value.value not in _ENDS):
+            return False
+    targets = [target for target, _ in statement.assignments]
+    computed = any(isinstance(t, Numbered) and not isinstance(t.index, Number) for t in targets)
+    return not computed and not read & set(targets)

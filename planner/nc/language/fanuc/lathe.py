@@ -1,0 +1,279 @@
+"""Cycles of Fanuc's and Haas' lathes as statements (their words: lathe_words.py).
+
+    G70             the profile P to Q, then back to where the tool was
+    G71 G72 G73     roughing (nc/turning.py) of the profile P to Q; then the blocks of the profile are passed over
+    G76             thread of many passes (nc/lathe_thread.py)
+
+Both formats of the cycles are read: two blocks, G71 U R and G71 P Q U W (Fanuc; G72 W R, G73 U W R, G76 P Q R), and one, G71 P Q U W I
+K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least increments (0.001 mm, 0.0001 inch) where they have no point.
+
+A profile is a procedure of its own, which a cycle runs to read it (lathe_cycles.py) and G70 runs to cut it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.nc.integers import LENGTHS
+from planner.nc.language.fanuc.calls import code_of
+from planner.nc.language.fanuc.lathe_cycles import least_increment, name_of
+from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE, LatheWords
+from planner.nc.language.source import Source, SourceLine
+from planner.nc.language.tree import (
+    Call,
+    Expression,
+    Goto,
+    Label,
+    Line,
+    Message,
+    Named,
+    Number,
+    Numbered,
+    Operation,
+    PlainRows,
+    Procedure,
+    ProgramFault,
+    SourcePlace,
+    Statement,
+    Turning,
+    Word,
+)
+
+_CALL = re.compile(r"G7[0-3](?![\d.]).*?P(\d+).*?Q(\d+)|G7[0-3](?![\d.]).*?Q(\d+).*?P(\d+)")
+_NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
+_AFTER = 1_000_000_000  # label behind the last block of a profile: its number and this
+
+
+class LatheParser(LatheWords):
+    """Statements of a lathe's program."""
+
+    def __init__(self, source: Source):
+        super().__init__(source)
+        self.pairs: set[tuple[int, int]] = set()  # P and Q of the cycles
+        self.called: set[tuple[int, int]] = set()  # so far
+        self.profiles: dict[tuple[int, int], tuple[list[Statement], int, int]] = {}
+        self.cycles: list[tuple[tuple[int, int], SourcePlace]] = []
+        self.waiting: dict[str, dict[str, Expression]] = {}  # words of the first blocks of cycles
+
+    def parse(self) -> list[Procedure]:
+        """All procedures of the file, and one for the profile of each cycle."""
+        words = self.source.words
+        rows = np.flatnonzero(words.letter[words.first[:-1]] != ord("%"))
+        self.source.lines = rows.tolist()
+        texts = [self.source.line(row).text.upper().replace(" ", "") for row in rows.tolist()]
+        numbers = {int(found.group(1)) for text in texts if (found := _NUMBER.match(text))}
+        found_pairs = (
+            (int(p or later), int(q or first)) for text in texts for p, q, first, later in _CALL.findall(text)
+        )
+        self.pairs = {pair for pair in found_pairs if numbers.issuperset(pair)}
+        procedures = super().parse()
+        for pair, place in self.cycles:
+            body, first, last = self.profiles.get(pair, (procedures[0].body, 0, -1))
+            if last < 0:
+                self.faults.append(ProgramFault(place, _no_profile(pair)))
+            elif all(known.name != _profile_name(pair) for known in procedures):
+                procedures.append(Procedure(_profile_name(pair), body[first].place, body[first:last]))
+        if not self.source.file:
+            start = procedures[0].place
+            codes = tuple(Word(ord("G"), start.at, Number(code)) for code in (7.0, 18.0, 95.0))
+            after = int(
+                bool(procedures[0].body) and isinstance(procedures[0].body[0], PlainRows)
+            )  # the first %
+            procedures[0].body.insert(after, Line(start, codes))
+        return procedures
+
+    # --- profiles -----------------------------------------------------------------------------------------------------------
+
+    def _line(self, line: SourceLine) -> None:
+        found = _NUMBER.match(line.text.replace(" ", ""))
+        number = int(found.group(1)) if found else -1
+        begun = [pair for pair in self.pairs if pair[0] == number]
+        for pair in begun:
+            if pair in self.called:  # its cycle has made it: what follows is behind it
+                self.body.append(Goto(line.place, Number(float(_AFTER + pair[1]))))
+        for pair in begun:
+            self.profiles.setdefault(pair, (self.body, len(self.body), -1))
+        super()._line(line)
+        ended = [pair for pair in self.pairs if pair[1] == number]
+        for pair in ended:
+            body, first, last = self.profiles.get(pair, (None, 0, 0))
+            if body is self.body and last < 0:
+                self.profiles[pair] = (self.body, first, len(self.body))
+        if ended:
+            self.body.append(Label(line.place, _AFTER + number))
+
+    # --- cycles -------------------------------------------------------------------------------------------------------------
+
+    def _cycle(self, cycle: str, words: tuple[Word, ...], line: SourceLine) -> None:
+        own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
+        given = {chr(word.letter): word for word in words if chr(word.letter) in own}
+        if self._is_first(cycle, given):
+            lengths = "QR" if cycle == "G76" else "UWR"
+            self.waiting[cycle] = {
+                letter: self._length(word, cycle, line) if letter in lengths else word.value
+                for letter, word in given.items()
+            }
+            return
+        rest = tuple(word for word in words if chr(word.letter) not in own and code_of(word) != cycle)
+        if rest:
+            self._words(rest, (), line)
+        if cycle == "G76":
+            self._thread(given, line)
+            return
+        pair = tuple(
+            word.value.value if isinstance(word.value, Number) else -1.0 for word in (given["P"], given["Q"])
+        )
+        profile = (int(pair[0]), int(pair[1]))
+        if profile not in self.pairs:
+            raise ProgramFault(line.place, _no_profile(profile))
+        self.cycles.append((profile, line.place))
+        self.called.add(profile)
+        name = _profile_name(profile)
+        call = Call(line.place, name, None, f"{cycle} P{profile[0]} Q{profile[1]}")
+        if cycle == "G70":
+            self.body += [Turning(line.place, "start"), call, Turning(line.place, "back")]
+            return
+        values = _ROUGHING[cycle](
+            self, {letter: self._length(word, cycle, line) for letter, word in given.items()}, line
+        )
+        self.body += [self._assigned(values, line), Turning(line.place, "profile"), call]
+        self.body.append(Turning(line.place, cycle, "".join(values)))
+
+    @staticmethod
+    def _is_first(cycle: str, given: dict[str, Word]) -> bool:
+        """Whether the block is the first of two."""
+        if cycle == "G76":
+            return not given.keys() & set("XZUWK")
+        return "P" not in given or "Q" not in given
+
+    @staticmethod
+    def _assigned(values: dict[str, Expression], line: SourceLine) -> Line:
+        return Line(
+            line.place, (), tuple((Named(name_of(letter), True), value) for letter, value in values.items())
+        )
+
+    def _removal(self, given: dict[str, Expression], line: SourceLine, depth: str) -> dict[str, Expression]:
+        """G71 (depth in U of its first block) and G72 (in W)."""
+        before = self.waiting.get("G71" if depth == "U" else "G72", {})
+        values = {letter: given[letter] for letter in "UWIK" if letter in given}
+        found = given.get("D", before.get(depth))
+        if found is None:
+            raise ProgramFault(
+                line.place,
+                f"the depth of a pass is not given: D, or {depth} in a block before this one ({depth}2. R0.5)",
+            )
+        values["D"] = found
+        if "R" in before:
+            values["R"] = before["R"]
+        return values
+
+    def _pattern(self, given: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
+        """G73: U W R of its first block are I K D of the form in one."""
+        before = self.waiting.get("G73", {})
+        values = {letter: given[letter] for letter in "UW" if letter in given}
+        for letter, first in (("I", "U"), ("K", "W"), ("D", "R")):
+            found = given.get(letter, before.get(first))
+            if found is not None:
+                values[letter] = found
+        if "D" not in values:
+            raise ProgramFault(
+                line.place, "G73 needs the number of its passes: D, or R in a block before this one"
+            )
+        return values
+
+    def _thread(self, given: dict[str, Word], line: SourceLine) -> None:
+        values = {letter: self._length(word, "G76", line) for letter, word in given.items()}
+        if self.feed is None:
+            raise ProgramFault(line.place, "G76 needs the lead of the thread as an F word")
+        two = "K" not in given
+        if two:
+            first = self.waiting.get("G76")
+            if first is None or "P" not in given or "Q" not in given:
+                raise ProgramFault(
+                    line.place, "G76 needs K and D, or P and Q with a block G76 P Q R before it"
+                )
+            values = {**values, "K": values["P"], "D": values["Q"], **_finishing(first, line)}
+            values["I"] = self._length(given["R"], "G76", line) if "R" in given else Number(0.0)
+        else:
+            if "D" not in given:
+                raise ProgramFault(line.place, "G76 needs D, the depth of the first pass")
+            values.pop("Q", None)  # the angle of the spindle where the thread begins
+            values.pop("R", None)
+            self._message_once(line)
+        for letter, axis, here in (("U", "X", X_HERE), ("W", "Z", Z_HERE)):
+            if letter in values:
+                values[axis] = Operation("+", (here, values.pop(letter)))
+        values = {letter: value for letter, value in values.items() if letter in "XZKDQRLAIE"}
+        values["F"] = self.feed
+        self.body.append(self._assigned(values, line))
+        self.body.append(Turning(line.place, "G76", "".join(values)))
+        self.threading = False
+
+    def _message_once(self, line: SourceLine) -> None:
+        text = "G76 in one block: the control's settings for chamfer, least pass and finishing allowance are taken as 0"
+        self.body.append(Message(line.place, (text,)))
+
+    def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
+        """A word of a cycle in the program's unit: in least increments where it is a number without a point."""
+        letter = chr(word.letter)
+        in_increments = "PQRDIK" if cycle == "G76" else "D"
+        if (
+            letter not in in_increments
+            or not isinstance(word.value, Number)
+            or (cycle == "G73" and letter == "D")
+        ):
+            return word.value
+        text = self.source.words.data[word.at - self.source.begin :]
+        found = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
+        if (found and found.group(1)) or (line.scale != 1.0 and word.letter in LENGTHS):
+            return word.value
+        return Operation("*", (word.value, _INCREMENT))
+
+
+# The least increment in the program's unit: #4006 is 20 under G20 and 21 under G21.
+_INCREMENT = Operation(
+    "+",
+    (
+        Number(least_increment(25.4)),
+        Operation(
+            "*",
+            (
+                Operation("-", (Numbered(Number(4006.0)), Number(20.0))),
+                Number(least_increment(1.0) - least_increment(25.4)),
+            ),
+        ),
+    ),
+)
+_ROUGHING: dict[str, Callable[[LatheParser, dict[str, Expression], SourceLine], dict[str, Expression]]] = {
+    "G71": lambda parser, given, line: parser._removal(given, line, "U"),
+    "G72": lambda parser, given, line: parser._removal(given, line, "W"),
+    "G73": LatheParser._pattern,
+}
+
+
+def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
+    """P, Q and R of the first block of G76: mmrraa is how often the full depth is cut, ten chamfers in leads, and the tool's angle."""
+    digits = first.get("P", Number(10_000.0))
+    if not isinstance(digits, Number) or digits.value != int(digits.value) or not 0 <= digits.value < 1e6:
+        raise ProgramFault(
+            line.place, "P of the first block of G76 has six digits: how often, chamfer, angle (P010060)"
+        )
+    often, rest = divmod(int(digits.value), 10_000)
+    chamfer, angle = divmod(rest, 100)
+    values: dict[str, Expression] = {
+        "L": Number(float(max(often, 1))),
+        "E": Number(chamfer / 10.0),
+        "A": Number(float(angle)),
+    }
+    return {**values, "Q": first.get("Q", Number(0.0)), "R": first.get("R", Number(0.0))}
+
+
+def _no_profile(pair: tuple[int, int]) -> str:
+    return f"there is no profile from N{pair[0]} to N{pair[1]} in this program; P and Q are the numbers of its first and last block"
+
+
+def _profile_name(pair: tuple[int, int]) -> str:
+    return f"profile N{pair[0]} to N{pair[1]}"

@@ -1,0 +1,226 @@
+"""Cycles of lathes while a program runs: the profile is read by executing its blocks aside, and the passes become rows of words.
+
+Rows are those of a lathe under LinuxCNC: G7 (diameters), G18, G33 for threads; so what a cycle was expanded to can be read by others.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.units import MM_PER_INCH
+from planner.nc.lathe_thread import LatheThread, ThreadFault, thread_passes
+from planner.nc.lexer import Words as LexedWords
+from planner.nc.program import Kind, Program
+from planner.nc.state import State
+from planner.nc.store import Store
+from planner.nc.turning import SAME, Contour, ContourFault, Leg, Roughing, Step, pattern, stock_removal
+
+if TYPE_CHECKING:
+    from planner.nc.language.run import ProgramRun
+
+RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
+_WRONG = {
+    (Kind.DWELL, Kind.STOP): "a dwell or a stop",
+    (Kind.SPLINE,): "a spline",
+}
+
+Words = list[tuple[str, float]]
+Given = Mapping[str, float]
+
+
+class LatheCycles:
+    """What the cycles of one run need: where the tool stood, and what is set aside while a profile is read."""
+
+    def __init__(self, run: ProgramRun):
+        self.run = run
+        self._start = np.zeros(3)
+        self._aside: tuple[State, Store, Callable[[LexedWords], None]] | None = None
+        self._line = 0  # of the cycle
+
+    def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
+        """Do a part of a cycle; its values by letter stand in the run's shared names. Raises ValueError.
+
+        action : "start" keeps where the tool is, "profile" reads the blocks that follow aside, "back" leads to where the tool was, and
+                 the name of a cycle makes its passes
+        """
+        self.run.flush()
+        self._line = place[1]
+        given = {letter: float(self.run.shared[name_of(letter)]) for letter in letters}
+        if action == "start":
+            self._start = self.run.interpreter.state.programmed().copy()
+            return
+        if action == "profile":
+            self._begin()
+            return
+        rows = [self._fast(self._point(self._start))] if action == "back" else _CYCLES[action](self, given)
+        for words in rows:
+            row = [(ord(letter), place[2], value) for letter, value in words]
+            self.run.rows.pending.append(self.run.rows.add_row(place[1], row))
+        self.run.flush()
+
+    # --- the profile --------------------------------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        interpreter = self.run.interpreter
+        state = interpreter.state
+        if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
+            raise ValueError(
+                "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
+            )
+        self._start = state.programmed().copy()
+        self._aside = copy.deepcopy(state), interpreter.store, self.run.tee
+        interpreter.store, self.run.tee = Store(), lambda words: None
+        state.feed_mode, state.feed = (
+            "per minute",
+            1.0,
+        )  # any feed does: moves whose feed depends on the diameter are divided
+
+    def _contour(self) -> Contour:
+        """The blocks that were executed aside as a profile; the state is again what it was before them. Raises ValueError."""
+        interpreter, kept = self.run.interpreter, self._aside
+        assert kept is not None
+        program, offset = interpreter.store.finish("", ()), interpreter.state.offset.copy()
+        interpreter.state, interpreter.store, self.run.tee = kept
+        self._aside = None
+        if (offset != interpreter.state.offset).any():
+            raise ValueError("the profile changes an offset; write it before the cycle")
+        return _contour_of(program, offset, self._point(self._start))
+
+    @staticmethod
+    def _point(position: np.ndarray) -> complex:
+        return complex(position[2], position[0])
+
+    # --- cycles -------------------------------------------------------------------------------------------------------------
+
+    def _removal(self, given: Given, *, facing: bool) -> Iterable[Words]:
+        contour, unit = self._contour(), self._unit
+        if "R" not in given:
+            self.run.interpreter.note(
+                f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", self._line
+            )
+        roughing = Roughing(
+            depth=abs(given["D"]) * unit,
+            retract=abs(given["R"]) * unit if "R" in given else RETRACT,
+            allowance=self._allowance(given),
+            more=complex(given.get("K", 0.0), given.get("I", 0.0)) * unit,
+        )
+        return self._rows(stock_removal(contour, roughing, facing=facing))
+
+    def _pattern(self, given: Given) -> Iterable[Words]:
+        contour = self._contour()
+        shift = complex(given.get("K", 0.0), given.get("I", 0.0)) * self._unit
+        return self._rows(pattern(contour, round(given["D"]), shift, self._allowance(given)))
+
+    def _allowance(self, given: Given) -> complex:
+        part = 0.5 if self.run.interpreter.state.diameters else 1.0
+        return complex(given.get("W", 0.0), part * given.get("U", 0.0)) * self._unit
+
+    def _thread(self, given: Given) -> Iterable[Words]:
+        state, unit = self.run.interpreter.state, self._unit
+        start = self._point(state.programmed())
+        part = 0.5 if state.diameters else 1.0
+        thread = LatheThread(
+            start=start,
+            end=complex(given.get("Z", start.real / unit), part * given.get("X", start.imag / (part * unit)))
+            * unit,
+            height=given["K"] * unit,
+            first=given["D"] * unit,
+            lead=given["F"] * unit,
+            least=given.get("Q", 0.0) * unit,
+            finish=given.get("R", 0.0) * unit,
+            springs=round(given.get("L", 1.0)),
+            angle=given.get("A", 0.0),
+            taper=given.get("I", 0.0) * unit,
+            chamfer=given.get("E", 0.0) * given["F"] * unit,
+        )
+        at, rows = start, []
+        try:
+            for one in thread_passes(thread):
+                if one.pitch:
+                    rows.append([("G", 33.0), *self._to(one.end), ("K", one.pitch / unit)])
+                elif abs(one.end - at) > 0.0:
+                    rows.append(self._fast(one.end))
+                at = one.end
+        except ThreadFault as fault:
+            raise ValueError(f"G76: {fault}") from fault
+        return rows
+
+    # --- rows ---------------------------------------------------------------------------------------------------------------
+
+    @property
+    def _unit(self) -> float:
+        return self.run.interpreter.state.unit
+
+    def _rows(self, steps: Iterable[Step]) -> list[Words]:
+        rows, at = [], self._point(self._start)
+        try:
+            for step in steps:
+                leg = step.leg
+                if step.fast and abs(leg.end - at) < SAME:
+                    continue
+                if step.fast:
+                    rows.append(self._fast(leg.end))
+                elif leg.turning:
+                    centre = (leg.centre - at) / self._unit
+                    code = 3.0 if leg.turning > 0 else 2.0
+                    rows.append([("G", code), *self._to(leg.end), ("I", centre.imag), ("K", centre.real)])
+                else:
+                    rows.append([("G", 1.0), *self._to(leg.end)])
+                at = leg.end
+        except ContourFault as fault:
+            raise ValueError(str(fault)) from fault
+        return rows
+
+    def _fast(self, point: complex) -> Words:
+        return [("G", 0.0), *self._to(point)]
+
+    def _to(self, point: complex) -> Words:
+        part = 2.0 if self.run.interpreter.state.diameters else 1.0
+        return [("X", part * point.imag / self._unit), ("Z", point.real / self._unit)]
+
+
+_CYCLES: dict[str, Callable[[LatheCycles, Given], Iterable[Words]]] = {
+    "G71": lambda cycles, given: cycles._removal(given, facing=False),
+    "G72": lambda cycles, given: cycles._removal(given, facing=True),
+    "G73": LatheCycles._pattern,
+    "G76": LatheCycles._thread,
+}
+
+
+def name_of(letter: str) -> str:
+    """The shared name that holds a cycle's word while it is run."""
+    return f"cycle {letter.lower()}"
+
+
+def least_increment(unit: float) -> float:
+    """Lengths without a point in cycles, in the program's unit: 0.001 mm or 0.0001 inch."""
+    return 1e-4 if unit == MM_PER_INCH else 1e-3
+
+
+def _contour_of(program: Program, offset: np.ndarray, start: complex) -> Contour:
+    """Blocks as a profile in programmed coordinates. Raises ValueError for what is no line or arc in the plane."""
+    legs, arcs = [], iter(zip(program.arc_center, program.arc_normal, program.arc_sweep, strict=True))
+    for kind, end in zip(program.kind.tolist(), program.end, strict=True):
+        for kinds, what in _WRONG.items():
+            if kind in kinds:
+                raise ValueError(f"{what} in the profile of a cycle; write it after the cycle")
+        point = complex(end[2] - offset[2], end[0] - offset[0])
+        if kind == Kind.ARC:
+            centre, normal, sweep = next(arcs)
+            if normal != 1 or abs(sweep) > 2.0 * math.pi:
+                raise ValueError("an arc of the profile lies in another plane than z x; write G18 before it")
+            legs.append(
+                Leg(point, 1 if sweep > 0 else -1, complex(centre[2] - offset[2], centre[0] - offset[0]))
+            )
+        else:
+            legs.append(Leg(point))
+    if not legs:
+        raise ValueError("the profile of the cycle has no moves")
+    if legs[0].turning:
+        raise ValueError("the first move of a profile is straight: G0 or G1 to its first point")
+    return Contour(start, int(program.kind[0]) == Kind.RAPID, tuple(legs))

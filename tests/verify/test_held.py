@@ -1,0 +1,83 @@
+"""Threads: motions in step with the spindle between run-in and run-out pass; others are named, with how far they are off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from judging import M, fault, judge
+from motions import along, rest_to_rest
+
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.run_in import run_in
+from planner.nc.reader import parse_program
+from planner.verify.held import room_of
+
+LENGTH, FEED = 30.0, 25.0
+
+
+def toolpath():
+    """One thread along z."""
+    return toolpath_from_program(parse_program(f"G21 G90 M3 S{60 * FEED}\nG33 Z-{LENGTH} K1\nM2"), M)
+
+
+def down(speed: float, wave: float = 0.0):
+    """A motion down the thread that reaches `speed`, times 1 - `wave` in its middle."""
+    law = rest_to_rest(LENGTH, speed, 2000.0, 2e5)
+
+    def curve(s):
+        zero = np.zeros_like(s)
+        return tuple(np.stack([zero, zero, -part], axis=1) for part in (s, zero + 1, zero, zero))
+
+    if not wave:
+        return along(LENGTH, curve, law)
+
+    def bent(s):
+        """The speed is off by `wave` at most, in a wave from 10 to 20 mm."""
+        k, inside = 2 * np.pi / 10.0, wave * ((s > 10.0) & (s < 20.0))
+        u, zero = k * (s - 10.0), np.zeros_like(s)
+        parts = (
+            s - inside * (1 - np.cos(u)) / k,
+            1 - inside * np.sin(u),
+            -inside * k * np.cos(u),
+            inside * k**2 * np.sin(u),
+        )
+        return tuple(np.stack([zero, zero, -part], axis=1) for part in parts)
+
+    return along(LENGTH, bent, law)
+
+
+def threads(verdict):
+    return [text for text in verdict.faults if text.startswith("thread")]
+
+
+def test_a_thread_at_its_feed_passes() -> None:
+    assert not threads(judge(down(FEED), toolpath()))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 0.999])
+def test_a_thread_below_its_feed_falls_out_of_step(share: float) -> None:
+    """At the share q of the feed the tool is (1/q - 1) l behind at the end of the stretch l, half of it about the mean."""
+    verdict = judge(down(share * FEED), toolpath())
+    stretch = LENGTH - 2 * 1.02 * run_in(toolpath(), M)[0]
+    off = 0.5 * (1 / share - 1) * stretch
+    if off < 0.05:
+        assert not threads(verdict)
+        return
+    said = fault(verdict, "thread")
+    assert float(said.split()[1]) == pytest.approx(off, rel=0.01)
+    assert said.endswith("line 2")
+
+
+def test_a_thread_whose_speed_wavers_falls_out_of_step() -> None:
+    """By wave / k with the wave number k."""
+    said = fault(judge(down(FEED, 0.1), toolpath()), "thread")
+    assert float(said.split()[1]) == pytest.approx(0.1 * 10 / (2 * np.pi), rel=0.01)
+    assert not threads(judge(down(FEED, 0.01), toolpath()))
+
+
+def test_the_verifier_finds_the_same_run_in_as_the_planner() -> None:
+    for feed in (1.0, 10.0, 40.0):
+        text = f"G21 G90 M3 S{60 * feed}\nG33 X-5 Z-20 K1\nG33 Z-60 K1\nM2"
+        path = toolpath_from_program(parse_program(text), M)
+        held = np.flatnonzero(path.held)
+        np.testing.assert_allclose(room_of(path, M, held), run_in(path, M)[held], rtol=1e-12)

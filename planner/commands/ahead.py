@@ -14,8 +14,10 @@ from planner.base.names import OPTIMAL
 from planner.commands.first_run import Helper
 
 MACHINE = "mill"
-# Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at.
-PROGRAM = """G21 G90 G17 G64 P0.02
+# Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at; and one so short that other corners
+# might be faster, which are planned beside it.
+PROGRAMS = (
+    """G21 G90 G17 G64 P0.02
 G1 X20 F3000
 X40 Y10
 G2 X60 Y10 I10 J0
@@ -30,11 +32,13 @@ X0 Y20
 G2 X10 Y20 Z-3 I5 J0
 G1 X30
 M2
-"""
+""",
+    "G21 G90 G64 P0.05 F2000\nG1 X10\nX12 Y5\nG3 X6 Y11 I-5 J1\nM2\n",
+)
 
 
 def compile_ahead() -> list[str]:
-    """Plan `PROGRAM`; returns the files of the kernels that this took, sorted. Empty where kernels are numba's own."""
+    """Plan `PROGRAMS`; returns the files of the kernels that this took, sorted. Empty where kernels are numba's own."""
     from planner.machine import load_machine
     from planner.methods.registry import plan
     from planner.nc.reader import parse_program
@@ -45,7 +49,8 @@ def compile_ahead() -> list[str]:
     with Helper(MACHINE, OPTIMAL) as helper:
         kernels.at_compilation(lambda kept: helper.start() if kept else None)
         try:
-            plan(parse_program(PROGRAM, machine), machine)
+            for program in PROGRAMS:
+                plan(parse_program(program, machine), machine)
         finally:
             kernels.at_compilation(None)
     return kernels.files_used()

@@ -1,11 +1,20 @@
 """Optimisation-based feedrate planning for CNC machines.
 
+>>> import planner
+>>> p = planner.plan("planner/examples/bracket.ngc", "mill", method="kinematic")
+>>> p
+<Plan of bracket.ngc on mill by kinematic: 15.8279 s, passed>
+
     plan                     plan, sample and verify a program: one call
-    Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost
+    Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost; it shows itself
+                             in notebooks, plots, saves and reports itself (docs/python.md)
+    methods                  the methods: a list of names that says what each is
+    compare                  several methods on one program, judged by the same verifier
+    verify                   any motion, from arrays, judged against a program and a machine
+    read_program, path       a program from a file, a text, or points
+    Program                  its blocks
     Machine, load_machine    limits, interpolation period and tolerance of a machine, from a TOML file
     PathLimit, JointLimit    limits of your own; with corner shapes (PolynomialCorner) and methods (Method): docs/extending.md
-    compare                  several methods on one program, judged by the same verifier
-    Program, read_program    the blocks of an NC program
     Reading                  how a program is read: what is refused, left out and assumed
     Toolpath                 the programmed path with its joints and tolerances
     Trajectory               the setpoints, one row per interpolation period
@@ -27,10 +36,13 @@ if TYPE_CHECKING:
     from planner.constraints.own import JointLimit, PathLimit
     from planner.corners.own import PolynomialCorner
     from planner.geometry.toolpath import Toolpath
+    from planner.interactive.given_motion import verify
+    from planner.interactive.points import path
     from planner.job.method import Method
     from planner.job.plan import Plan
     from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
+    from planner.methods import MethodNames
     from planner.methods.registry import plan
     from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
@@ -40,7 +52,10 @@ if TYPE_CHECKING:
     from planner.verify import Verdict
 
     __version__: str
+    methods: MethodNames
 
+# Packages that are public by themselves: two are called like functions (base/called.py), one lists its methods.
+_PACKAGES = ("methods", "path", "verify")
 _HOME = {
     "plan": "planner.methods.registry",
     "Plan": "planner.job.plan",
@@ -77,16 +92,22 @@ __all__ = [
     "Trace",
     "Trajectory",
     "Verdict",
+    "__version__",
     "compare",
     "load_machine",
+    "methods",
+    "path",
     "plan",
     "read_program",
+    "verify",
 ]
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return import_module("importlib.metadata").version("feedrate-planner")
+    if name in _PACKAGES:
+        return import_module(f"planner.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'planner' has no attribute '{name}'")
     return getattr(import_module(_HOME[name]), name)

@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
@@ -40,6 +40,14 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in type(self).model_fields:
+            raise AttributeError(
+                f"{type(self).__name__}.{name} cannot be set: records do not change; make another one with "
+                f"model_copy(update={{'{name}': {value!r}}})"
+            )
+        super().__setattr__(name, value)
 
 
 class Axis(_Record):
@@ -97,7 +105,7 @@ class DialectData(_Record):
 
 
 class Machine(_Record):
-    """A machine. The template explains every key.
+    """A machine. The template explains every key. Raises InputError for all faults at once.
 
     name                : of the machine
     axes                : limits by axis letter, at least x and y
@@ -127,6 +135,12 @@ class Machine(_Record):
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}
     _own: tuple[OwnLimit, ...] = PrivateAttr(default=())
+
+    def __init__(self, **data: Any):
+        try:
+            super().__init__(**data)
+        except ValidationError as fault:
+            raise InputError(faults_in_words(fault)) from None
 
     @field_validator("axes")
     @classmethod
@@ -219,8 +233,10 @@ def machine_from_dict(data: dict, *, source: str | None = None) -> Machine:
     """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at once."""
     try:
         return Machine(**data)
-    except (ValidationError, TypeError) as fault:
-        raise InputError(_faults(fault), source=source) from fault
+    except InputError as fault:
+        raise InputError(fault.message, source=source) from None
+    except TypeError as fault:
+        raise InputError(str(fault), source=source) from fault
 
 
 def builtin_machines() -> tuple[str, ...]:
@@ -250,19 +266,41 @@ def _read(path: Path) -> str:
         raise InputError(f"machine file cannot be read: {fault}", source=str(path)) from fault
 
 
-def _faults(fault: ValidationError | TypeError) -> str:
-    if isinstance(fault, TypeError):
-        return str(fault)
+# What is needed where pydantic finds a fault of a type; {gt} and so on are its context.
+_NEEDED = {
+    "greater_than": "must be above {gt:g}",
+    "greater_than_equal": "must be {ge:g} or more",
+    "less_than": "must be below {lt:g}",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be a text",
+    "literal_error": "must be {expected}",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "tuple_type": "must be a list",
+    "too_short": "must have at least {min_length} entry",
+}
+
+
+def faults_in_words(fault: ValidationError) -> str:
+    """The faults of a record, each with the key, what is needed and what was found."""
     said = []
     for error in fault.errors():
         key = ".".join(str(part) for part in error["loc"])
-        text = error["msg"].removeprefix("Value error, ")
         if error["type"] == "missing":
             said.append(f"{key}: missing")
         elif error["type"] == "extra_forbidden":
             said.append(f"{key}: unknown key")
         elif error["type"] == "value_error":
+            text = error["msg"].removeprefix("Value error, ")
             said.append(f"{key}: {text}" if key else text)
         else:
-            said.append(f"{key}: {text}, found {error['input']!r}")
+            needed = _NEEDED.get(error["type"], error["msg"]).format(**error.get("ctx", {}))
+            said.append(f"{key}: {needed}, found {error['input']!r}")
     return "; ".join(said)

@@ -9,7 +9,8 @@ import pytest
 
 import planner
 from planner.base.errors import InputError
-from planner.machine import load_machine
+from planner.machine import builtin_text, load_machine
+from planner.machine_import.linuxcnc import settings
 
 TEMPLATE = Path(planner.__file__).parent / "templates" / "machine.toml"
 
@@ -99,3 +100,70 @@ def test_every_key_of_the_template_is_valid_and_every_key_is_in_it(tmp_path: Pat
     assert machine.fir.phase_lag_max == 30.0
     assert "a" in machine.axes
     assert machine.work_offsets["g55"]["x"] == 120.0
+
+
+# What the sources of the machines that are products say: LinuxCNC in inch/s and inch/s2, grbl in mm/min, the others in mm/s.
+SOURCED = {
+    "tormach": ([1.5 * 25.4, 1.5 * 25.4, 1.083 * 25.4], [9 * 25.4, 9 * 25.4, 6 * 25.4]),
+    "boss": ([2 * 25.4] * 3, [10 * 25.4] * 3),
+    "shapeoko": ([5000 / 60] * 3, [400.0] * 3),
+    "voron": ([300.0, 300.0, 15.0], [3000.0, 3000.0, 350.0]),
+    "ender3": ([500.0, 500.0, 5.0], [500.0, 500.0, 100.0]),
+}
+
+
+@pytest.mark.parametrize("name", SOURCED)
+def test_built_in_products_have_the_figures_of_their_sources(name: str) -> None:
+    machine = load_machine(name)
+    velocity, acceleration = SOURCED[name]
+    assert machine.limits("velocity", ("x", "y", "z")) == pytest.approx(velocity, rel=1e-4)
+    assert machine.limits("acceleration", ("x", "y", "z")) == pytest.approx(acceleration, rel=1e-6)
+    text = builtin_text(name)
+    assert "github.com/" in text
+    assert text.count("assumed") + text.count("Assumed") >= 3
+
+
+INI = Path("/usr/share/doc/linuxcnc/examples/sample-configs/by_machine")
+
+
+@pytest.mark.parametrize(
+    ("name", "file"), [("tormach", "tormach/pcnc-1100-seriesII.ini"), ("boss", "boss/boss.ini")]
+)
+def test_linuxcncs_own_configurations_say_the_same(name: str, file: str) -> None:
+    if not (INI / file).exists():
+        pytest.skip(f"{INI / file} (package linuxcnc-doc or linuxcnc-uspace) is not installed")
+    said = settings((INI / file).read_text(encoding="utf-8"), file)
+    machine = load_machine(name)
+    for letter in ("x", "y", "z"):
+        assert machine.axes[letter].velocity == pytest.approx(said.velocity[letter].value, rel=1e-4)
+        assert machine.axes[letter].acceleration == pytest.approx(said.acceleration[letter].value)
+    assert said.dt is not None
+    assert machine.dt == pytest.approx(said.dt.value)
+    assert said.feed_max is not None
+    assert machine.feed_max == pytest.approx(said.feed_max.value)
+
+
+def test_faults_are_told_in_the_words_of_the_file() -> None:
+    axis = {"velocity": 1.0, "acceleration": 1.0, "jerk": 1.0}
+    bad = {
+        "name": 3,
+        "dt": -1,
+        "tolerance": "thin",
+        "axes": {"x": axis, "y": {**axis, "jerk": "inf"}},
+        "speed": 2,
+    }
+    with pytest.raises(InputError) as caught:
+        planner.Machine(**bad)
+    assert str(caught.value).split("; ") == [
+        "name: must be a text, found 3",
+        "dt: must be above 0, found -1",
+        "tolerance: must be a number, found 'thin'",
+        "axes.y.jerk: must be a finite number, found 'inf'",
+        "speed: unknown key",
+    ]
+    machine = load_machine("mill")
+    with pytest.raises(
+        AttributeError, match=r"Machine.dt cannot be set: .*model_copy\(update=\{'dt': 0.002\}\)"
+    ):
+        machine.dt = 0.002  # type: ignore[misc]
+    assert machine.model_copy(update={"dt": 0.002}).dt == 0.002

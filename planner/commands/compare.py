@@ -55,6 +55,14 @@ def compare_command(
         Path | None,
         typer.Option("-o", "--output", "--out", metavar="FILE", help="write the comparison (.json, .csv)"),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report",
+            metavar="FILE",
+            help="write a page with the motions side by side (.html) for a browser",
+        ),
+    ] = None,
     force: ForceOption = False,
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
@@ -79,18 +87,27 @@ def compare_command(
 
     if output is not None:
         check_comparison_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+    if report is not None:
+        from planner.report.html.comparison_page import check_page_place
+
+        check_page_place(report, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     limits = load_machine(machine or DEFAULT_MACHINE)
     program = read_program(job, limits, reading)
-    rows = [_run(name, program, limits, tolerance, quiet) for name in methods]
+    rows = [_run(name, program, limits, tolerance, quiet, report is not None) for name in methods]
     about = about_job(str(job), limits, tolerance)
+    if report is not None:
+        from planner.report.html.comparison_page import write_comparison_page
+
+        write_comparison_page(report, rows, str(job), limits, program)
     if output is not None:
         write_comparison(output, rows, about)
     if as_json:
         say(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
     else:
         show(comparison_table(rows, f"{job}: {len(rows)} methods, machine {limits.name}"))
-        if output is not None:
-            say(str(output))
+        for file in (output, report):
+            if file is not None:
+                say(str(file))
     outcomes = {row.outcome for row in rows}
     if "passed" not in outcomes:
         raise typer.Exit(
@@ -115,9 +132,12 @@ def parse_methods(text: str) -> list[str]:
     return names
 
 
-def _run(method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool) -> Row:
-    """Plan with one method and say on standard error how it went."""
+def _run(
+    method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool, shown: bool
+) -> Row:
+    """Plan with one method and say on standard error how it went; keep samples of the motion if they are `shown` on a page."""
     from planner.report.compare import Row, row_of
+    from planner.report.html.comparison_page import SAMPLES_MAX
 
     with ProgressBar(quiet=quiet) as progress:
         try:
@@ -127,6 +147,7 @@ def _run(method: str, program: Program, machine: Machine, tolerance: float | Non
                 machine,
                 tolerance,
                 lambda stage, fraction: progress(f"{method}: {stage}", fraction),
+                SAMPLES_MAX if shown else 0,
             )
         except MemoryError as fault:
             row = Row(method=method, outcome="not solved", sentence=memory_used_up(fault))

@@ -19,6 +19,13 @@ class For(StrEnum):
 
     stream = "linuxcnc-stream"
     pvt = "pvt"
+    grbl = "grbl"
+    klipper = "klipper"
+    marlin = "marlin"
+    linuxcnc = "linuxcnc"
+
+
+PROGRAMS = (For.grbl, For.klipper, For.marlin, For.linuxcnc)
 
 
 class Unit(StrEnum):
@@ -37,7 +44,8 @@ def export_command(
         For,
         typer.Option(
             "--for",
-            help="linuxcnc-stream: setpoints for the streamer of LinuxCNC's HAL, with the HAL files; pvt: positions, velocities, times",
+            help="linuxcnc-stream: setpoints for the streamer of LinuxCNC's HAL, with the HAL files; pvt: positions, velocities, "
+            "times; grbl, klipper, marlin, linuxcnc: a program that its own planner runs well",
         ),
     ],
     output: Annotated[
@@ -52,8 +60,23 @@ def export_command(
             help="pvt: how far the cubics between rows may be from the setpoints [mm] (default 0.001)",
         ),
     ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            metavar="MM",
+            help="programs: what plan and chords may be off the program together [mm] (default: that of the plan)",
+        ),
+    ] = None,
 ) -> None:
-    """Write the setpoints of a plan for a control that plays them."""
+    """Write a plan for a control: setpoints that it plays, or a program that its own planner runs well."""
+    if for_ in PROGRAMS:
+        if within is not None or unit is not Unit.mm:
+            raise InputError(f"--within and --unit are for setpoints; --for {for_} takes --tolerance")
+        _program(plan, for_, output, tolerance)
+        return
+    if tolerance is not None:
+        raise InputError(f"--tolerance is for programs; --for {for_} takes every setpoint as it is")
     from planner.control_files.pvt import WITHIN, write_pvt
     from planner.control_files.stream import write_stream
     from planner.report.trajectory_reader import read_trajectory
@@ -78,6 +101,35 @@ def export_command(
     finally:
         shutil.rmtree(new, ignore_errors=True)
     say(f"{output}: {said}")
+
+
+def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
+    """Write the program of a plan's directory for a control, and say what it holds."""
+    from planner.control_files.program import write_program
+    from planner.report.html.saved import saved_plan
+
+    if os.path.lexists(output):
+        raise InputError("exists already and is not overwritten; give another name", source=str(output))
+    if tolerance is not None and not 0 < tolerance < float("inf"):
+        raise InputError(f"--tolerance must be above 0 mm, found {tolerance:g}")
+    if not plan.is_dir():
+        raise InputError(
+            "give the directory that 'plan -o' wrote: the program is needed too", source=str(plan)
+        )
+    saved, _, _ = saved_plan(plan)
+    allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
+    new = output.with_name(f".{output.name}.{os.getpid()}")
+    try:
+        new.mkdir(parents=True)
+        made = write_program(new, saved, for_.value, allowed)
+        new.rename(output)
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    say(f"{output / made.file}: {made.sentence}")
+    for name, seconds in made.predicted.items():
+        say(f"  {seconds:10.4f} s predicted by a model of {for_.value}'s planner: {name}")
 
 
 def _trajectory(plan: Path) -> Path:

@@ -29,12 +29,13 @@ from planner.feedrate.solution import FeedrateSolution
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lagrangian:
-    """value (P,) of every interval [s], and what it changes by per relative change of the limits: acceleration, jerk (A,) and
-    feed_sq_max (P,) [s]."""
+    """value (P,) of every interval [s], and what it changes by per relative change of the limits: acceleration, jerk (A,) of the axes,
+    all of these together by interval, rows (P,), and feed_sq_max (P,) [s]."""
 
     value: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
+    rows: FloatArray
     feed_sq_max: FloatArray
 
 
@@ -63,8 +64,12 @@ def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangi
         feed=found.feed,
         pi=found.dynamics,
     )
-    value, of_acceleration, of_jerk, of_feed = _lagrangian(columns_of(problem), problem.interval, profile)
-    return Lagrangian(value=value, acceleration=of_acceleration, jerk=of_jerk, feed_sq_max=of_feed)
+    value, of_acceleration, of_jerk, of_rows, of_feed = _lagrangian(
+        columns_of(problem), problem.interval, profile
+    )
+    return Lagrangian(
+        value=value, acceleration=of_acceleration, jerk=of_jerk, rows=of_rows, feed_sq_max=of_feed
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -73,7 +78,7 @@ def _lagrangian(columns, interval, profile):
     _, s, x_max, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk = columns
     x, u, p, rows, feed, pi = profile
     points, axes = d1.shape
-    value, of_feed = np.zeros(points), np.zeros(points)
+    value, of_rows, of_feed = np.zeros(points), np.zeros(points), np.zeros(points)
     of_acceleration, of_jerk = np.zeros(axes), np.zeros(axes)
     for i in range(points):
         if not interval[i]:
@@ -88,11 +93,13 @@ def _lagrangian(columns, interval, profile):
             right = (d1[i + 1, k] * u1 + d2_left[i + 1, k] * x[i + 1]) / acceleration[i + 1, k]
             held = rows[i, k, 0] * left + rows[i, k, 3] * right
             of_acceleration[k] -= held
+            of_rows[i] -= held
             total += held
             left = d1[i, k] * j + v0 * (3.0 * d2_right[i, k] * u[i] + d3_right[i, k] * x[i])
             right = d1[i + 1, k] * j + v1 * (3.0 * d2_left[i + 1, k] * u1 + d3_left[i + 1, k] * x[i + 1])
             held = rows[i, k, 1] * left / jerk[i, k] + rows[i, k, 2] * right / jerk[i + 1, k]
             of_jerk[k] -= held
+            of_rows[i] -= held
             total += held
         held = feed[i, 0] * x[i] / x_max[i]
         of_feed[i] -= held
@@ -102,4 +109,4 @@ def _lagrangian(columns, interval, profile):
         of_feed[i] -= held * x_max[i] / both
         of_feed[i + 1] -= held * x_max[i + 1] / both
         value[i] = total + held
-    return value, of_acceleration, of_jerk, of_feed
+    return value, of_acceleration, of_jerk, of_rows, of_feed

@@ -9,15 +9,16 @@ from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.job.records import CornerTable, GridHistory, PriceList
+from planner.job.shown import Shown
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.verify import CornerCheck, Verdict
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Plan:
-    """A planned job.
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Plan(Shown):
+    """A planned job: its records, and how it shows itself in Python and notebooks (shown.py).
 
     method, solver      : names of what was used
     corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where no corner is rounded
@@ -51,6 +52,20 @@ class Plan:
     prices: PriceList | None = None
     notes: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Program, machine, method, cycle time and verdict, in a line."""
+        verdict = "not solved" if self.verdict is None else "passed" if self.verdict.passed else "failed"
+        time = "" if self.trajectory is None else f"{self.trajectory.cycle_time:.4f} s, "
+        source = self.program.source.replace("\\", "/").rpartition("/")[2]
+        return f"<Plan of {source} on {self.machine.name} by {self.method}: {time}{verdict}>"
+
+    @property
+    def cycle_time(self) -> float:
+        """Duration of the motion [s]. Raises NotSolvedError if there is none."""
+        if self.trajectory is None:
+            raise NotSolvedError(self.sentence)
+        return self.trajectory.cycle_time
 
     @property
     def geometry(self) -> str | None:

@@ -105,6 +105,27 @@ class DearCorners:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class PlacePrices:
+    """What more costs and saves by place: at the M segments of the programmed path and the M+1 joints between them.
+
+    feed      : (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
+    limits    : (M,) time saved by `MORE_LIMIT` more of every limit on this segment, feed and axes [s]
+    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves time; None where it is not known
+    """
+
+    feed: FloatArray
+    limits: FloatArray
+    tolerance: FloatArray | None
+
+    def __post_init__(self) -> None:
+        segments = len(self.feed)
+        freeze(self, "feed", np.float64, (segments,))
+        freeze(self, "limits", np.float64, (segments,))
+        if self.tolerance is not None:
+            freeze(self, "tolerance", np.float64, (segments + 1,))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PriceList:
     """What limits and tolerance cost: derivatives of the cycle time T, negative where more of a limit saves time.
 
@@ -116,6 +137,7 @@ class PriceList:
     ranges    : least and most time that a new plan may save [s]
     hints     : names whose saving is told by its range only; `saved` is its middle, and a hint only
     corners   : the corners with the largest savings; None where they are not known
+    places    : the same by place, as straight lines foretell it; None where it is not known
     """
 
     limits: dict[str, float]
@@ -125,6 +147,7 @@ class PriceList:
     corners: DearCorners | None
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     hints: tuple[str, ...] = ()
+    places: PlacePrices | None = None
 
     def ranked(self) -> list[tuple[str, float]]:
         """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""

@@ -111,7 +111,7 @@ def no_splines(axes: int) -> SplineTable:
     return SplineTable(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Program:
     """An NC program: B blocks over A axes.
 
@@ -137,6 +137,7 @@ class Program:
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
     reading      : the settings it was read with
+    text         : the program itself, if it was given as a text; None for those of a file, and for points
     """
 
     source: str
@@ -161,6 +162,7 @@ class Program:
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
     reading: Reading = AS_USUAL
+    text: bytes | None = None
 
     def __post_init__(self) -> None:
         axes = len(self.axes)
@@ -189,6 +191,9 @@ class Program:
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def __repr__(self) -> str:
+        return f"<Program {self.source}: {len(self):,} blocks, axes {' '.join(self.axes)}>"
 
     def place(self, block: int) -> str:
         """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost first."""

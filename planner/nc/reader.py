@@ -22,15 +22,35 @@ from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, LATHE, SIEMENS, Reading
 
 
-def read_program(path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL) -> Program:
+def read_program(
+    path: str | Path | None = None,
+    machine: Machine | None = None,
+    reading: Reading = AS_USUAL,
+    *,
+    text: str | bytes | None = None,
+) -> Program:
     """Read an NC program or a plotter file.
 
+    path    : the file; None where `text` is given
+    text    : the program itself
     machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
               None for zeros and blending
     reading : what is refused, left out and assumed
 
-    Raises InputError if the file cannot be read, and for the first construct that is not supported or not valid.
+    Raises InputError if the file cannot be read, for the first construct that is not supported or not valid, and unless one of file
+    and text is given.
+
+    >>> import planner
+    >>> len(planner.read_program(text="G21 F3000\\nG1 X10\\nY5\\n"))
+    2
     """
+    if (path is None) == (text is None):
+        raise InputError("give a program file, or its text as text=...")
+    if text is not None:
+        return dataclasses.replace(
+            parse_program(text, machine, reading), text=text.encode() if isinstance(text, str) else text
+        )
+    assert path is not None
     return parse_program(load(path), machine, reading, source=str(path))
 
 

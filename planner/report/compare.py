@@ -7,7 +7,7 @@ beside it, and is the best only if no other passed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from planner.job.method import Method
     from planner.job.plan import Plan
     from planner.job.stages import Progress
+    from planner.report.html.data import Samples
     from planner.verify import Verdict
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
 AFTER_PLANNING = ("read", "sample", "verify")
@@ -47,6 +48,7 @@ class Row:
     ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
     planning_time : computing time without reading, sampling and verification [s]
     summary       : the content of `summary.json`
+    shown         : samples of the motion for a page (html/comparison_page.py); None unless asked for
     """
 
     method: str
@@ -62,7 +64,8 @@ class Row:
     after_filters: float | None = None
     ringing: float | None = None
     planning_time: float | None = None
-    summary: dict[str, Any] | None = None
+    summary: dict[str, Any] | None = field(default=None, repr=False)
+    shown: Samples | None = field(default=None, repr=False, compare=False)
 
     @property
     def passed(self) -> bool:
@@ -107,15 +110,23 @@ def row_of(
     machine: Machine,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    shown: int = 0,
 ) -> Row:
-    """The row of a method, whatever comes of it."""
+    """The row of a method, whatever comes of it.
+
+    shown : samples of the motion to keep for a page, at most; 0 for none
+    """
     from planner import plan
 
     label = method if isinstance(method, str) else _label(method)
     try:
-        return row_of_plan(
-            label, plan(program, machine, method=method, tolerance=tolerance, progress=progress)
-        )
+        made = plan(program, machine, method=method, tolerance=tolerance, progress=progress)
+        row = row_of_plan(label, made)
+        if shown and made.solved:
+            from planner.report.html.data import samples_of  # only pages need it
+
+            row = replace(row, shown=samples_of(made, shown))
+        return row
     except (InputError, NotSolvedError) as fault:
         return refused(label, fault)
 

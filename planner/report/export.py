@@ -27,7 +27,7 @@ from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.info import PLACES_SHOWN
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
-from planner.report.planned import LeftOut, planned_program
+from planner.report.planned import LeftOut, planned_program, source_text
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.trajectory_file import Format, units, write_trajectory
 
@@ -219,14 +219,6 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
         return planned_program(plan, blocks)
     except LeftOut as why:
         return None, [f"{PLANNED} is left out: {why}"]
-
-
-def source_text(plan: Plan) -> bytes | None:
-    """The text of the program, if it was read from a file that is still there."""
-    try:
-        return Path(plan.program.source).read_bytes()
-    except (OSError, ValueError):
-        return None
 
 
 def _is_source(plan: Plan, file: Path) -> bool:

@@ -51,11 +51,9 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     because a line would become too long.
     """
     assert plan.trajectory is not None
-    source = Path(plan.program.source)
-    try:
-        data = source.read_bytes()
-    except (OSError, ValueError):
-        raise LeftOut(f"the program was not read from a file, or {source} is no longer there") from None
+    source, data = plan.program.source, source_text(plan)
+    if data is None:
+        raise LeftOut(f"the program was not read from a file, or {source} is no longer there")
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
     planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
@@ -88,10 +86,17 @@ def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
 
 
 def _is_source(plan: Plan, text: bytes) -> bool:
+    return source_text(plan) == text
+
+
+def source_text(plan: Plan) -> bytes | None:
+    """The text of the program, if it was given as a text, or read from a file that is still there."""
+    if plan.program.text is not None:
+        return plan.program.text
     try:
-        return Path(plan.program.source).read_bytes() == text
+        return Path(plan.program.source).read_bytes()
     except (OSError, ValueError):
-        return False
+        return None
 
 
 def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:

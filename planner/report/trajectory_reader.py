@@ -6,10 +6,11 @@ other names are left alone.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -76,18 +77,25 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
         raise InputError("cannot be read: its metadata are nested too deep", source=str(path)) from None
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
         raise InputError(f"cannot be read: {fault}", source=str(path)) from fault
+    found = trajectory_of_columns(given, str(path))
+    return dataclasses.replace(found, metadata=about if isinstance(about, dict) else {})
+
+
+def trajectory_of_columns(given: Mapping[str, Any], source: str) -> TrajectoryFile:
+    """A trajectory of the columns of a file, or of arrays (T,) and (T, n), by their names; the rest as in `read_trajectory`.
+
+    source : where they come from, for messages
+    """
     columns: dict[str, Array] = {}
     for name, column in _one_by_one(given).items():
         word = name.strip().lower()
         if word in KNOWN:
-            columns[word] = _numbers(path, name, column)
-    trajectory, digits, notes = _assemble(str(path), columns, tuple(given))
-    return TrajectoryFile(
-        trajectory=trajectory, given=digits, metadata=about if isinstance(about, dict) else {}, notes=notes
-    )
+            columns[word] = _numbers(source, name, column)
+    trajectory, digits, notes = _assemble(source, columns, tuple(given))
+    return TrajectoryFile(trajectory=trajectory, given=digits, metadata={}, notes=notes)
 
 
-def _one_by_one(given: dict[str, Any]) -> dict[str, Any]:
+def _one_by_one(given: Mapping[str, Any]) -> dict[str, Any]:
     """The columns, with an array (T, n) that is named by n axes taken apart."""
     columns: dict[str, Any] = {}
     for name, column in given.items():
@@ -130,19 +138,19 @@ def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
         )
 
 
-def _numbers(path: Path, name: str, column: Any) -> Array:
+def _numbers(source: str, name: str, column: Any) -> Array:
     """A column as numbers. Raises InputError naming the column and the row of the first that is none."""
     column = np.asarray(column)
     if column.ndim != 1 or column.dtype.kind not in "fiub":
         raise InputError(
             f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed",
-            source=str(path),
+            source=source,
         )
     bad = np.flatnonzero(~np.isfinite(column))
     if len(bad):
         raise InputError(
             f"column '{name}', row {bad[0] + 1}: {column[bad[0]]}; every value must be a finite number",
-            source=str(path),
+            source=source,
         )
     return column
 

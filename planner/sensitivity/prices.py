@@ -28,7 +28,6 @@ of the time, the saving is a hint only.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -36,7 +35,6 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints import chord_error
-from planner.constraints.assemble import feedrate_problem
 from planner.constraints.limits import ACCELERATION, FEED, OF_AXES, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
@@ -54,9 +52,9 @@ from planner.sensitivity.corner_prices import (
     corner_prices,
     sums,
 )
+from planner.sensitivity.places import MORE_LIMIT, bounds_with, by_place
 from planner.sensitivity.savings import Change, more_of, thinned
 
-MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-]
 WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
 HINT, HINT_LEAST = (
     0.15,
@@ -104,7 +102,7 @@ def price_list(
     speeds = [FEED.name, *(name for name in velocities if by_share[name] < 0.0)]
     for name in speeds:  # these are dT/d(ln limit)
         by_share[name] = _by_speed(samples, problem, now, changes[name])
-    dear, tolerance = None, None
+    dear, tolerance, together = None, None, None
     corners: CornerPrices | None = None
     if by_site is not None:
         together = _by_joint(samples.path, by_site.place, by_site.now)
@@ -138,6 +136,7 @@ def price_list(
         corners=dear,
         ranges={name: (saving.least, saving.most) for name, saving in found.items()},
         hints=tuple(name for name, saving in found.items() if saving.vague(solution.cycle_time)),
+        places=by_place(samples, problem, now, changes[FEED.name], together),
     )
 
 
@@ -218,7 +217,7 @@ class _Savings:
             return -price
         if name not in self.speeds:
             return -price * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-        more = _bounds(self.samples, self.changes[name], MORE_LIMIT)
+        more = bounds_with(self.samples, self.changes[name], MORE_LIMIT)
         return -2.0 * float(self.now.feed_sq_max @ (1.0 - np.sqrt(self.problem.feed_sq_max / more)))
 
 
@@ -247,7 +246,7 @@ def _dearest(path: SmoothPath, price: FloatArray, saved: FloatArray) -> DearCorn
 
 def _by_speed(samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change) -> float:
     """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the other one that stays."""
-    gained = np.log(_bounds(samples, change, STEP) / problem.feed_sq_max)
+    gained = np.log(bounds_with(samples, change, STEP) / problem.feed_sq_max)
     return float(now.feed_sq_max @ gained) / STEP
 
 
@@ -257,11 +256,3 @@ def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machin
     tolerance = samples.path.toolpath.tolerance[samples.segment]
     chord = kappa * solution.feed_sq * chord_error.rate(machine)
     return float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())
-
-
-def _bounds(samples: PathSamples, change: Change, share: float) -> FloatArray:
-    """(P,) bounds of feed^2 with a share more feed or axis velocity [mm2/s2]."""
-    toolpath = samples.path.toolpath
-    faster = dataclasses.replace(toolpath, feed=toolpath.feed * change.feed(share))
-    there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=faster))
-    return feedrate_problem(there, change.machine(share)).feed_sq_max

@@ -22,8 +22,11 @@ sharp each check is:
     judge.py      `verify` itself
 
 The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are never looked at.
+
+`planner.verify(t, q, program, machine)` judges arrays (interactive/given_motion.py).
 """
 
+from planner.base.called import call_like
 from planner.verify.corners import CornerCheck
 from planner.verify.given import Given
 from planner.verify.judge import verify
@@ -31,3 +34,5 @@ from planner.verify.ringing import Ringing
 from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
 
 __all__ = ["AfterFilters", "CornerCheck", "Given", "LimitCheck", "Ringing", "Verdict", "verify"]
+
+call_like(__name__, "planner.interactive.given_motion:verify")

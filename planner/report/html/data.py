@@ -28,6 +28,9 @@ SAMPLES_MAX = 150_000  # of the motion: the page of a program of 250,000 blocks 
 PROGRAMMED_MAX = 60_000  # points of the programmed path that are shown
 ARC_POINTS = 24  # of every arc and curve that are shown
 NO_LIMIT = "none"
+# Around a joint its price is shown within so many tolerances, a rounded corner reaches back some ten of them, and at least within this
+# share of the path's extent, some ten pixels of the picture.
+NEAR, NEAR_SHARE = 20, 0.012
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,6 +42,7 @@ class Samples:
     limit     : (N,) index in `limits` of the limit that holds the motion there
     limits    : their names; the last one is `NO_LIMIT`
     deviation : (N,) distance from the programmed path near the block of the sample [mm]
+    price     : (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None where it is not known
     """
 
     step: int
@@ -46,6 +50,7 @@ class Samples:
     limit: Array
     limits: tuple[str, ...]
     deviation: FloatArray
+    price: FloatArray | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,6 +63,8 @@ class Lines:
     highest    : (L,) highest feed of the samples shown, or what is known of lines without one [mm/s]
     limit      : (L,) index in `Samples.limits` of the limit that holds the motion there for the longest time
     deviation  : (L,) largest distance of the samples shown from the programmed path [mm]; NaN where no sample is shown
+    more_feed  : (L,) time that a tenth more of this line's feed would save [s]; None where it is not known
+    more       : (L,) time that a tenth more of all limits on this line would save [s]; None where it is not known
     """
 
     line: Array
@@ -66,6 +73,8 @@ class Lines:
     highest: FloatArray
     limit: Array
     deviation: FloatArray
+    more_feed: FloatArray | None
+    more: FloatArray | None
 
 
 def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
@@ -75,9 +84,31 @@ def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
     step = max(1, -(-len(trajectory) // (most if len(trajectory) <= most else most // 2)))
     shown = _thinned(trajectory, step)
     names, limit = _limits(plan, shown)
-    segment = np.searchsorted(plan.toolpath.block, shown.block, side="right") - 1
-    deviation = distance_near(plan.toolpath, shown.position, np.maximum(segment, 0))
-    return Samples(step=step, shown=shown, limit=limit, limits=names, deviation=deviation)
+    segment = np.maximum(np.searchsorted(plan.toolpath.block, shown.block, side="right") - 1, 0)
+    return Samples(
+        step=step,
+        shown=shown,
+        limit=limit,
+        limits=names,
+        deviation=distance_near(plan.toolpath, shown.position, segment),
+        price=_price(plan, shown.position, segment),
+    )
+
+
+def _price(plan: Plan, position: FloatArray, segment: Array) -> FloatArray | None:
+    """(n,) what tolerance at the nearer joint of its segment (n,) saves each sample's place (n, A) [s/mm]; 0 far from joints
+    (`NEAR`), None where it is not known."""
+    places = plan.prices.places if plan.prices is not None else None
+    if places is None or places.tolerance is None:
+        return None
+    toolpath = plan.toolpath
+    before = np.linalg.norm(position - toolpath.start[segment], axis=1)
+    behind = np.linalg.norm(position - toolpath.end[segment], axis=1)
+    joint = np.where(before <= behind, segment, segment + 1)
+    extent = float(np.ptp(toolpath.end, axis=0).max())
+    near = np.minimum(before, behind) <= np.maximum(NEAR * toolpath.tolerance[joint], NEAR_SHARE * extent)
+    price: FloatArray = np.where(near, np.maximum(-places.tolerance[joint], 0.0), 0.0)
+    return price
 
 
 def _thinned(trajectory: Trajectory, step: int) -> Trajectory:
@@ -136,7 +167,10 @@ def lines_of(plan: Plan, samples: Samples) -> Lines:
     np.maximum.at(unseen, row, blocks.highest)
     deviation = np.full(rows, -1.0)
     np.maximum.at(deviation, at, samples.deviation)
+    places = plan.prices.places if plan.prices is not None else None
     return Lines(
+        more_feed=None if places is None else np.bincount(row, places.feed, rows).astype(np.float64),
+        more=None if places is None else np.bincount(row, places.limits, rows).astype(np.float64),
         line=toolpath.line[fresh],
         planned=np.bincount(row, blocks.duration, rows).astype(np.float64),
         programmed=np.bincount(row, programmed, rows).astype(np.float64),

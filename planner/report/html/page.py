@@ -2,44 +2,47 @@
 
 Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own DecompressionStream. Texts
 of the program and of names are data as well, and the page shows them as text, so that nothing in a program is ever run.
+
+The first picture needs none of that: it is in the page as SVG (picture.py), and the header is filled before plotly's script, some five
+megabytes, is run and the columns are unpacked.
 """
 
 from __future__ import annotations
 
-import base64
-import gzip
 import html
-import json
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.base.arrays import Array
-from planner.base.errors import InputError
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.report.colours import limit_colours
 from planner.report.export import json_ready, summary
 from planner.report.html.data import in_degrees, lines_of, programmed_path, samples_of
+from planner.report.html.parts import columns_text, filled, json_text, plotly_script, template
+from planner.report.html.picture import path_picture
 from planner.report.replace import check_file
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
 
 REPORT = "report.html"
+PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
 CORNERS_MAX = 20_000  # corners that are listed, those closest to eq. 18-19
-_MARK = '<meta name="generator" content="feedrate-planner">'
-_LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
+MARK = '<meta name="generator" content="feedrate-planner">'
+MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
 
 
 def check_report_place(path: Path, *, force: bool = False) -> None:
     """Raise InputError if a page cannot be written to a file: a directory, or a file that is no report while `force` is not set."""
-    check_file(path, (), _is_report, force=force)
+    check_file(path, (), is_report, force=force)
 
 
-def _is_report(path: Path) -> bool:
+def is_report(path: Path) -> bool:
+    """Whether a file is a page of this package."""
     with path.open("rb") as stream:
-        return _MARK.encode() in stream.read(500)
+        return MARK.encode() in stream.read(500)
 
 
 def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | None = None) -> str:
@@ -56,19 +59,17 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
     about["summary"] = said or summary(plan)
     about["columns"] = {name: column.dtype.str.lstrip("<|") for name, column in columns.items()}
-    page = _template("report.html")
+    page = template("report.html")
     parts = {
         "TITLE": html.escape(Path(plan.program.source).name),
-        "STYLE": _template("report.css"),
-        "PLOTLY": _plotly(),
-        "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
-        "COLUMNS": "\n".join(
-            f'<script type="text/plain" id="column-{name}">{_packed(column)}</script>'
-            for name, column in columns.items()
-        ),
-        "SCRIPT": _template("report.js"),
+        "STYLE": template("report.css"),
+        "PICTURE": path_picture(plan, PICTURE),
+        "PLOTLY": plotly_script(),
+        "ABOUT": json_text(about),
+        "COLUMNS": columns_text(columns),
+        "SCRIPT": template("report.js"),
     }
-    return "".join(parts.get(piece, piece) for piece in page.split("@@"))
+    return filled(page, parts)
 
 
 def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
@@ -95,15 +96,20 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
     }
     for k, axis in enumerate(axes):
         columns[axis] = (shown.position[:, k] * scale[k]).astype(np.float32)
-        columns[f"v{axis}"] = (shown.velocity[:, k] * scale[k]).astype(np.float32)
         columns[f"a{axis}"] = (shown.acceleration[:, k] * scale[k]).astype(np.float32)
         columns[f"j{axis}"] = (shown.jerk[:, k] * scale[k]).astype(np.float32)
+    if samples.price is not None:
+        columns["price"] = (samples.price * MICROSECONDS_PER_MICROMETRE).astype(np.float32)
+    if lines.more_feed is not None and lines.more is not None:
+        columns["line_more_feed"] = lines.more_feed.astype(np.float32)
+        columns["line_more"] = lines.more.astype(np.float32)
     machine = plan.machine
     about = {
         "axes": [*axes],
         "linear": [axis for axis in axes if axis in LINEAR_AXES],
         "rotary": [axis for axis in axes if axis in ROTARY_AXES],
         "limits": list(samples.limits),
+        "colours": limit_colours(samples.limits),
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "machine": {axis: machine.axes[axis].model_dump() for axis in axes},
@@ -129,22 +135,3 @@ def _corners(plan: Plan) -> dict[str, list[Any]]:
         "eq20": found.feed_paper[seen].tolist(),
         "gain": found.gain[seen].tolist(),
     }
-
-
-def _packed(column: Array) -> str:
-    """Bytes of a column, compressed, as base64."""
-    data = np.ascontiguousarray(column)
-    little = data.astype(data.dtype.newbyteorder("<"), copy=False)
-    return base64.b64encode(gzip.compress(little.tobytes(), _LEVEL, mtime=0)).decode("ascii")
-
-
-def _plotly() -> str:
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as fault:
-        raise InputError("a report needs the package plotly: pip install plotly") from fault
-    return str(get_plotlyjs())
-
-
-def _template(name: str) -> str:
-    return (resources.files("planner") / "report" / "html" / name).read_text(encoding="utf-8")

@@ -7,9 +7,9 @@
   const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
   const ink = dark ? "#e6e9ef" : "#1d2430", dim = dark ? "#97a1b2" : "#667085", rule = dark ? "#2e3744" : "#d9dee7";
   const ARRAYS = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
-  // Okabe and Ito's colours, told apart with red-green blindness too; axes and limits take them in order.
+  // Okabe and Ito's colours, told apart with red-green blindness too; axes take them in order, limits have theirs from colours.py.
   const COLOURS = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
-  const POINTS_OF_PATH = 40000, BUCKETS = 1200;
+  const POINTS_OF_PATH = 20000, BUCKETS = 1200;
 
   const element = (id) => document.getElementById(id);
   const make = (tag, text, className) => {
@@ -18,22 +18,21 @@
     if (className) made.className = className;
     return made;
   };
+  const mark = (name) => performance.mark(name);
+  function bytesOf(text) {
+    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let k = 0; k < bytes.length; k++) bytes[k] = raw.charCodeAt(k);
+    return bytes;
+  }
   async function unpack(name, type) {
-    const held = element("column-" + name);
-    const bytes = Uint8Array.from(atob(held.textContent), (one) => one.charCodeAt(0));
+    const held = element("column-" + name), bytes = bytesOf(held.textContent);
     held.remove();
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     const buffer = await new Response(stream).arrayBuffer();
     c[name] = new ARRAYS[type](buffer);
   }
-  await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
-  const N = c.t.length, axes = about.axes, linear = about.linear;
-  const unit = (axis) => (about.rotary.includes(axis) ? "deg" : "mm");
   const digits = (value, n = 4) => (value === null || !Number.isFinite(value) ? "–" : Number(value.toPrecision(n)).toString());
-  const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
-  const limits = about.limits.map(escaped);
-  const text = new TextDecoder().decode(c.program);
-  const programLines = text.length ? text.split(/\r\n|\n|\r/) : [];
 
   // Header, verdict, prices, notes
   {
@@ -82,29 +81,56 @@
     element("foot").textContent = every + `Made by planner ${summary.versions.planner}; this page needs no network.`;
   }
 
+  // The first picture is painted with the header; what takes longer follows (a page in the background paints nothing, and goes on).
+  await Promise.race([new Promise((painted) => requestAnimationFrame(() => setTimeout(painted, 0))), new Promise((late) => setTimeout(late, 500))]);
+  mark("first picture");
+  const script = make("script", element("plotly").textContent);
+  element("plotly").remove();
+  document.head.append(script);
+  mark("plotly");
+  await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
+  mark("columns");
+  const N = c.t.length, axes = about.axes, linear = about.linear;
+  const unit = (axis) => (about.rotary.includes(axis) ? "deg" : "mm");
+  const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+  const limits = about.limits.map(escaped);
+  const text = new TextDecoder().decode(c.program);
+  const programLines = text.length ? text.split(/\r\n|\n|\r/) : [];
+
   // The path
   const colourings = {
     feed: { column: c.feed, title: "feed [mm/s]", scale: "Cividis" },
     deviation: { column: c.deviation.map((v) => 1000 * v), title: "deviation [µm]", scale: "Cividis" },
     limit: { column: c.limit, title: "", limits: true },
   };
+  const button = (colour) => document.querySelector(`#colours [data-colour=${colour}]`);
+  if (c.price) colourings.price = { column: c.price, title: "saved [µs per µm]",
+    scale: [[0, rule], [0.02, rule], [0.02, "#f6c667"], [0.5, "#e8743b"], [1, "#7a1f5c"]] };
+  else button("price").remove();
   const highest = (column, counts) => column.reduce((most, v, k) => (counts(k) && v > most ? v : most), 1e-9);
   // Rapids would leave one colour for all the rest: the scale is that of the moves with a feed, if there are any.
   const feeds = c.programmed.some(Number.isFinite) ? (k) => Number.isFinite(c.programmed[k]) : () => true;
   colourings.feed.highest = highest(c.feed, feeds);
-  colourings.deviation.highest = highest(colourings.deviation.column, () => true);
+  for (const name of ["deviation", "price"]) if (colourings[name]) colourings[name].highest = highest(colourings[name].column, () => true);
   let colouring = "feed", range = [0, N - 1], against = "t", now = 0;
-  const limitColour = (k) => (limits[k] === "none" ? "#8c8c8c" : COLOURS[k % 7]);
+  const limitColour = (k) => about.colours[k];
   function stepScale() {
     const scale = [], n = limits.length;
     limits.forEach((_, k) => scale.push([k / n, limitColour(k)], [(k + 1) / n, limitColour(k)]));
     return scale;
   }
+  // Samples that are drawn: all that are in sight, or every so many where these are too many; farther away a tenth as many.
+  let sight = () => true;
   function pathRows() {
-    const [first, last] = range, count = last - first + 1, step = Math.max(1, Math.ceil(count / POINTS_OF_PATH));
+    const [first, last] = range, seen = [];
+    for (let k = first; k <= last; k++) if (sight(k)) seen.push(k);
+    const step = Math.max(1, Math.ceil(seen.length / POINTS_OF_PATH)), far = Math.max(1, Math.ceil(10 * (last - first + 1) / POINTS_OF_PATH));
     const rows = [];
-    for (let k = first; k <= last; k += step) rows.push(k);
-    if (rows[rows.length - 1] !== last) rows.push(last);
+    let inSight = 0;
+    for (let k = first; k <= last; k++) {
+      const drawn = sight(k) ? inSight++ % step === 0 : k % far === 0;
+      if (drawn || k === first || k === last) rows.push(k);
+    }
     return rows;
   }
   const pick = (column, rows) => Array.from(rows, (k) => column[k]);
@@ -126,9 +152,10 @@
     const at = [0, 1, 2].map((a) => (a < linear.length ? pick(c[linear[a]], rows) : rows.map(() => 0)));
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,
-      customdata: rows.map((k) => [c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k]]),
+      customdata: rows.map((k) => [c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? c.price[k] : 0]),
       hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} mm/s<br>held by %{customdata[2]}<br>" +
-        "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm<extra></extra>",
+        "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm" +
+        (c.price ? "<br>saved per µm %{customdata[5]:.3g} µs" : "") + "<extra></extra>",
     };
   }
   const programmed = { x: [], y: [], z: [] };
@@ -146,20 +173,44 @@
   const flat = linear.length < 3 || extents[2][1] - extents[2][0] < 0.12 * size;
   const axis3d = (title) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false });
   const bare = { displaylogo: false, responsive: true };
+  const modebar = { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink };
   function scene() {
     return {
-      aspectmode: "data", xaxis: axis3d(linear[0] || ""), yaxis: axis3d(linear[1] || ""), zaxis: axis3d(linear[2] || ""),
+      aspectmode: "data", xaxis: axis3d(linear[0] || ""), yaxis: axis3d(linear[1] || ""), zaxis: { ...axis3d(linear[2] || ""), visible: !flat },
       camera: { projection: { type: "orthographic" }, eye: flat ? { x: 0, y: 0, z: 1.6 } : { x: 1.2, y: -1.3, z: 0.9 },
         up: flat ? { x: 0, y: 1, z: 0 } : { x: 0, y: 0, z: 1 } },
     };
   }
   const pathPlot = element("path"), profilePlot = element("profile");
+  element("first").remove();
   await Plotly.newPlot(pathPlot, [
     { type: "scatter3d", mode: "lines", ...programmed, line: { width: 2, color: dim }, opacity: 0.45, hoverinfo: "skip", name: "programmed" },
     pathTrace(),
     { type: "scatter3d", mode: "markers", x: [place(0)[0]], y: [place(0)[1]], z: [place(0)[2]], hoverinfo: "skip",
       marker: { size: 7, color: dark ? "#ffffff" : "#000000" }, name: "here" },
-  ], { scene: scene(), margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, uirevision: "keep" }, bare);
+  ], { scene: scene(), margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, modebar, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, uirevision: "keep" }, bare);
+  mark("path");
+  // Zoomed in, the part in sight is drawn finer: the samples near the axis of sight. The scene's own lengths are those of its aspect ratio.
+  let waiting = null;
+  pathPlot.on("plotly_relayout", (change) => {
+    if (!Object.keys(change).some((key) => key.startsWith("scene.camera"))) return;
+    clearTimeout(waiting);
+    waiting = setTimeout(() => {
+      const { eye, center } = pathPlot.layout.scene.camera, full = pathPlot._fullLayout.scene, at = { x: 0, y: 0, z: 0, ...center };
+      const way = ["x", "y", "z"].map((a) => eye[a] - at[a]), reach = Math.hypot(...way);
+      if (reach > 1.2) { sight = () => true; redrawPath(); return; }
+      const unit = way.map((w) => w / reach), scale = ["x", "y", "z"].map((a) => {
+        const [low, high] = full[a + "axis"].range;
+        return [(low + high) / 2, full.aspectratio[a] / (high - low)];
+      });
+      sight = (k) => {
+        const off = place(k).map((v, a) => (v - scale[a][0]) * scale[a][1] - at["xyz"[a]]);
+        const along = off[0] * unit[0] + off[1] * unit[1] + off[2] * unit[2];
+        return off.reduce((sum, v) => sum + v * v, 0) - along * along < reach * reach;
+      };
+      redrawPath();
+    }, 250);
+  });
   function redrawPath() {
     const trace = pathTrace();
     return Plotly.react(pathPlot, [pathPlot.data[0], trace, pathPlot.data[2]], pathPlot.layout, bare);
@@ -209,7 +260,7 @@
     const base = c[against];
     return {
       margin: { l: 62, r: 14, t: 8, b: 42 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
-      hovermode: "closest", legend: { orientation: "h", y: 1.06 },
+      hovermode: "closest", modebar, legend: { orientation: "h", y: 1.06 },
       xaxis: { title: { text: against === "t" ? "time [s]" : "length along the path [mm]" }, range: [base[range[0]], base[range[1]]], gridcolor: rule, anchor: "y3" },
       yaxis: yAxis("feed [mm/s]", [0.7, 1], { rangemode: "tozero" }),
       yaxis2: yAxis("acceleration<br>[% of the limit]", [0.36, 0.64], { range: [-112, 112], tickvals: [-100, -50, 0, 50, 100] }),
@@ -317,10 +368,12 @@
   table("lines", [
     { name: "line", whole: true }, { name: "text", text: true }, { name: "planned [s]" }, { name: "programmed [s]" }, { name: "planned / programmed" },
     { name: "highest feed [mm/s]" }, { name: "held by", text: true }, { name: "deviation [µm]" },
+    ...(c.line_more ? [{ name: "10 % more F saves [ms]" }, { name: "10 % more of all limits saves [ms]" }] : []),
   ], [
     (k) => c.line_number[k], (k) => (programLines[c.line_number[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
     (k) => c.line_planned[k] / c.line_programmed[k], (k) => c.line_highest[k], (k) => about.limits[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
-  ], c.line_number, "cells");
+    ...(c.line_more ? [(k) => 1000 * c.line_more_feed[k], (k) => 1000 * c.line_more[k]] : []),
+  ], c.line_number, c.line_more ? "cells ten" : "cells");
   const corner = about.corners;
   if (corner.line && corner.line.length) {
     table("corners", [
@@ -375,6 +428,7 @@
     };
     playing = requestAnimationFrame(frame);
   };
-  window.report = { ready: true, show, state: () => ({ now, range, colouring, against, line: c.line[now], samples: N }) };
+  mark("ready");
+  window.report = { ready: true, show, drawn: () => pathRows().length, state: () => ({ now, range, colouring, against, line: c.line[now], samples: N }) };
   document.body.dataset.ready = "yes";
 })();

@@ -6,8 +6,6 @@ import base64
 import gzip
 import json
 import re
-import shutil
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +25,7 @@ from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.page import report_page
 from planner.report.html.saved import saved_plan
 from tests.commands.command_line import run
+from tests.report.html.in_browser import opened, wait_for
 
 JOB = "G21 F3000 (</script><script>document.title='ran'</script>)\nG1 X40 Y3\nG3 X40 Y33 J15\nG1 X0 Z-2\nG0 X0 Y0 Z0\n"
 MILL = load_machine("mill")
@@ -183,39 +182,9 @@ def test_report_needs_a_directory(job: Path) -> None:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory, page: str) -> Iterator[Any]:
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if not chromium or not driver:
-        pytest.skip("chromium and its driver (packages chromium, chromium-driver) are not installed")
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-dev-shm-usage",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-        "--window-size=1400,1800",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     file = tmp_path_factory.mktemp("page") / "report.html"
     file.write_text(page, encoding="utf-8")
-    opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    opened.set_script_timeout(60)
-    opened.get(f"file://{file}")
-    _wait(opened, "return document.body.dataset.ready")
-    yield opened
-    opened.quit()
-
-
-def _wait(browser: Any, question: str, seconds: float = 90.0) -> Any:
-    """The answer of the page once it is one."""
-    until = time.monotonic() + seconds
-    while not (answer := browser.execute_script(question)):
-        assert time.monotonic() < until, f"no answer: {question}"
-        time.sleep(0.1)
-    return answer
+    yield from opened(file)
 
 
 @pytest.mark.slow
@@ -256,9 +225,53 @@ def test_page_answers_to_clicks(browser: Any, plan: Plan) -> None:
     times = [float(text) for text in browser.execute_script(rows)]
     assert times == sorted(times, reverse=True)
     browser.execute_script("Plotly.relayout('profile', {'xaxis.range[0]': 1, 'xaxis.range[1]': 5})")
-    first, last = _wait(browser, "const r = report.state().range; return r[0] > 0 ? r : null")
+    first, last = wait_for(browser, "const r = report.state().range; return r[0] > 0 ? r : null")
     assert plan.trajectory.s[first] <= 1.0 <= 5.0 <= plan.trajectory.s[last]
     browser.execute_script("report.show(0)")
     browser.find_element(By.ID, "play").click()
-    _wait(browser, "return report.state().now > 0")
+    wait_for(browser, "return report.state().now > 0")
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def test_lines_and_places_have_their_prices(page: str, plan: Plan) -> None:
+    assert plan.prices is not None
+    assert plan.prices.places is not None
+    places, lines = plan.prices.places, lines_of(plan, samples_of(plan))
+    assert lines.more_feed is not None
+    assert lines.more is not None
+    assert lines.more_feed.sum() == pytest.approx(places.feed.sum())
+    assert lines.more.sum() == pytest.approx(places.limits.sum())
+    assert np.array_equal(column(page, "line_more", "<f4"), lines.more.astype(np.float32))
+    assert places.tolerance is not None
+    price = column(page, "price", "<f4")
+    assert price.max() == pytest.approx(-1e3 * places.tolerance.min(), rel=1e-6)
+    assert (price == 0).any(), "far from joints there is none"
+
+
+def test_the_first_picture_needs_no_script(page: str) -> None:
+    before = page.partition('id="plotly"')[0]
+    assert before.count("<polyline") > 1
+    assert (
+        page.index("<svg")
+        < page.index('<script type="text/plain" id="plotly">')
+        < page.index('id="column-t"')
+    )
+
+
+@pytest.mark.slow
+def test_the_picture_stands_there_before_plotly(browser: Any) -> None:
+    marks = browser.execute_script("return performance.getEntriesByType('mark').map((one) => one.name)")
+    assert marks == ["first picture", "plotly", "columns", "path", "ready"]
+
+
+@pytest.mark.slow
+def test_prices_are_a_colour_and_columns(browser: Any, plan: Plan) -> None:
+    from selenium.webdriver.common.by import By
+
+    browser.find_element(By.CSS_SELECTOR, "[data-colour=price]").click()
+    assert browser.execute_script("return report.state().colouring") == "price"
+    heads = browser.find_elements(By.CSS_SELECTOR, "#lines-head button")
+    assert [head.text for head in heads[-2:]] == [
+        "10 % more F saves [ms]",
+        "10 % more of all limits saves [ms]",
+    ]

@@ -1,0 +1,149 @@
+"""The planned motion as a polyline: setpoints between which straight moves miss no other setpoint by more than a given distance.
+
+A chord of length l over curvature kappa misses by kappa l^2 / 8. So the density of the vertices along the path is
+(kappa / 8 miss)^(1/2), and they are the setpoints at which its integral passes whole numbers; where the chords then miss by more,
+which is measured, the density is raised and all is done again. The ends of rapid moves, standstills and places where something else
+happens (an M word) are vertices in any case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.geometry.chords import arc_point
+from planner.job.plan import Plan
+from planner.motion.trajectory import Trajectory
+from planner.nc.program import Kind
+
+ROUNDS = 30  # of raising the density, each by a tenth at least: far more than curvature between setpoints can ask for
+DECIMALS = 4  # of a coordinate in mm
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Polyline:
+    """Straight moves between n+1 points.
+
+    points : (n+1, A) [mm], rounded to `DECIMALS`
+    feed   : (n,) planned feed: the highest of the setpoints from one point to the next [mm/s]
+    block  : (n,) block of the program of each move
+    rapid  : (n,) whether that is a rapid move
+    miss   : how far the moves miss a setpoint at most [mm]
+    """
+
+    points: FloatArray
+    feed: FloatArray
+    block: Array
+    rapid: Array
+    miss: float
+
+
+def planned_polyline(plan: Plan, within: float) -> Polyline:
+    """The planned motion as a polyline.
+
+    within : how far it may miss a setpoint [mm], above the rounding of coordinates
+
+    Raises ValueError for a plan without a trajectory.
+    """
+    trajectory = plan.require().trajectory
+    assert trajectory is not None
+    fixed = _fixed(plan, trajectory)
+    density = _density(trajectory, within)
+    for _ in range(ROUNDS):
+        along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s))])
+        chosen = np.append(True, np.diff(np.floor(along)) > 0) | fixed
+        rows = np.flatnonzero(chosen)
+        points = _rounded(trajectory.position[rows])
+        misses = _misses(trajectory.position, rows, points)
+        if (misses <= within).all() or chosen.all():
+            break
+        worse = np.maximum.reduceat(misses, rows[:-1])
+        more = np.where(worse > within, np.maximum(np.sqrt(worse / within), 1.1), 1.0)
+        density = density * np.repeat(more, np.append(np.diff(rows)[:-1], len(density) - rows[-2]))
+    feed = np.maximum(np.maximum.reduceat(trajectory.feed, rows[:-1]), trajectory.feed[rows[1:]])
+    block = trajectory.block[np.minimum(rows[:-1] + 1, rows[1:])]
+    moves = (np.diff(points, axis=0) != 0).any(axis=1)
+    kept = np.append(True, moves)
+    return Polyline(
+        points=points[kept],
+        feed=feed[moves],
+        block=block[moves],
+        rapid=plan.program.kind[block[moves]] == Kind.RAPID,
+        miss=float(misses.max()),
+    )
+
+
+def programmed_polyline(plan: Plan, within: float) -> Polyline:
+    """The programmed path as a polyline, at the programmed feeds: straight moves as they are, arcs and curves as chords.
+
+    within : how far chords may be from arcs and curves [mm]
+    """
+    toolpath = plan.toolpath
+    chord = np.sqrt(8.0 * within / np.maximum(toolpath.curvature, 1e-12))
+    count = np.where(toolpath.straight, 1, np.ceil(toolpath.length / chord)).astype(np.int64)
+    segment = np.repeat(np.arange(len(toolpath)), count)
+    number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 1
+    ends = toolpath.end[segment].copy()
+    inner = np.flatnonzero(number < count[segment])
+    at = segment[inner]
+    along = toolpath.length[at] * number[inner] / count[at]
+    bent = toolpath.arc[at] >= 0
+    arcs, curves = at[bent], at[~bent]
+    ends[inner[bent]] = toolpath.arcs.center[toolpath.arc[arcs]] + arc_point(toolpath, arcs, along[bent])
+    ends[inner[~bent]] = toolpath.curves.at(toolpath.curve[curves], toolpath.length[curves], along[~bent])[
+        :, 0
+    ]
+    vertices: FloatArray = np.vstack([toolpath.start[:1], ends])
+    return Polyline(
+        points=_rounded(vertices),
+        feed=toolpath.feed[segment],
+        block=toolpath.block[segment],
+        rapid=toolpath.rapid[segment],
+        miss=within if len(inner) else 0.0,
+    )
+
+
+def _rounded(points: FloatArray) -> FloatArray:
+    """Points (n, A) as they are written."""
+    found: FloatArray = np.round(points, DECIMALS)
+    return found
+
+
+def _fixed(plan: Plan, trajectory: Trajectory) -> Array:
+    """(T,) setpoints that are vertices: ends, standstills, where rapid moves begin and end, and where words without a motion stand."""
+    fixed = np.zeros(len(trajectory), dtype=bool)
+    fixed[[0, -1]] = True
+    at_rest = trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
+    fixed |= at_rest
+    rapid = plan.program.kind[trajectory.block] == Kind.RAPID
+    fixed[:-1] |= rapid[1:] != rapid[:-1]
+    events = np.unique([event.block for event in plan.program.events if event.block < len(plan.program)])
+    if len(events):
+        passed = np.searchsorted(events, trajectory.block, side="right")
+        fixed[:-1] |= passed[1:] != passed[:-1]
+    return fixed
+
+
+def _density(trajectory: Trajectory, within: float) -> FloatArray:
+    """(T,) vertices per mm of path, at least one for the whole of it."""
+    v, a = trajectory.velocity, trajectory.acceleration
+    speed_sq = (v * v).sum(axis=1)
+    moving = speed_sq > 1e-12 * max(float(speed_sq.max()), 1e-12)
+    along = np.divide((v * a).sum(axis=1), speed_sq, out=np.zeros(len(v)), where=moving)
+    across = np.linalg.norm(a - along[:, None] * v, axis=1)
+    kappa = np.divide(across, speed_sq, out=np.zeros(len(v)), where=moving)
+    density: FloatArray = np.sqrt(kappa / (8.0 * within)) + 1.0 / max(float(trajectory.s[-1]), 1e-9)
+    return density
+
+
+def _misses(position: FloatArray, rows: Array, points: FloatArray) -> FloatArray:
+    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1, A) at `rows`."""
+    move = np.clip(np.searchsorted(rows, np.arange(len(position)), side="right") - 1, 0, len(rows) - 2)
+    a, b = points[move], points[move + 1]
+    chord = b - a
+    size = (chord * chord).sum(axis=1)
+    u = np.divide(((position - a) * chord).sum(axis=1), size, out=np.zeros(len(position)), where=size > 0)
+    off: FloatArray = np.linalg.norm(position - a - np.clip(u, 0.0, 1.0)[:, None] * chord, axis=1)
+    return off

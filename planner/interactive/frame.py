@@ -1,0 +1,29 @@
+"""The setpoints of a plan as a table of pandas."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from planner.base.errors import InputError
+from planner.report.trajectory_file import columns_of, units
+
+if TYPE_CHECKING:
+    import pandas
+
+    from planner.job.plan import Plan
+
+
+def plan_frame(plan: Plan) -> pandas.DataFrame:
+    """`Plan.to_pandas`: a row for each setpoint."""
+    try:
+        pd = import_module("pandas")
+    except ImportError as fault:
+        raise InputError(
+            "a table needs the package pandas: pip install 'feedrate-planner[notebook]'"
+        ) from fault
+    trajectory = plan.require().trajectory
+    assert trajectory is not None
+    table: pandas.DataFrame = pd.DataFrame(columns_of(trajectory))
+    table.attrs["units"] = units(trajectory.axes)
+    return table

@@ -1,0 +1,87 @@
+"""A program of points: straight moves from one to the next, for paths that do not come from an NC program."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.nc.program import Kind, PathControl, Program
+
+AXES = ("x", "y", "z")
+SOURCE = "<points>"
+
+
+def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float | None = None) -> Program:
+    """A program that goes straight from each point to the next.
+
+    points    : (n, 2) or (n, 3) x, y and z, n > 1 [mm]; z is 0 where there is none
+    feed      : [mm/s], one for all moves or (n-1,) one for each; None for rapid moves, which only the machine's limits hold
+    tolerance : contour error budget [mm]; None for that of the machine
+
+    `Program.line` counts the moves from 1.
+
+    Raises InputError for arrays of another shape, values that are not finite, and feeds or a tolerance that are not above 0.
+
+    >>> import planner
+    >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
+    >>> len(square), square.end[1].tolist()
+    (4, [20.0, 20.0, 0.0])
+    >>> planner.plan(square, "mill", method="stop").verdict.passed
+    True
+    """
+    position = _points(points)
+    moves = len(position) - 1
+    if tolerance is not None and not 0 < tolerance < np.inf:
+        raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
+    nothing, none = np.zeros(0), np.zeros((0, len(AXES)))
+    return Program(
+        source=SOURCE,
+        axes=AXES,
+        start=position[0],
+        kind=np.full(moves, Kind.RAPID if feed is None else Kind.LINE),
+        end=position[1:],
+        feed=np.full(moves, np.inf) if feed is None else _feeds(feed, moves),
+        dwell=np.zeros(moves),
+        line=np.arange(1, moves + 1),
+        path_control=np.full(moves, PathControl.BLEND),
+        tolerance=np.full(moves, np.nan if tolerance is None else tolerance),
+        arc_block=nothing,
+        arc_center=none,
+        arc_normal=nothing,
+        arc_sweep=nothing,
+    )
+
+
+def _points(points: ArrayLike) -> FloatArray:
+    """(n, 3) the points. Raises InputError unless they are (n, 2) or (n, 3) finite numbers, n > 1."""
+    try:
+        given = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(
+            "points: not an array of numbers; give (n, 2) or (n, 3), one row for each point"
+        ) from None
+    if given.ndim != 2 or given.shape[1] not in (2, 3) or len(given) < 2:
+        raise InputError(f"points: shape {given.shape}; it must be (n, 2) or (n, 3) with at least two points")
+    bad = np.logical_not(np.isfinite(given).all(axis=1))
+    _refuse("points: row", bad, given, "every coordinate must be finite")
+    return np.pad(given, ((0, 0), (0, len(AXES) - given.shape[1])))
+
+
+def _feeds(feed: ArrayLike, moves: int) -> FloatArray:
+    """(moves,) feeds [mm/s]. Raises InputError unless they are one number, or one above 0 for each move."""
+    given = np.asarray(feed, dtype=np.float64)
+    if given.shape not in ((), (moves,)):
+        raise InputError(f"feed: shape {given.shape}; give one number, or one for each of the {moves} moves")
+    given = np.broadcast_to(given, (moves,))
+    bad = np.logical_not(np.isfinite(given) & (given > 0))
+    _refuse("feed: move", bad, given, "every feed must be above 0 mm/s, and finite")
+    return given
+
+
+def _refuse(what: str, bad: NDArray[np.bool_], given: FloatArray, needed: str) -> None:
+    """Raise InputError naming the first row of `given` (n, ...) that is `bad` (n,)."""
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise InputError(f"{what} {first + 1}: {given[first].tolist()}; {needed}")

@@ -1,0 +1,108 @@
+"use strict";
+// Methods side by side: columns of method k are c.mK_t, c.mK_feed ... (comparison_page.py).
+(async () => {
+  const about = JSON.parse(document.getElementById("about").textContent), rows = about.rows, c = {};
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
+  const ink = dark ? "#e6e9ef" : "#1d2430", dim = dark ? "#97a1b2" : "#667085", rule = dark ? "#2e3744" : "#d9dee7";
+  const ARRAYS = { f4: Float32Array, i4: Int32Array };
+  const BUCKETS = 1500, POINTS_OF_PATH = 8000;
+  const element = (id) => document.getElementById(id);
+  const make = (tag, text, className) => {
+    const made = document.createElement(tag);
+    if (text !== undefined) made.textContent = text;
+    if (className) made.className = className;
+    return made;
+  };
+  const digits = (value, n = 4) => (value === null || value === undefined || !Number.isFinite(value) ? "–" : Number(value.toPrecision(n)).toString());
+  async function unpack(name, type) {
+    const held = element("column-" + name), raw = atob(held.textContent), bytes = new Uint8Array(raw.length);
+    for (let k = 0; k < bytes.length; k++) bytes[k] = raw.charCodeAt(k);
+    held.remove();
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    c[name] = new ARRAYS[type](await new Response(stream).arrayBuffer());
+  }
+  await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
+  const hidden = new Set();
+  let against = "t";
+
+  element("subtitle").textContent = `${rows.length} methods on machine ${about.machine}; ${about.blocks.toLocaleString()} blocks`;
+  const quantities = [...new Set(rows.flatMap((row) => Object.keys(row.worst)))];
+  const head = make("tr");
+  for (const name of ["method", "cycle time [s]", "ratio to best", ...quantities.map((q) => q.replaceAll("_", " ") + " / limit"), "contour error [µm]", "planning [s]", "verdict"])
+    head.append(make("th", name));
+  element("methods").append(head);
+  rows.forEach((row, k) => {
+    const line = make("tr", undefined, row.shown ? "choice" : ""), name = make("td", row.method);
+    const key = make("span", "■ ");
+    key.style.color = row.shown ? about.colours[k] : "transparent";
+    name.prepend(key);
+    if (row.method === about.best) name.style.fontWeight = "600";
+    line.append(name, make("td", digits(row.cycle_time, 6)), make("td", digits(row.ratio, 5)));
+    for (const quantity of quantities) {
+      const ratio = row.worst[quantity], text = digits(ratio, 4), free = row.free.includes(quantity);
+      line.append(make("td", free ? `(${text})` : text, !free && ratio > 1 + 1e-6 ? "bad" : ""));
+    }
+    line.append(make("td", row.contour_error === null ? "–" : digits(1000 * row.contour_error, 4)), make("td", digits(row.planning_time, 3)));
+    line.append(make("td", row.outcome, row.outcome === "passed" ? "" : "bad"));
+    if (row.shown) line.onclick = () => {
+      if (!hidden.delete(k)) hidden.add(k);
+      line.classList.toggle("off", hidden.has(k));
+      draw();
+    };
+    element("methods").append(line);
+    if (row.outcome !== "passed") element("notes").append(make("li", `${row.method}: ${row.sentence}`));
+    if (row.free.length) element("notes").append(make("li", `${row.method} does not limit ${row.free.join(", ")} (in brackets)`));
+  });
+
+  const shown = rows.map((_, k) => k).filter((k) => rows[k].shown);
+  const column = (k, name) => c[`m${k}_${name}`];
+  const bare = { displaylogo: false, responsive: true };
+  const look = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, showlegend: false,
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink }, uirevision: "keep" };
+  const axis3d = (title, visible = true) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, visible });
+  function paths() {
+    return shown.map((k) => {
+      const n = column(k, "t").length, step = Math.max(1, Math.ceil(n / POINTS_OF_PATH)), keep = (name) => column(k, name).filter((_, i) => i % step === 0 || i === n - 1);
+      return { type: "scatter3d", mode: "lines", x: keep("x"), y: keep("y"), z: keep("z"), name: rows[k].method, line: { width: 3, color: about.colours[k] },
+        visible: !hidden.has(k), customdata: keep("line"), hovertemplate: `${rows[k].method}, line %{customdata}<extra></extra>` };
+    });
+  }
+  function bucketed(base, values, scale) {
+    const size = Math.max(1, Math.ceil(values.length / BUCKETS)), x = [], y = [];
+    for (let from = 0; from < values.length; from += size) {
+      let low = from, high = from;
+      for (let k = from; k < Math.min(from + size, values.length); k++) {
+        if (values[k] < values[low]) low = k;
+        if (values[k] > values[high]) high = k;
+      }
+      for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) { x.push(base[k]); y.push(values[k] * scale); }
+    }
+    return { x, y };
+  }
+  const title = { t: "time [s]", s: "length along the path [mm]", line: "NC line" };
+  function profile(name, scale) {
+    return shown.map((k) => ({ type: "scatter", mode: "lines", ...bucketed(column(k, against), column(k, name), scale), name: rows[k].method,
+      visible: !hidden.has(k), line: { color: about.colours[k], width: 1.4 } }));
+  }
+  const layout = (text) => ({ ...look, margin: { l: 62, r: 14, t: 8, b: 42 }, xaxis: { title: { text: title[against] }, gridcolor: rule },
+    yaxis: { title: { text }, gridcolor: rule, zerolinecolor: rule, rangemode: "tozero" } });
+  const extents = ["x", "y", "z"].map((axis) => shown.reduce(([a, b], k) => column(k, axis).reduce(([u, v], w) => [Math.min(u, w), Math.max(v, w)], [a, b]), [Infinity, -Infinity]));
+  const size = Math.max(...extents.map(([a, b]) => b - a), 1e-9), flat = extents[2][1] - extents[2][0] < 0.12 * size;
+  const camera = { projection: { type: "orthographic" }, eye: flat ? { x: 0, y: 0, z: 1.6 } : { x: 1.2, y: -1.3, z: 0.9 },
+    up: flat ? { x: 0, y: 1, z: 0 } : { x: 0, y: 0, z: 1 } };
+  const space = { ...look, margin: { l: 0, r: 0, t: 0, b: 0 },
+    scene: { aspectmode: "data", xaxis: axis3d("x"), yaxis: axis3d("y"), zaxis: axis3d("z", !flat), camera } };
+  async function draw() {
+    await Plotly.react("path", paths(), space, bare);
+    await Plotly.react("feed", profile("feed", 1), layout("feed [mm/s]"), bare);
+    await Plotly.react("deviation", profile("deviation", 1000), layout("distance [µm]"), bare);
+  }
+  for (const button of element("against").children) button.onclick = () => {
+    against = button.dataset.against;
+    for (const other of element("against").children) other.classList.toggle("on", other === button);
+    draw();
+  };
+  if (shown.length) await draw();
+  window.comparison = { state: () => ({ shown: shown.length, hidden: [...hidden], against }) };
+  document.body.dataset.ready = "yes";
+})();

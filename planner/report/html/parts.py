@@ -1,0 +1,56 @@
+"""Parts that pages share: columns of numbers, plotly's script, templates, and filling these."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import Array
+from planner.base.errors import InputError
+
+LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
+
+
+def filled(page: str, parts: Mapping[str, str]) -> str:
+    """A page with its places @@NAME@@ filled."""
+    return "".join(parts.get(piece, piece) for piece in page.split("@@"))
+
+
+def columns_text(columns: Mapping[str, Array]) -> str:
+    """The `columns` of numbers, each (n,), as elements of a page."""
+    return "\n".join(
+        f'<script type="text/plain" id="column-{name}">{packed(column)}</script>'
+        for name, column in columns.items()
+    )
+
+
+def json_text(value: Any) -> str:
+    """JSON that may stand in a script element."""
+    return json.dumps(value, allow_nan=False).replace("<", "\\u003c")
+
+
+def packed(column: Array) -> str:
+    """Bytes of a `column` (n,), compressed, as base64."""
+    data = np.ascontiguousarray(column)
+    little = data.astype(data.dtype.newbyteorder("<"), copy=False)
+    return base64.b64encode(gzip.compress(little.tobytes(), LEVEL, mtime=0)).decode("ascii")
+
+
+def plotly_script() -> str:
+    """plotly's script, to be run by the page that it stands in. Raises InputError if plotly is not installed."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as fault:
+        raise InputError("a report needs the package plotly: pip install plotly") from fault
+    return str(get_plotlyjs()).replace("</script", "<\\/script")
+
+
+def template(name: str) -> str:
+    """A part of a page, from the package."""
+    return (resources.files("planner") / "report" / "html" / name).read_text(encoding="utf-8")

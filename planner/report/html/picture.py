@@ -1,0 +1,60 @@
+"""The path of a plan as a small picture (SVG), drawn before any script runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.machine import LINEAR_AXES
+from planner.report.colours import CIVIDIS
+
+if TYPE_CHECKING:
+    from planner.job.plan import Plan
+
+POINTS = 3000  # of the motion: several for each pixel of its width
+
+
+def path_picture(plan: Plan, size: float) -> str:
+    """The motion seen along its thinnest direction, coloured by feed, as SVG. The plan must have a trajectory.
+
+    size : of the longer side [px]
+    """
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    rows = np.unique(np.linspace(0, len(trajectory) - 1, min(POINTS, len(trajectory))).astype(np.int64))
+    shown = trajectory.rows(rows)
+    position = shown.position[:, [k for k, axis in enumerate(shown.axes) if axis in LINEAR_AXES]]
+    across = np.sort(np.argsort(-np.ptp(position, axis=0), kind="stable")[:2])
+    points = position[:, across] * [1.0, -1.0]  # the picture's y goes down
+    extent = np.ptp(points, axis=0)
+    scale = size / max(float(extent.max()), 1e-9)
+    points = (points - points.min(axis=0)) * scale + 4.0
+    width, height = extent * scale + 8.0
+    asked = np.isfinite(
+        plan.program.feed[shown.block]
+    )  # rapids have the colour of the fastest move with a feed
+    highest = float(shown.feed[asked].max() if asked.any() else shown.feed.max())
+    colour = np.minimum(shown.feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
+    lines = "".join(
+        f'<polyline points="{_points(points[first : last + 1])}" stroke="{CIVIDIS[colour[first]]}"/>'
+        for first, last in _runs(colour)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
+        f'height="{height:.0f}" role="img" '
+        f'aria-label="path coloured by feed" fill="none" stroke-width="1.6" stroke-linecap="round">{lines}</svg>'
+    )
+
+
+def _runs(colour: Array) -> list[tuple[int, int]]:
+    """First and last point of the lines of one colour, each up to the first point of the next."""
+    starts = np.flatnonzero(np.append(True, np.diff(colour) != 0))
+    ends = np.append(starts[1:], len(colour) - 1)
+    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
+
+
+def _points(points: FloatArray) -> str:
+    """Points (n, 2) as SVG writes them."""
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

@@ -1,0 +1,64 @@
+"""Where more of a limit, of the feed or of the tolerance would save time: the prices of a plan by place.
+
+The Lagrangian is a sum over the intervals of the grid (feedrate/lagrangian.py), so what changes on one segment alone, an F word or the
+limits there, is priced by the multipliers of its own points and intervals. For a finite change, straight lines in one over the limit
+are taken, as for the limits of the whole program (sensitivity/prices.py):
+
+    feed    -2 sum mu_i (1 - sqrt(X_i / X'_i))             X, X' the bounds of feed^2 without and with more of the programmed feed
+    limits  (sum lam g + 2 sum mu_i) (1 - 1/(1 + more))     all bounds at once: of feed, velocity, acceleration and jerk
+
+with multipliers lam of the rows g and mu of the bounds. A neighbour that cannot follow makes the true saving smaller.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.constraints.assemble import feedrate_problem
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.lagrangian import Lagrangian
+from planner.job.records import PlacePrices
+from planner.path.samples import PathSamples
+from planner.sensitivity.savings import Change
+
+MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-]
+
+
+def by_place(
+    samples: PathSamples,
+    problem: FeedrateProblem,
+    now: Lagrangian,
+    faster: Change,
+    by_joint: FloatArray | None,
+) -> PlacePrices:
+    """The prices of a solution by place.
+
+    now      : the Lagrangian at the solution
+    faster   : more of the programmed feed
+    by_joint : (R+1,) dT/d(tolerance) at the joints of the path's legs [s/mm]; None where it is not known
+    """
+    segments = len(samples.path.toolpath)
+    share = 1.0 - np.sqrt(problem.feed_sq_max / bounds_with(samples, faster, MORE_LIMIT))
+    all_limits = -(now.rows + 2.0 * now.feed_sq_max) * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
+    of_feed = -2.0 * now.feed_sq_max * share
+    tolerance = None
+    if by_joint is not None and isinstance(samples.path, SmoothPath):
+        tolerance = np.zeros(segments + 1)
+        np.add.at(tolerance, samples.path.legs.first, by_joint)
+    return PlacePrices(
+        feed=np.bincount(samples.segment, of_feed, segments).astype(np.float64),
+        limits=np.bincount(samples.segment, all_limits, segments).astype(np.float64),
+        tolerance=tolerance,
+    )
+
+
+def bounds_with(samples: PathSamples, change: Change, share: float) -> FloatArray:
+    """(P,) bounds of feed^2 with a share more feed or axis velocity [mm2/s2]."""
+    toolpath = samples.path.toolpath
+    faster = dataclasses.replace(toolpath, feed=toolpath.feed * change.feed(share))
+    there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=faster))
+    return feedrate_problem(there, change.machine(share)).feed_sq_max

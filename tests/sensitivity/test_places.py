@@ -1,0 +1,66 @@
+"""Prices by place: closed forms of a straight line, sums, and jobs planned again with more feed on one line."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planner
+from planner.job.plan import Plan
+from planner.job.records import PlacePrices
+from planner.machine import load_machine
+from planner.sensitivity.places import MORE_LIMIT
+
+MILL = load_machine("mill")
+TENTH = 1.0 - 1.0 / (1.0 + MORE_LIMIT)
+
+
+def places_of(plan: Plan) -> PlacePrices:
+    assert plan.prices is not None
+    assert plan.prices.places is not None
+    return plan.prices.places
+
+
+def test_a_straight_line_has_its_closed_form() -> None:
+    """T = L/F + 2 (F/j)^(1/2) where the acceleration stays below its limit: all limits together, d/d(ln F) + d/d(ln j), save L/F."""
+    length, feed, jerk = 100.0, 100.0, MILL.axes["x"].jerk
+    plan = planner.plan(planner.path([[0, 0], [length, 0]], feed=feed), MILL)
+    assert plan.cycle_time == pytest.approx(length / feed + 2.0 * np.sqrt(feed / jerk), rel=1e-3)
+    places = places_of(plan)
+    assert places.limits == pytest.approx([length / feed * TENTH], rel=1e-2)
+    assert places.feed == pytest.approx([(length / feed - np.sqrt(feed / jerk)) * TENTH], rel=1e-2)
+
+
+@pytest.fixture(scope="module")
+def zigzag() -> Plan:
+    program = planner.path([[0, 0], [30, 0], [35, 20], [60, 25], [60, 60]], feed=[40.0, 60.0, 80.0, 500.0])
+    return planner.plan(program, MILL, geometry="corners")
+
+
+@pytest.mark.parametrize("segment", [0, 2, 3])
+def test_more_feed_on_one_line_saves_what_is_foretold(zigzag: Plan, segment: int) -> None:
+    program = zigzag.program
+    feed = program.feed.copy()
+    feed[segment] *= 1.0 + MORE_LIMIT
+    again = planner.plan(dataclasses.replace(program, feed=feed), MILL, geometry="corners")
+    saved = zigzag.cycle_time - again.cycle_time
+    told = places_of(zigzag).feed[segment]
+    if segment == 3:  # no motion on the mill reaches 500 mm/s in 35 mm
+        assert (saved, told) == pytest.approx((0.0, 0.0), abs=1e-4)
+    else:
+        assert told == pytest.approx(saved, rel=0.1)
+        assert saved > 0.02
+
+
+def test_places_add_up_to_the_whole(zigzag: Plan) -> None:
+    assert zigzag.prices is not None
+    places = places_of(zigzag)
+    assert places.tolerance is not None
+    assert zigzag.prices.tolerance is not None
+    assert len(places.tolerance) == 5
+    assert places.tolerance[[0, -1]].tolist() == [0.0, 0.0], "nothing is rounded where the motion stops"
+    assert places.tolerance.sum() == pytest.approx(zigzag.prices.tolerance, rel=0.05)
+    assert places.feed.sum() == pytest.approx(-zigzag.prices.feed * TENTH, rel=0.05)
+    assert (places.limits >= places.feed - 1e-6).all()

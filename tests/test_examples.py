@@ -1,0 +1,52 @@
+"""The examples in docstrings of public names, and those of docs/python.md, run as they stand."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from importlib import import_module
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+MODULES = [
+    "planner",
+    "planner.interactive.given_motion",
+    "planner.interactive.points",
+    "planner.nc.reader",
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_in_docstrings(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    done = doctest.testmod(import_module(name))
+    assert done.attempted > 0
+    assert done.failed == 0
+
+
+def test_every_module_with_an_example_is_tested() -> None:
+    with_example = {
+        ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for file in (ROOT / "planner").rglob("*.py")
+        if ">>> " in file.read_text(encoding="utf-8")
+    }
+    assert with_example == set(MODULES)
+
+
+@pytest.mark.slow
+def test_the_page_on_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pandas")
+    mpl.use("agg")
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    for needed in ("planner/examples/bracket.ngc",):
+        page = page.replace(needed, str(ROOT / needed))
+    monkeypatch.chdir(tmp_path)
+    seen: dict = {}
+    for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(example, seen)
+    assert seen["p"].verdict.passed
+    assert seen["judged"].passed
+    assert {one.name for one in Path("out").iterdir()} >= {"summary.json", "report.html"}

@@ -44,7 +44,9 @@ def test_a_package_that_was_built_plans_without_compiling(tmp_path: Path) -> Non
     assert len(built) > 30
     assert all(name.endswith(".kernel") for name in built)
     job = tmp_path / "job.ngc"
-    job.write_text("G21 G90 G64 P0.02 F3000\nG1 X20\nG2 X24 Y4 I4\nG1 X40 Y3 Z1\nX15 Y20\nM2\n", encoding="utf-8")
+    job.write_text(
+        "G21 G90 G64 P0.02 F3000\nG1 X20\nG2 X24 Y4 I4\nG1 X40 Y3 Z1\nX15 Y20\nM2\n", encoding="utf-8"
+    )
     cache = tmp_path / "cache"
     assert cycle_time(job, build, NUMBA_CACHE_DIR=str(cache)) == cycle_time(job, ROOT)
     assert not cache.exists()  # nothing was compiled

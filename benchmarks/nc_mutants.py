@@ -3,7 +3,7 @@
     python -m benchmarks.nc_mutants [COUNT] [--seed N] [--folder FOLDER]
 
 The programs are pieces of those in FOLDER and of a list of constructs of all dialects, with lines, words and bytes changed, doubled,
-swapped and cut, read with settings by chance. Each has `SECONDS` and the process `MEMORY`. Prints what it found;
+swapped and cut, read with settings by chance. Each has `SECONDS` and the process `MEMORY`. Writes results/nc-mutants.json and .md;
 exit code 1 for a crash or a hang, with the program's seed.
 """
 
@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from benchmarks.record import markdown, write_results
 
 SECONDS = 20  # of computing for one program; the slowest of ordinary ones takes some hundredths
 NOTES_MAX = 200
@@ -36,6 +38,13 @@ M6 T1\nT2 M6 G43 H2\nM0\nM1\nM30\nM2\nM60\nM62 P1\nM66 P0 L3\nA0. B0\nG1 X5 A90.
 o100 call [1] [2]\no101 if [#1 GT 2]\no101 else\no101 endif\no102 while [#1 LT 5]\n#1=[#1+1]\no102 endwhile\no103 repeat [3]
 o103 endrepeat\nIF [#1 EQ 5] GOTO 10\nN10\nWHILE [#1 LT 5] DO 1\nEND 1\nX1e-05 Y-8.775e-05\n(comment)\n; comment\n/G0 X5
 BEGIN PGM 1 MM\nL X+5 Y+2 FMAX\nDEF REAL A\nCYCLE800()\nIN;PU0,0;PD400,0;PD400,400;\nAA0,0,90;\nRT1,2,3,4;\nSP1;ZZ5;\nSC0,1,0,1;
+G71 U2. R0.5\nG71 P10 Q20 U0.5 W0.1 F0.2\nN10 G0 X20\nN20 X40 Z-20\nG70 P10 Q20\nG72 P10 Q20 D1. U0 W.1
+G73 P10 Q20 I2. K1. D3\nG0 U2 W-1\nG99
+G76 P010060 Q50 R0.02\nG76 X16.9 Z-25. P1534 Q485 F2.5\nG32 Z-5 F1.\nG96 S200\nG50 S3000\nT0101\nG54.1 P3\nG33.1 Z-5 K1
+CYCL DEF 200 Q200=2 Q201=-5 Q206=100 Q202=2 Q203=0 Q204=10 Q211=0\nCYCL CALL\nCC X+1 Y+1\nC X+5 Y+1 DR+\nRND R2\nLBL 1\nCALL LBL 1 REP 3
+LBL 0\nQ1 = Q2 + 3\nFN 9: IF +Q1 EQU +Q2 GOTO LBL 1\nCP IPA+360 DR+\nTOOL CALL 1 Z S1000 F100\nEND PGM 1 MM
+MCALL CYCLE81(5,0,2,-5)\nMCALL\nFOR I=1 TO 5\nENDFOR\nLOOP\nENDLOOP\nIF R1==1 GOTOF ENDE\nENDE:\nX=IC(2) Y=AC(3)\nR1=R1+1\nTRANS X5
+HOLE P3\nCALL "A"\nPROC B(REAL C)\nRET\nREPEAT\nUNTIL R1>3\nREPEAT ENDE P=2
 0\nSECTION\nsolid a\nfacet normal 0 0 1\nG0 X1 (open\nG0 X--1\nG1 X1..2\nG999 X1\nM-3\nS-5\nF0\nX99999999999\nG187 P1\nM73 P1 R70
 """.splitlines()
 _BYTES = b'GMXYZIJKRPQFSTNHDEABCUVWLO0123456789.+-#[]()<>=%/$:;,* \t\n\r"\x00\x80\xff\x1b'
@@ -151,8 +160,11 @@ def main() -> None:
         if seed % 1000 == 0:
             print(f"{seed}: {dict(found)}", flush=True)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(
-        f"{options.count:,} programs: {dict(found)}; peak memory {peak:.2f} GB; crashed or hung: {bad[:20]}"
+    rows = [[name, f"{times:,}"] for name, times in sorted(found.items())]
+    table = markdown(["what became of it", "programs"], [*rows, ["peak memory [GB]", f"{peak:.2f}"]])
+    print(table, f"crashed or hung: {bad[:20]}", sep="\n")
+    write_results(
+        "nc-mutants", {"seed": options.seed, "found": dict(found), "peak_GB": peak, "bad": bad}, table
     )
     sys.exit(1 if bad else 0)
 

@@ -6,6 +6,8 @@ template with every key and its unit.
 
 from __future__ import annotations
 
+import difflib
+import re
 import tomllib
 from collections.abc import Sequence
 from importlib import resources
@@ -26,11 +28,19 @@ from pydantic import (
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.files import require_ending
+from planner.base.names import known_name
 from planner.base.units import RAD_PER_DEG
 from planner.constraints.own import OwnLimit, check_names
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
+M_DIGITS = 5  # of an M code: no control has more
+TIMED_BY_NAME = {
+    3: "spindle_start",
+    4: "spindle_start",
+    5: "spindle_stop",
+    6: "tool_change",
+}  # keys of [times]
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -96,6 +106,36 @@ class ToolData(_Record):
     diameter: NotNegative = 0.0
 
 
+class Times(_Record):
+    """What takes time while the axes stand still, beside dwells [s]; None where it is not known, and left out of totals.
+
+    tool_change   : M6, with stopping the spindle, and of plotters another pen
+    spindle_start : M3 and M4, until the spindle turns as it should
+    spindle_stop  : M5, and the stop before it turns the other way
+    m_code        : every other M code that `m_codes` does not name
+    m_codes       : of single codes, such as {"M8": 0.5}; M0, M1 and M60 too, which otherwise wait for a person
+    """
+
+    tool_change: NotNegative | None = None
+    spindle_start: NotNegative | None = None
+    spindle_stop: NotNegative | None = None
+    m_code: NotNegative | None = None
+    m_codes: dict[str, NotNegative] = {}
+
+    @field_validator("m_codes")
+    @classmethod
+    def _codes_known(cls, codes: dict[str, float]) -> dict[str, float]:
+        found = {}
+        for code, seconds in codes.items():
+            name = code.strip().upper().removeprefix("M")
+            if not name.isdecimal() or len(name) > M_DIGITS:
+                raise ValueError(f"'{code[:10]}' is not an M code; write e.g. M8 = 0.5")
+            if int(name) in TIMED_BY_NAME:
+                raise ValueError(f"M{int(name)} has a key of its own: {TIMED_BY_NAME[int(name)]}")
+            found[f"M{int(name)}"] = seconds
+        return found
+
+
 class DialectData(_Record):
     """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit; `lathe`
     says whether they are a lathe's, or None: their words tell."""
@@ -131,6 +171,7 @@ class Machine(_Record):
     modes: tuple[Mode, ...] = ()
     plotter: Plotter | None = None
     dialect: DialectData | None = None
+    times: Times | None = None
     tools: dict[str, ToolData] = {}
     positions: dict[str, dict[str, Finite]] = {}
     work_offsets: dict[str, dict[str, Finite]] = {}
@@ -166,7 +207,7 @@ class Machine(_Record):
     def _names_known(self) -> Machine:
         for table, allowed in (("positions", ("g28", "g30")), ("work_offsets", WORK_OFFSETS)):
             for key, values in getattr(self, table).items():
-                if key not in allowed:
+                if key not in allowed and not (table == "work_offsets" and _FURTHER_OFFSET.fullmatch(key)):
                     raise ValueError(f"{table}: '{key}' is not known; allowed are {', '.join(allowed)}")
                 for letter in values:
                     if letter not in LINEAR_AXES:
@@ -208,6 +249,7 @@ class Machine(_Record):
         return machine
 
 
+_FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
 
 
@@ -248,7 +290,7 @@ def builtin_machines() -> tuple[str, ...]:
 def builtin_text(name: str) -> str:
     """The commented TOML of a built-in machine. Raises InputError for an unknown name."""
     if name not in builtin_machines():
-        raise InputError(f"no built-in machine '{name}'; there are {', '.join(builtin_machines())}")
+        known_name("built-in machine", name, builtin_machines())
     return (resources.files("planner") / "machines" / f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -258,12 +300,32 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())
+        near = difflib.get_close_matches(str(path), builtin_machines(), n=1)
+        hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise InputError(
-            f"machine file not found; give a TOML file or one of the built-in machines: {names}",
+            f"machine file not found; give a TOML file or one of the built-in machines: {names}{hint}",
             source=str(path),
         ) from fault
     except (OSError, UnicodeDecodeError) as fault:
         raise InputError(f"machine file cannot be read: {fault}", source=str(path)) from fault
+
+
+_TABLES: dict[str, type[_Record]] = {
+    "axes": Axis,
+    "fir": Fir,
+    "modes": Mode,
+    "plotter": Plotter,
+    "dialect": DialectData,
+    "times": Times,
+    "tools": ToolData,
+}
+
+
+def _near(place: tuple[int | str, ...]) -> str:
+    """A key of the same table of a machine file that is spelled nearly like an unknown one, as a question; or nothing."""
+    table = Machine if len(place) == 1 else _TABLES.get(str(place[0]))
+    near = difflib.get_close_matches(str(place[-1]), table.model_fields if table else (), n=1)
+    return f" (did you mean '{near[0]}'?)" if near else ""
 
 
 # What is needed where pydantic finds a fault of a type; {gt} and so on are its context.
@@ -296,7 +358,7 @@ def faults_in_words(fault: ValidationError) -> str:
         if error["type"] == "missing":
             said.append(f"{key}: missing")
         elif error["type"] == "extra_forbidden":
-            said.append(f"{key}: unknown key")
+            said.append(f"{key}: unknown key{_near(error['loc'])}")
         elif error["type"] == "value_error":
             text = error["msg"].removeprefix("Value error, ")
             said.append(f"{key}: {text}" if key else text)

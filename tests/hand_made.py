@@ -146,4 +146,5 @@ def make_plan(
         notes=program.notes,
         timings={"read": 0.01, "solve": 0.02},
         solved=solved,
+        beside=(),
     )

@@ -66,6 +66,7 @@ LAYERS = (
     "planner.sensitivity",
     "planner.job.trace",
     "planner.job.stages",
+    "planner.job.beside",
     "planner.delivery",
     "planner.job",
     "planner.methods.kinematic",  # two motions that the loop compares its own with
@@ -75,6 +76,7 @@ LAYERS = (
     "planner.report",
     "planner.interactive",
     "planner.control_files",
+    "planner.study",
     "planner.commands",
     "planner.cli",
     "planner.__main__",

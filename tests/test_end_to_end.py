@@ -15,7 +15,7 @@ STOPPING = "--method stop --format npz"
 BRACKET = Path(__file__).resolve().parent.parent / "planner" / "examples" / "bracket.ngc"
 
 
-@pytest.mark.parametrize("arguments", slow_but([STOPPING], ["", "--corner fir", STOPPING]))
+@pytest.mark.parametrize("arguments", slow_but([STOPPING], ["", "--corner fir --effort quick", STOPPING]))
 def test_plan_then_verify_the_file(tmp_path: Path, arguments: str) -> None:
     out = tmp_path / "out"
     planned = CliRunner().invoke(app, ["plan", str(BRACKET), "-o", str(out), "--json", *arguments.split()])

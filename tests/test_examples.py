@@ -7,7 +7,6 @@ import re
 from importlib import import_module
 from pathlib import Path
 
-import matplotlib as mpl
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,17 +35,27 @@ def test_every_module_with_an_example_is_tested() -> None:
     assert with_example == set(MODULES)
 
 
+def examples(page: str) -> list[str]:
+    """The Python of a page in docs/."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
 @pytest.mark.slow
 def test_the_page_on_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pandas")
-    mpl.use("agg")
-    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
-    for needed in ("planner/examples/bracket.ngc",):
-        page = page.replace(needed, str(ROOT / needed))
     monkeypatch.chdir(tmp_path)
     seen: dict = {}
-    for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
-        exec(example, seen)
+    for example in examples("python.md"):
+        exec(example.replace("planner/examples/", f"{ROOT.as_posix()}/planner/examples/"), seen)
     assert seen["p"].verdict.passed
     assert seen["judged"].passed
     assert {one.name for one in Path("out").iterdir()} >= {"summary.json", "report.html"}
+
+
+def test_the_page_for_students_runs() -> None:
+    seen: dict = {}
+    for example in examples("student.md"):
+        exec(example, seen)
+    assert seen["round_"].cycle_time < seen["stop"].cycle_time
+    assert seen["round_"].verdict.passed

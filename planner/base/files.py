@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 from pathlib import Path
 
 from planner.base.errors import InputError
 
 STREAMS = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")  # where a shell's pipes and process substitutions are
+
+STDIN = "-"  # as a file name: the standard input
 
 
 def require_ending(path: str | Path) -> None:
@@ -24,3 +27,10 @@ def require_ending(path: str | Path) -> None:
         f"this is {what}; give a regular file, or the output of a program by | and /dev/stdin",
         source=str(path),
     )
+
+
+def standard_input() -> bytes:
+    """What is on the standard input, to its end. Raises OSError if there is none, or it cannot be read."""
+    if sys.stdin is None:  # closed by the caller: <&-
+        raise OSError("the standard input is closed")
+    return sys.stdin.buffer.read()

@@ -30,7 +30,9 @@ BESIDE = {
     "guide": "what FIR filters are led along: the legs of the program, or the fine chords of a smooth path (`fir/guide.py`)",
     "chord": "the straight line between two points of a curve: what the machine runs between two samples, or "
     "a line that stands for part of an arc",
-    "piece": "a part of a motion, in time: each axis has constant jerk in it; of a feedrate problem, the grid points of one run",
+    "joint step": "a step of path and feed together, with all limits linearised (`smoothing/joint.py`); no joint of the path",
+    "piece": "a part of a motion, in time: each axis has constant jerk in it; of a feedrate problem, the grid points of one run; "
+    "of a programmed curve, one rational cubic (`nc/bezier.py`)",
     "velocity pulse": "a leg of a guide, or some of it, that is commanded at one speed (`fir/command.py`); "
     "the pulses of a drive are the steps of its motor (`motion/pulses.py`)",
     "ramp": "where a motion only speeds up, or only brakes",

@@ -35,7 +35,6 @@ _LAYOUT = _LAYOUT_IN_C_S | 0x0002
 # Arguments whose type says all of numba's type; numbers of NumPy's are told by their dtype.
 _SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "none", str: "str"}
 
-_told: Callable[[bool], None] | None = None
 _warned = False
 _files: set[str] = set()
 _one_at_a_time = threading.RLock()
@@ -45,10 +44,28 @@ class KernelCacheWarning(UserWarning):
     """Compiled kernels cannot be kept."""
 
 
-def at_compilation(tell: Callable[[bool], None] | None) -> None:
-    """Call `tell` whenever a kernel is about to be compiled, with True if it is kept for the next run; None for no more calls."""
-    global _told
-    _told = tell
+class Compilation:
+    """Who is told of kernels that are compiled: `begins` with True for one that is kept for the next run, and `ends`."""
+
+    def begins(self, is_kept: bool) -> None:
+        """A kernel is about to be compiled."""
+
+    def ends(self) -> None:
+        """It is compiled."""
+
+
+_listener = Compilation()
+
+
+def at_compilation(listener: Compilation | None) -> None:
+    """Tell the listener of kernels that are compiled from now on; None for nobody."""
+    global _listener
+    _listener = listener or Compilation()
+
+
+def compilation() -> Compilation:
+    """Who is told."""
+    return _listener
 
 
 def files_used() -> list[str]:
@@ -110,9 +127,9 @@ class Kernel:
             where = kept.place(self.py_func, self.content, kind) if self._cache else None
             found = self._loaded(where) if where is not None else None
             if found is None:
-                if _told is not None:
-                    _told(where is not None and _can_be_kept)
+                _listener.begins(where is not None and _can_be_kept)
                 found = self._compiled(args, where)
+                _listener.ends()
             self._made[kind] = found
             return found
 

@@ -14,14 +14,15 @@ from planner.commands.machine import import_file, init_file, list_machines, show
 from planner.commands.plan import plan_command
 from planner.commands.pulses import pulses_command
 from planner.commands.report import report_command
+from planner.commands.sweep import sweep_command
 from planner.commands.verify import verify_command
+from planner.commands.what_if import what_if_command
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 
 app = typer.Typer(
     help="The fastest motion of an NC program within the limits of a machine, planned and verified.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # rich would take longer to import than everything else for --help
     context_settings=HELP_OPTIONS,
@@ -47,6 +48,8 @@ def common(
 
 for name, command in {
     "plan": plan_command,
+    "what-if": what_if_command,
+    "sweep": sweep_command,
     "compare": compare_command,
     "verify": verify_command,
     "info": info_command,

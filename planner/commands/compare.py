@@ -21,16 +21,8 @@ from planner.commands.options import (
     ToleranceOption,
     takes_reading,
 )
-from planner.commands.terminal import (
-    BAD_INPUT,
-    FAILED,
-    NOT_SOLVED,
-    ProgressBar,
-    guarded,
-    memory_used_up,
-    say,
-    show,
-)
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, guarded, memory_used_up, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
@@ -74,6 +66,8 @@ def compare_command(
 
     The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused the job.
     """
+    if force and output is None:
+        raise InputError("--force has no effect without a file to write; name one with -o FILE")
     methods = parse_methods(method)
     from planner.machine import load_machine
     from planner.nc.reader import read_program

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from planner.base.errors import InputError
 from planner.commands.options import DEFAULT_MACHINE, ForceOption, Job, MachineOption, takes_reading
 from planner.commands.terminal import guarded, say
 from planner.nc.reading import Reading
@@ -26,15 +27,16 @@ def expand_command(
     reading: Reading,
 ) -> None:
     """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
-    from planner.base.errors import InputError
+    if force and output is None:
+        raise InputError("--force has no effect without a file to write; name one with -o FILE")
     from planner.machine import load_machine
     from planner.nc.language.flat import flat_program
-    from planner.nc.reader import load
+    from planner.nc.reader import load, source_name
 
     if output is not None and output.exists() and not force:
         raise InputError("the file exists; give another name or --force", source=str(output))
     data = load(job)
-    found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=str(job))
+    found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=source_name(job))
     text = data if found is None else found[0].encode()
     if output is None:
         typer.echo(text, nl=False)

@@ -12,7 +12,8 @@ import os
 import signal
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 INTERRUPTED = 130  # exit code: 128 + SIGINT, what shells report
@@ -25,6 +26,22 @@ def end_at_interrupts() -> None:
         threading.current_thread() is threading.main_thread()
         and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     ):
+        signal.signal(signal.SIGINT, _end)
+
+
+@contextmanager
+def interrupts_raise() -> Iterator[None]:
+    """Within, Ctrl-C raises KeyboardInterrupt: for a process that only waits for others, and runs no kernel."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not _end
+    ):
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
         signal.signal(signal.SIGINT, _end)
 
 

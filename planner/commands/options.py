@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,8 +34,11 @@ def _use_threads(count: int | None) -> int | None:
     return count
 
 
-def _choice(name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME") -> Any:
-    """An option that takes a name that `check` knows; it may be an alias."""
+def _choice(
+    name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME", known: Iterable[str] = ()
+) -> Any:
+    """An option that takes a name that `check` knows; it may be an alias. `known` is what a shell offers."""
+    offered = [*known] or metavar.split("|")
 
     def parsed(text: str) -> str:
         try:
@@ -43,50 +46,66 @@ def _choice(name: str, check: Callable[[str], str], help_text: str, metavar: str
         except InputError as fault:
             raise typer.BadParameter(str(fault)) from None
 
-    return typer.Option(name, metavar=metavar, parser=parsed, help=help_text)
+    return typer.Option(
+        name,
+        metavar=metavar,
+        parser=parsed,
+        help=help_text,
+        autocompletion=lambda incomplete: [each for each in offered if each.startswith(incomplete)],
+    )
+
+
+def _machines(incomplete: str) -> list[str]:
+    """Built-in machines and machine files that a shell offers."""
+    from planner.machine import builtin_machines
+
+    folder = Path(incomplete).parent
+    files = [str(file) for file in folder.glob("*.toml")] if folder.is_dir() else []
+    return [name for name in (*builtin_machines(), *files) if name.startswith(incomplete)]
 
 
 SHAPING = " and ".join(names.users_of("geometry"))
-MethodOption = Annotated[
-    str,
-    _choice("--method", names.method_name, f"how to plan: {', '.join(names.METHODS)}"),
-]
-GeometryOption = Annotated[
-    str | None,
-    _choice(
-        "--geometry",
-        names.geometry_name,
-        f"how {SHAPING} smooth the path: spline (one spline from stop to stop), corners (each corner by itself), or auto (splines, or "
-        f"corners where they take less time; the default)",
-        "|".join(names.GEOMETRIES),
-    ),
-]
-CornerOption = Annotated[
-    str | None,
-    _choice(
-        "--corner",
-        names.corner_name,
-        f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
-        "|".join(names.CORNER_SHAPES),
-    ),
-]
-EffortOption = Annotated[
-    str | None,
-    _choice(
-        "--effort",
-        names.effort_name,
-        f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
-    ),
-]
-SolverOption = Annotated[
-    str | None,
-    _choice(
-        "--solver",
-        names.solver_name,
-        "solver; the first is the method's default: "
-        + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
-    ),
-]
+METHOD = _choice(
+    "--method", names.method_name, f"how to plan: {', '.join(names.METHODS)}", known=names.METHODS
+)
+GEOMETRY = _choice(
+    "--geometry",
+    names.geometry_name,
+    f"how {SHAPING} smooth the path: spline (one spline from stop to stop), corners (each corner by itself), or auto (splines, or "
+    f"corners where they take less time; the default)",
+    "|".join(names.GEOMETRIES),
+)
+CORNER = _choice(
+    "--corner",
+    names.corner_name,
+    f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
+    "|".join(names.CORNER_SHAPES),
+)
+EFFORT = _choice(
+    "--effort",
+    names.effort_name,
+    f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
+    known=names.EFFORTS,
+)
+SOLVER = _choice(
+    "--solver",
+    names.solver_name,
+    "solver; the first is the method's default: "
+    + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
+    known=names.SOLVERS,
+)
+ROUNDS = typer.Option(
+    "--rounds",
+    min=0,
+    help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
+)
+MethodOption = Annotated[str, METHOD]
+GeometryOption = Annotated[str | None, GEOMETRY]
+CornerOption = Annotated[str | None, CORNER]
+EffortOption = Annotated[str | None, EFFORT]
+SolverOption = Annotated[str | None, SOLVER]
+RoundsOption = Annotated[int | None, ROUNDS]
+Jobs = Annotated[list[Path], typer.Argument(metavar="JOB...", help="NC program, or several")]
 Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
 MachineOption = Annotated[
     str | None,
@@ -95,6 +114,7 @@ MachineOption = Annotated[
         "--machine",
         metavar="FILE",
         help=f"machine file, or name of a built-in machine (default: {DEFAULT_MACHINE})",
+        autocompletion=_machines,
     ),
 ]
 ToleranceOption = Annotated[
@@ -117,6 +137,20 @@ ThreadsOption = Annotated[
 ]
 QuietOption = Annotated[bool, typer.Option("-q", "--quiet", help="print no progress")]
 ForceOption = Annotated[bool, typer.Option("--force", help="also overwrite files that planner did not write")]
+
+
+def given_options(context: typer.Context, without: Container[str]) -> list[str]:
+    """The options of a command line as they are to be written for another one, all but those of the names in `without`."""
+    words: list[str] = []
+    for option in context.command.params:
+        if option.name is None or option.name in without or option.param_type_name != "option":
+            continue
+        value = context.params.get(option.name)
+        if value is None or value is False or value == "":
+            continue
+        name = max(option.opts, key=len)
+        words += [name] if value is True else [name, str(getattr(value, "value", value))]
+    return words
 
 
 def _one_of(allowed: tuple[str, ...]) -> Callable[[str], str]:
@@ -169,27 +203,68 @@ _READING: dict[str, tuple[Any, Any]] = {
 }
 
 
-def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of the reader; it gets them as one argument, `reading`."""
-    usual = Reading()
+def _taking(
+    command: Callable[..., None],
+    argument: str,
+    options: dict[str, tuple[Any, Any]],
+    usual: dict[str, Any],
+    gathered: Callable[[dict[str, Any]], Any],
+) -> Callable[..., None]:
+    """Give a command some options, which it gets as one argument.
+
+    options  : type and option by name
+    usual    : their defaults
+    gathered : makes the argument of their values
+    """
 
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
-        given = {name: kwargs.pop(name) for name in _READING}
-        given["ignore"] = ignore_list(given["ignore"])
-        command(*args, reading=Reading(**given), **kwargs)
+        given = {name: kwargs.pop(name) for name in options}
+        command(*args, **{argument: gathered(given)}, **kwargs)
 
     own = inspect.signature(command, eval_str=True)
-    options = [
+    parameters = [p for p in own.parameters.values() if p.name != argument] + [
         inspect.Parameter(
             name,
             inspect.Parameter.KEYWORD_ONLY,
-            default="" if name == "ignore" else getattr(usual, name),
+            default=usual[name],
             annotation=Annotated[kind, option],
         )
-        for name, (kind, option) in _READING.items()
+        for name, (kind, option) in options.items()
     ]
-    parameters = [p for p in own.parameters.values() if p.name != "reading"] + options
     run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
+
+
+def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of the reader; it gets them as one argument, `reading`."""
+
+    def gathered(given: dict[str, Any]) -> Reading:
+        return Reading(**given | {"ignore": ignore_list(given["ignore"])})
+
+    usual = {name: "" if name == "ignore" else getattr(Reading(), name) for name in _READING}
+    return _taking(command, "reading", _READING, usual, gathered)
+
+
+# How a job is planned, as options: of commands that plan it many times.
+_PLANNING: dict[str, tuple[Any, Any]] = {
+    "method": (str, METHOD),
+    "geometry": (str | None, GEOMETRY),
+    "corner": (str | None, CORNER),
+    "solver": (str | None, SOLVER),
+    "effort": (str | None, EFFORT),
+    "rounds": (int | None, ROUNDS),
+}
+
+
+def takes_planning(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of planning; it gets those that are given as one argument, `how`, as `planner.plan` takes them."""
+    usual = dict.fromkeys(_PLANNING, None) | {"method": names.OPTIMAL}
+    return _taking(
+        command,
+        "how",
+        _PLANNING,
+        usual,
+        lambda given: {name: value for name, value in given.items() if value is not None},
+    )

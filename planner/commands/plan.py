@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.base.names import OPTIMAL, users_of
+from planner.base.names import METHODS, NORMAL, OPTIMAL, users_of
 from planner.commands.first_run import Helper
 from planner.commands.options import (
     DEFAULT_MACHINE,
@@ -19,17 +19,20 @@ from planner.commands.options import (
     ForceOption,
     Format,
     GeometryOption,
-    Job,
+    Jobs,
     JsonOption,
     MachineOption,
     MethodOption,
     QuietOption,
+    RoundsOption,
     SolverOption,
     ThreadsOption,
     ToleranceOption,
+    given_options,
     takes_reading,
 )
-from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import Reading
 
 NO_CORNERS = "no corners to list: the program has no corner without a full stop"
@@ -38,7 +41,8 @@ NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 @guarded
 @takes_reading
 def plan_command(
-    job: Job,
+    context: typer.Context,
+    jobs: Jobs,
     machine: MachineOption = None,
     tolerance: ToleranceOption = None,
     method: MethodOption = OPTIMAL,
@@ -46,13 +50,7 @@ def plan_command(
     corner: CornerOption = None,
     solver: SolverOption = None,
     effort: EffortOption = None,
-    rounds: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
-        ),
-    ] = None,
+    rounds: RoundsOption = None,
     shaped: Annotated[
         bool,
         typer.Option(
@@ -95,7 +93,7 @@ def plan_command(
     *,
     reading: Reading,
 ) -> None:
-    """Plan the motion of a program, sample it and verify it."""
+    """Plan the motion of a program, sample it and verify it; of several ones side by side, each into DIR/NAME."""
     if plot and output is None:
         raise InputError("--plot writes its pictures into the output directory: name one with -o DIR")
     if report and output is None:
@@ -104,8 +102,39 @@ def plan_command(
         raise InputError(
             "--format is the format of the trajectory in the output directory: name one with -o DIR"
         )
+    for why, ignored in (
+        ("--corners adds to the table, and --json prints none", corners and as_json),
+        ("--verbose tells what --quiet keeps quiet", verbose and quiet),
+        ("--force is for files, and without -o or --trace there are none", force and not (output or trace)),
+    ):
+        if ignored:
+            raise InputError(f"{why}; leave one out")
+    if len(jobs) > 1:
+        one_by_one = {"--trace": trace, "--verbose": verbose, "--corners": corners}
+        for name, value in one_by_one.items():
+            if value:
+                raise InputError(f"{name} is for one program; {len(jobs)} are given")
+        from planner.commands.many import plan_many
+        from planner.methods.registry import check_settings
+
+        check_settings(
+            method,
+            geometry=geometry,
+            corner=corner,
+            effort=effort,
+            rounds=rounds,
+            solver=solver,
+            shaped=shaped,
+        )
+        handed_on = given_options(context, ("output", "threads", "quiet", "as_json"))
+        code = plan_many(jobs, handed_on, output, threads=threads, quiet=quiet, as_json=as_json)
+        if code:
+            raise typer.Exit(code)
+        return
+    (job,) = jobs
     from planner import plan
-    from planner.job.trace import Trace
+    from planner.commands.time_left import TimeLeft
+    from planner.job.trace import Step, Trace
     from planner.report import trace_file
     from planner.report.export import SUMMARY, check_places, summary, write_plan
 
@@ -116,9 +145,18 @@ def plan_command(
     if trace is not None:
         trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
+    left = TimeLeft(
+        solves=METHODS[method].shapes, effort=effort or NORMAL, rounds=rounds, writes=output is not None
+    )
+
+    def log(step: Step) -> None:
+        progress.log(step)
+        if verbose or trace is not None:
+            steps(step)
+
     with (
         Helper(str(machine or DEFAULT_MACHINE), method) as helper,
-        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start) as progress,
+        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start, left=left) as progress,
     ):
         result = plan(
             job,
@@ -133,7 +171,7 @@ def plan_command(
             tolerance=tolerance,
             reading=reading,
             progress=progress,
-            log=steps if verbose or trace is not None else None,
+            log=log,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:

@@ -7,7 +7,6 @@ import functools
 import io
 import os
 import sys
-import time
 import unicodedata
 import warnings
 from collections.abc import Callable
@@ -16,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from planner.base import kernels
 from planner.base.errors import InputError, NotSolvedError
 from planner.commands.interrupt import INTERRUPTED
 
@@ -25,12 +23,8 @@ if TYPE_CHECKING:
 
 # Exit codes. The last two are those of sysexits.h (EX_SOFTWARE) and of a shell (128 + SIGPIPE).
 FAILED, BAD_INPUT, NOT_SOLVED, BUG, BROKEN_PIPE = 1, 2, 3, 70, 141
-PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
-LINE_EVERY = 10.0  # [s] between lines of progress where there is no terminal
 # Columns where the output is no terminal: rows are for other programs there, and are not cut or folded.
 PIPE_WIDTH = 1000
-COMPILING = "compiling"
-KEPT = "once: they are kept for the next run"
 PLAIN = {"µ": "u", "²": "2", "³": "3", "°": "deg", "…": "..."}  # for encodings that lack them
 
 
@@ -142,7 +136,10 @@ def show(*tables: RenderableType) -> None:
     terminal = sys.stdout is not None and sys.stdout.isatty()
     # Into a string, since rich's own writing ends the process on a broken pipe, with exit code 1.
     console: Console = Console(
-        file=io.StringIO(), force_terminal=terminal, width=None if terminal else PIPE_WIDTH
+        file=io.StringIO(),
+        force_terminal=terminal,
+        width=None if terminal else PIPE_WIDTH,
+        markup=False,  # [mm] is a unit
     )
     for table in tables:
         rendered = [
@@ -152,81 +149,3 @@ def show(*tables: RenderableType) -> None:
     assert isinstance(console.file, io.StringIO)
     lines = console.file.getvalue().removesuffix("\n").split("\n")
     _write("\n".join(lines if terminal else [line.rstrip() for line in lines]))
-
-
-class ProgressBar:
-    """Progress of a long job on standard error: a bar with a clock on a terminal, a line now and then elsewhere.
-
-    quiet           : print nothing
-    at_first_kernel : called once when the first kernel is about to be compiled that can be kept
-
-    The number of rounds is not known beforehand, so the bar only shows that work goes on. The text beside it names the stage, the pass,
-    and how much of the pass is done.
-    """
-
-    def __init__(self, *, quiet: bool = False, at_first_kernel: Callable[[], None] | None = None) -> None:
-        self._quiet = quiet
-        self._at_first_kernel = at_first_kernel
-        self._compiled = 0
-        self._bar: Any = None
-        self._task: Any = None
-        self._times: dict[str, int] = {}
-        self._compiling_said = False
-
-    def __enter__(self) -> ProgressBar:
-        self._start = time.monotonic()
-        self._next_line = self._start + LINE_EVERY
-        kernels.at_compilation(self._compile)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        kernels.at_compilation(None)
-        if self._bar is not None:
-            self._bar.stop()
-            self._bar = None
-
-    def __call__(self, stage: str, fraction: float) -> None:
-        """Show that `stage` is done to `fraction` (0 to 1); 0 begins it, perhaps once more."""
-        if fraction == 0.0:
-            self._times[stage] = self._times.get(stage, 0) + 1
-        self._show(self._text(stage, fraction))
-
-    def _compile(self, kept: bool) -> None:
-        """Called before a kernel is compiled."""
-        self._compiled += 1
-        if kept and self._at_first_kernel is not None:
-            self._at_first_kernel()
-            self._at_first_kernel = None
-        self._show(f"{COMPILING} kernel {self._compiled}{f', {KEPT}' if kept else ''}")
-
-    def _text(self, stage: str, fraction: float) -> str:
-        times = self._times.get(stage, 1)
-        part = f", {fraction:.0%}" if 0.0 < fraction < 1.0 else ""
-        return f"{stage}, pass {times}{part}" if times > 1 else stage + part
-
-    def _show(self, text: str) -> None:
-        now = time.monotonic()
-        if self._quiet or now - self._start < PROGRESS_AFTER:
-            return
-        if sys.stderr.isatty():
-            if self._bar is None:
-                self._open()
-            self._bar.update(self._task, description=printable(text))
-        elif now >= self._next_line or (text.startswith(COMPILING) and not self._compiling_said):
-            self._compiling_said |= text.startswith(COMPILING)
-            self._next_line = now + LINE_EVERY
-            say(f"{now - self._start:.0f} s: {text}", err=True)
-
-    def _open(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        self._bar = Progress(
-            TimeElapsedColumn(),
-            BarColumn(),
-            TextColumn("{task.description}", markup=False),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self._task = self._bar.add_task("", total=None)  # a task with a total would stop its clock at it
-        self._bar.start()

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
+from planner.base.names import known_name
 from planner.commands.options import (
     DEFAULT_MACHINE,
     Job,
@@ -25,7 +26,8 @@ from planner.commands.options import (
     ToleranceOption,
     takes_reading,
 )
-from planner.commands.terminal import FAILED, ProgressBar, guarded, say, show
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import AS_USUAL, Reading
 
 if TYPE_CHECKING:
@@ -74,8 +76,7 @@ def verify_command(
 
     unjudged = tuple(not_limited or ())
     for name in unjudged:
-        if name not in NOT_LIMITED_NAMES:
-            raise InputError(f"--not-limited {name}: no such limit; there are {', '.join(NOT_LIMITED_NAMES)}")
+        known_name("limit", name, NOT_LIMITED_NAMES)
     read = read_trajectory(trajectory)
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from planner.job.plan import Plan
 
+# Samples of a figure at most [-]; the path of 11,157 samples makes a figure of 1.1 MB.
 POINTS_MAX = 40_000
 FLAT = 0.12  # third extent over the largest below which a path is seen from above
 COLOURINGS = ("feed", "limit", "deviation")

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from planner.base.errors import InputError
-from planner.report.trajectory_file import columns_of, units
+from planner.report.trajectory_file import trajectory_columns, units
 
 if TYPE_CHECKING:
     import pandas
@@ -24,6 +24,6 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
         ) from fault
     trajectory = plan.require().trajectory
     assert trajectory is not None
-    table: pandas.DataFrame = pd.DataFrame(columns_of(trajectory))
+    table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory))
     table.attrs["units"] = units(trajectory.axes)
     return table

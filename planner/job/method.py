@@ -59,7 +59,9 @@ class Method(ABC):
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
-        require_samples(float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell)), machine.dt)
+        at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
+        require_samples(at_feed, machine.dt)
+        stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
         return self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
 
     def plan_best(self, job: Job) -> Plan:

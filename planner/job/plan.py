@@ -8,6 +8,7 @@ from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
+from planner.job.beside import Beside, beside_motion
 from planner.job.records import CornerTable, GridHistory, PriceList
 from planner.job.shown import Shown
 from planner.machine import Machine
@@ -74,6 +75,11 @@ class Plan(Shown):
         if self.corner is None:
             return None
         return self.corner if self.corner in (AUTO, SPLINE) else SINGLE_CORNERS
+
+    @property
+    def beside(self) -> tuple[Beside, ...]:
+        """What happens while the axes stand still, tool changes for example, and how long it takes; no part of the cycle time."""
+        return beside_motion(self.program, self.machine)
 
     @property
     def solved(self) -> bool:

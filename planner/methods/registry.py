@@ -86,10 +86,7 @@ def plan(
     Raises InputError for a program or machine that cannot be read, naming file, line and column, for an unknown name, and for a setting
     that the method does not use.
     """
-    if isinstance(method, str):
-        method = method_name(method)
-    given = _given(settings)
-    _check_used(method, given)
+    given = check_settings(method, **settings)
     if isinstance(method, str):
         method = make_method(method, **given)
     if not isinstance(machine, Machine):
@@ -129,6 +126,13 @@ def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
     method = getattr(import_module(module), class_name)(**made)
     assert isinstance(method, Method)
     return method
+
+
+def check_settings(method: str | Method = "optimal", **settings: Unpack[MethodSettings]) -> MethodSettings:
+    """The settings that are set. Raises InputError for an unknown name and for a setting that the method does not use."""
+    given = _given(settings)
+    _check_used(method_name(method) if isinstance(method, str) else method, given)
+    return given
 
 
 def _given(settings: MethodSettings) -> MethodSettings:

@@ -1,14 +1,15 @@
-"""Method `tube`: geometry and feed found together, anywhere inside the tolerance; for short jobs.
+"""Method `tube`: geometry and feed found together, anywhere inside the tolerance.
 
-All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (tube/nlp.py), so
-nothing is given away between the two. What is found is the best motion near the one from which the search starts, with no certificate
-that there is no better one elsewhere. It takes about a second per corner where the others take milliseconds, hence `LEGS_MAX`.
+All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (tube/rows.py,
+tube/nlp.py), so nothing is given away between the two. What is found is the best motion near the one from which the search starts, with
+no certificate that there is no better one elsewhere.
 
 1. The path is divided into runs between full stops; each is a problem of its own (tube/run.py).
 2. Methods of `starts` make motions from which the search begins (tube/guess.py): the first one's, and where that does not lead to a
    faster one the next one's.
-3. ipopt finds the motion; it is integrated exactly and slowed down by what rounding exceeds (tube/motion.py).
-4. Where no search ends faster than the first start, its motion stays, run by run (tube/splice.py): the plan is never slower.
+3. A solver finds the motion: the own one window by window (tube/own.py), ipopt a whole run at a time.
+4. Where no search ends faster than the first start, its motion stays, run by run and window by window (tube/parts.py): the plan is
+   never slower.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.delivery.periods import missed
 from planner.feedrate.solution import Status
@@ -28,20 +29,16 @@ from planner.job.job import Delivered, Job
 from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.methods.optimal import OptimalMethod
-from planner.motion.axis_motion import AxisMotion
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import passing_times, standstills
 from planner.nc.program import Program
-from planner.tube.guess import guess_from
-from planner.tube.motion import Steps, steps_of
-from planner.tube.nlp import TubeNLP
+from planner.tube.guess import Guess, guess_from
+from planner.tube.parts import Found, parts_of
 from planner.tube.run import TubeRun, tube_runs_of
+from planner.tube.solvers import TubeSolver, tube_solver
 from planner.tube.splice import Spliced, SplicedRun
 
-# A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
-# 7 s, one of 400 two minutes and 0.44 GB.
-LEGS_MAX = 500
 # The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
 
@@ -51,22 +48,22 @@ class TubeMethod(Method):
     """The best motion inside the tolerance near those of other methods.
 
     starts : methods whose motions the search starts from; the first one's is what the plan is never slower than
-    solver : settings of the search
+    solver : name of the solver, "own" or "ipopt" (tube/solvers.py), or a solver
     """
 
     starts: tuple[Method, ...] = field(
         default_factory=lambda: (OptimalMethod(), OptimalMethod(corner="bezier"))
     )
-    solver: TubeNLP = field(default_factory=TubeNLP)
+    solver: str | TubeSolver = "own"
 
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
             runs = list(tube_runs_of(job.toolpath, job.machine))
-            _check_size(runs, job.program)
+            _check_size(runs, job.program, tube_solver(self.solver))
         with job.stage("start"):
             starts = _Starts(self.starts, job)
             first = next(iter(starts), None)
-        found: list[_Found] = []
+        found: list[Found] = []
         with job.stage("solve") as report:
             for k, run in enumerate(runs if first else ()):
                 found.append(self._search(k, run, starts))
@@ -93,34 +90,25 @@ class TubeMethod(Method):
             grid_points=grid_points,
         )
 
-    def _search(self, k: int, run: TubeRun, starts: _Starts) -> _Found:
+    def _search(self, k: int, run: TubeRun, starts: _Starts) -> Found:
         """What the search along run k leads to from one start after the other, until it is faster than the first start."""
-        least, why = np.inf, []
+        least, why, solver = np.inf, [], tube_solver(self.solver)
         for start in starts:
             least = min(least, start.lasting(k)) if start is starts.made[0] else least
-            guess = guess_from(run, *start.window(k, run))
-            solution = self.solver.solve(run, guess)
-            if solution.h is None or solution.place is None:
+            guess = start.guess(k, run)
+            solution = solver.solve(run, guess)
+            steps, kept = solution.steps, solution.kept
+            if steps is None:
                 why.append(solution.sentence)
                 continue
-            steps = steps_of(run, guess, solution)
-            if steps.h.sum() >= least:
+            # parts of another start's motion do not join those of the first one
+            other = start is not starts.made[0] and kept is not None and kept.any()
+            if other or steps.h.sum() >= least:
                 why.append("the search did not end faster than its start")
                 continue
-            place = (solution.place[:-1] + solution.place[1:]) / 2
-            return _Found(run, solution.status, solution.sentence, steps, place)
-        return _Found(run, Status.ACCEPTABLE, why[0])
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """How the search along a run ended; the steps and the places of their middles [mm], None where the start stays."""
-
-    run: TubeRun
-    status: Status
-    sentence: str
-    steps: Steps | None = None
-    place: FloatArray | None = None
+            times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
+            return Found(run, solution.status, solution.sentence, steps, solution.place, times, kept)
+        return Found(run, Status.ACCEPTABLE, why[0])
 
 
 class _Start:
@@ -149,6 +137,16 @@ class _Start:
             begin=float(begin),
             end=self.motion.end if last else float(self.arrival[k + 1]),
         )
+
+    def guess(self, k: int, run: TubeRun) -> Guess:
+        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts of it can stay."""
+        guess = guess_from(run, *self.window(k, run))
+        inner = self.departure[k] + np.cumsum(guess.h[:-1])
+        seen = self.motion.at(inner, 1.0)
+        state = guess.state.copy()
+        for m, name in enumerate(("position", "velocity", "acceleration")):
+            state[1:-1, m] = getattr(seen, name)[:, run.axis]
+        return dataclasses.replace(guess, state=state)
 
     def window(self, k: int, run: TubeRun) -> tuple[Trajectory, FloatArray]:
         """The motion along run k, and when it passes the run's vertices (R+1,) [s]."""
@@ -185,18 +183,18 @@ class _Starts:
             yield self.made[-1]
 
 
-def _check_size(runs: list[TubeRun], program: Program) -> None:
-    """Raise InputError for a job with more legs, or steps on arcs, than `LEGS_MAX`."""
+def _check_size(runs: list[TubeRun], program: Program, solver: TubeSolver) -> None:
+    """Raise InputError for a job with more legs, or steps on arcs, than the solver takes."""
     legs = sum(float(np.maximum(np.ceil(run.length / run.step_max), 1.0).sum()) for run in runs)
-    if legs > LEGS_MAX:
+    if legs > solver.legs_max:
         raise InputError(
-            f"{legs:.0f} lines and steps on arcs; method tube is for short jobs and takes at most {LEGS_MAX}: split the program, "
-            "or plan with method optimal",
+            f"{legs:.0f} lines and steps on arcs; this solver takes at most {solver.legs_max:g}: plan with the solver own, or with "
+            "method optimal",
             source=program.source,
         )
 
 
-def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered, list[int], str]:
+def _delivered(job: Job, first: _Start, found: list[Found]) -> tuple[Delivered, list[int], str]:
     """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
     motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
     start = first.plan.trajectory, first.plan.verdict
@@ -204,14 +202,14 @@ def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered,
     assert start[1] is not None
     kept, why = [k for k, one in enumerate(found) if one.steps is None], ""
     filtered = job.real[0].fir is not None  # what goes on between two stops is felt behind them
-    if filtered and kept:
+    if filtered and not all(one.whole for one in found):
         kept = list(range(len(found)))
     while len(kept) < len(found):
-        motion = Spliced(
-            runs=tuple(
-                first.spliced(k) if k in kept else _spliced(job.toolpath, found[k]) for k in range(len(found))
-            )
-        )
+        parts: list[SplicedRun] = []
+        for k, one in enumerate(found):
+            own = first.spliced(k)
+            parts += [own] if k in kept else parts_of(job.toolpath, one, own)
+        motion = Spliced(runs=tuple(parts))
         made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
         passed = made[1].passed or not start[1].passed
         if passed and made[0].cycle_time <= start[0].cycle_time:
@@ -222,7 +220,7 @@ def _delivered(job: Job, first: _Start, found: list[_Found]) -> tuple[Delivered,
     return (start[0], start[1]), kept, why
 
 
-def _missed(job: Job, motion: MotionInTime, found: list[_Found]) -> set[int]:
+def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:
     """The runs on which chords between samples miss vertices by more than the tolerance."""
     machine, toolpath = job.real
     _, far = missed(motion, toolpath, machine.dt)
@@ -232,7 +230,7 @@ def _missed(job: Job, motion: MotionInTime, found: list[_Found]) -> set[int]:
     }
 
 
-def _said(job: Job, first: _Start, found: list[_Found], kept: list[int], why: str) -> tuple[Status, str]:
+def _said(job: Job, first: _Start, found: list[Found], kept: list[int], why: str) -> tuple[Status, str]:
     """Status and sentence: of the worst search, and where the start stays."""
     took = [one for k, one in enumerate(found) if k not in kept]
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
@@ -249,37 +247,6 @@ def _said(job: Job, first: _Start, found: list[_Found], kept: list[int], why: st
             f"{_lines(run, job.toolpath)}: {why}"
         )
     return worst.status if worst and not kept else Status.ACCEPTABLE, text
-
-
-def _spliced(toolpath: Toolpath, found: _Found) -> SplicedRun:
-    """The steps along a run as a motion, with the dwell before it, and the one at the end of the job."""
-    run, steps = found.run, found.steps
-    assert steps is not None
-    assert found.place is not None
-    first, last = run.first[0], run.first[-1]
-    before = toolpath.dwell[first]
-    behind = toolpath.dwell[last] if last == len(toolpath) else 0.0
-    standing = int(before > 0)  # a step without motion before the others
-    along = np.append(0.0, np.cumsum(toolpath.length[first:last]))
-    inside = np.searchsorted(along[1:-1], found.place, side="right")
-    segment: Array = np.append([first] * standing, first + inside).astype(np.int64)
-    columns = {}
-    for name in ("position", "velocity", "acceleration", "jerk"):
-        whole = np.zeros((standing + len(steps.h), len(toolpath.axes)))
-        if name == "position":
-            whole += toolpath.start[first]
-        whole[standing:, run.axis] = getattr(steps, name)
-        columns[name] = whole
-    t = np.append(0.0, np.cumsum(np.append([before] * standing, steps.h)))
-    motion = AxisMotion(
-        axes=toolpath.axes,
-        t=t[:-1],
-        block=toolpath.block[segment],
-        line=toolpath.line[segment],
-        end=float(t[-1] + behind),
-        **columns,
-    )
-    return SplicedRun(motion=motion, begin=0.0, end=motion.end)
 
 
 def _lines(run: TubeRun, toolpath: Toolpath) -> str:

@@ -45,8 +45,9 @@ def events(state: State, store: Store, block: Block, note: Note) -> None:
         state.tool_loaded = integer(block, "Q", 0)
     if "tool change" in block.m:
         state.tool_loaded = state.tool_selected
+        store.add_event("M", 6.0, line)
         store.add(Kind.STOP, line, state)
-        note("a tool change is a full stop that takes no time and moves nothing", line)
+        note("a tool change is a full stop of the motion that moves nothing", line)
     store.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
     for letter, value in block.events:
         store.add_event(letter, value, line)

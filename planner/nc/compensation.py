@@ -42,7 +42,8 @@ def _system_in_force(state: State, block: Block) -> bool:
     number = round(block.value.get("P", 0.0))
     return (
         number == 0
-        or {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}[state.system] == number
+        or {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}.get(state.system)
+        == number
     )
 
 

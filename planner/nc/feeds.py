@@ -27,7 +27,7 @@ SURFACE_STEP = (
     0.05  # by which the spindle's speed changes in a part of a move: as much as overrides are set to
 )
 _LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
-_MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8
+_MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per minute
 _SLOWEST = (
     0.1  # feed of a block under G93, at least [programmed units per minute]: as LinuxCNC has it, and never 0
 )

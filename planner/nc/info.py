@@ -20,7 +20,7 @@ from planner.nc.bezier import at, homogeneous, lengths
 from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
 from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program
-from planner.nc.reader import interpret, load
+from planner.nc.reader import interpret, load, source_name
 from planner.nc.reading import AS_USUAL, Reading
 
 # What `planner info` counts: corners that turn by more than each of these [deg], and quantiles of the moves' lengths [-].
@@ -83,7 +83,7 @@ def inspect_program(
     Raises InputError only if the file cannot be read, is empty or is not a text.
     """
     data = load(path)
-    program, faults = interpret(data, machine, reading, source=str(path))
+    program, faults = interpret(data, machine, reading, source=source_name(path))
     return describe(program, lines=len(data.splitlines()), unsupported=faults)
 
 

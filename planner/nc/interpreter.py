@@ -29,7 +29,7 @@ from planner.nc.plain import run_plain
 from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.splines import SplineReader, is_spline_line
-from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units
+from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units, system_name
 from planner.nc.store import Store
 
 # G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
@@ -179,6 +179,8 @@ class Interpreter:
             self._cutter.fix()
         if stop == 600:
             self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+        if stop in (0, 10, 600):
+            self.store.add_event("M", stop / 10, block.line)
         if stop in (0, 10, 600) or block.stops:
             self.store.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
@@ -202,9 +204,9 @@ class Interpreter:
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.note)
         if "work offset" in g:
-            state.system = g["work offset"]
+            state.system = offsets.system_of(block)
             if state.system not in state.systems and state.system != 540:
-                self.note(f"G{codes.number(state.system)} has no offset in the machine file: 0", block.line)
+                self.note(f"{system_name(state.system)} has no offset in the machine file: 0", block.line)
         if "path control" in g:
             auxiliary.path_control(state, block, self.note)
         if "distance mode" in g:

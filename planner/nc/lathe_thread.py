@@ -56,7 +56,7 @@ class Pass:
     pitch: float = 0.0
 
 
-def depths(thread: LatheThread) -> Iterator[float]:
+def lathe_depths(thread: LatheThread) -> Iterator[float]:
     """Depths of the passes below the crest [mm]."""
     left, n, depth = thread.height - thread.finish, 1, thread.first
     while depth < left * (1.0 - 1e-12):
@@ -78,7 +78,7 @@ def thread_passes(thread: LatheThread) -> Iterator[Pass]:
         math.copysign(1.0, end.real - start.real),
     )
     slope = math.tan(math.radians(thread.angle / 2.0))
-    for depth in depths(thread):
+    for depth in lathe_depths(thread):
         begin = start.real + ahead * depth * slope
         low = end.imag + out * (thread.height - depth)
         cut, leave = complex(begin, low + thread.taper), complex(end.real, low)

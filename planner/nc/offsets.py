@@ -20,7 +20,7 @@ from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.block import Block
 from planner.nc.moves import WordFault, coordinate, integer
-from planner.nc.state import State, System, Tool
+from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, State, System, Tool
 
 Note = Callable[[str, int], None]
 
@@ -48,6 +48,19 @@ def set_tool_offset(state: State, block: Block, note: Note) -> None:
         state.tool_offset = state.tool_offset + _given(state, block, np.zeros(3))
     else:
         raise WordFault(block.at["tool length"], "G43.2 needs a tool as an H word, or lengths as X, Y and Z")
+
+
+def system_of(block: Block) -> int:
+    """The code of the work system that a block names. Raises WordFault for a G54.1 without a P that there is."""
+    code = block.g["work offset"]
+    if code != 541:
+        return code
+    number = integer(block, "P", 1) if "P" in block.value else 0
+    if not 1 <= number <= FURTHER_MAX:
+        raise WordFault(
+            block.at.get("P", block.at["work offset"]), f"G54.1 needs its work system as P1 to P{FURTHER_MAX}"
+        )
+    return FURTHER_SYSTEMS + number
 
 
 def store_position(state: State, code: int) -> None:

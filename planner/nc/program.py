@@ -137,6 +137,7 @@ class Program:
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
     reading      : the settings it was read with
+    pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : the program itself, if it was given as a text; None for those of a file, and for points
     """
 
@@ -162,6 +163,7 @@ class Program:
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
     reading: Reading = AS_USUAL
+    pen: bool = False
     text: bytes | None = None
 
     def __post_init__(self) -> None:
@@ -197,8 +199,11 @@ class Program:
 
     def place(self, block: int) -> str:
         """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost first."""
-        text = f"line {self.line[block]}"
-        frame = int(self.frame[block]) if self.frames else 0
+        return f"line {self.line[block]}" + self.called(int(self.frame[block]) if self.frames else 0)
+
+    def called(self, frame: int) -> str:
+        """The calls that led to a frame, innermost first, behind the line of a block; empty for the main program."""
+        text = ""
         while frame > 0:
             at = self.frames[frame]
             elsewhere = f" in {at.source}" if at.source != self.source else ""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planner.base.errors import InputError
-from planner.base.files import require_ending
+from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.faults import Fault, require_none
@@ -51,7 +51,14 @@ def read_program(
             parse_program(text, machine, reading), text=text.encode() if isinstance(text, str) else text
         )
     assert path is not None
-    return parse_program(load(path), machine, reading, source=str(path))
+    data = load(path)
+    program = parse_program(data, machine, reading, source=source_name(path))
+    return dataclasses.replace(program, text=data) if str(path) == STDIN else program
+
+
+def source_name(path: str | Path) -> str:
+    """What messages call a program file."""
+    return "<stdin>" if str(path) == STDIN else str(path)
 
 
 def parse_program(
@@ -141,8 +148,10 @@ def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Progr
 
 
 def load(path: str | Path) -> bytes:
-    """The bytes of a program file. Raises InputError if there is no such file or it cannot be read."""
+    """The bytes of a program file, or of the standard input for "-". Raises InputError if it cannot be read."""
     try:
+        if str(path) == STDIN:
+            return standard_input()
         require_ending(path)
         return Path(path).read_bytes()
     except FileNotFoundError as fault:

@@ -208,8 +208,9 @@ class SplineReader:
 
 def is_spline_line(block: Block) -> bool:
     """Whether a line under a spline's motion code has words of the spline."""
-    taken = block.g.get("one-shot") == 40 or block.g.get("path control") == 640  # P and Q are theirs
-    return "motion" in block.g or block.has("XYZIJKLR" if taken else "XYZIJKLRPQ")
+    return "motion" in block.g or bool(
+        block.value.keys() & set("XYZIJKLRPQ") - block.own
+    )  # those of other codes are theirs
 
 
 def _leaves(opened: OpenSpline, block: Block) -> bool:

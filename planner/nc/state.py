@@ -30,6 +30,8 @@ _PATH_CONTROL = {
 # Ten times the G code of a work coordinate system, by its name in the machine file.
 _SYSTEMS = {f"g{n}": 10 * n for n in range(54, 60)} | {"g59.1": 591, "g59.2": 592, "g59.3": 593}
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
+FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
+FURTHER_MAX = 300
 FeedMode = Literal["per minute", "inverse time", "per turn"]
 
 
@@ -97,7 +99,7 @@ class State:
     rotated      : whether the work system in force is rotated
     g92_saved    : what G92.3 brings back [mm]
     tool_offset  : (3,) in force (G43) [mm]
-    systems      : work systems by code (54 is 540)
+    systems      : work systems by code (54 is 540, 54.1 P3 is 54103)
     homes        : (3,) machine positions of G28 (280) and G30 (300) [mm]
     tools        : by number
     to_level     : canned cycles retract to the level before them (G98), not to R (G99)
@@ -200,7 +202,7 @@ class Setup:
             return cls()
         return cls(
             path_control=_PATH_CONTROL[machine.path_control],
-            systems={_SYSTEMS[name]: _vector(given) for name, given in machine.work_offsets.items()},
+            systems={system_code(name): _vector(given) for name, given in machine.work_offsets.items()},
             positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
             feed_default=machine.feed_default,
             tools={
@@ -219,6 +221,19 @@ class Setup:
         )
         state.apply_offsets()
         return state
+
+
+def system_code(name: str) -> int:
+    """The code of a work system by its name in a machine file: "g54", "g54.1p3"."""
+    first, _, further = name.partition("p")
+    return FURTHER_SYSTEMS + int(further) if further else _SYSTEMS[first]
+
+
+def system_name(code: int) -> str:
+    """A work system as programs write it: G54, G54.1 P3."""
+    if code > FURTHER_SYSTEMS:
+        return f"G54.1 P{code - FURTHER_SYSTEMS}"
+    return f"G{code // 10}" + (f".{code % 10}" if code % 10 else "")
 
 
 def set_units(state: State, code: int) -> None:

@@ -1,7 +1,7 @@
 """A program written out as NC text, for those that were read from something else (HPGL): the reader reads the same program again.
 
-The text is RS274NGC in mm: G0 for rapids, G1, G2 and G3 with F words, G4 for dwells and full stops, M and T words for the events; a
-pen or tool that is chosen at a stop becomes T... M6. Coordinates are rounded to `DECIMALS`, a tenth of what the reader may be off.
+The text is RS274NGC in mm: G0 for rapids, G1, G2 and G3 with F words, G4 for dwells and full stops, M and T words for the events, of
+which M0, M1, M6 and M60 are full stops by themselves. Coordinates are rounded to `DECIMALS`, a tenth of what the reader may be off.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from planner.nc.program import Kind, PathControl, Program
 from planner.nc.writer import FEED_MIN, round_down
 
 DECIMALS = 7  # of a coordinate in mm
+STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
 # Characters that must not stand in a comment, and what stands there instead.
 _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
@@ -38,14 +39,14 @@ def _blocks(program: Program, feeds: FloatArray) -> list[str]:
     events = list(program.events)
     next_event, last_feed = 0, ""
     for block, kind in enumerate(program.kind.tolist()):
-        tool = False
+        stopped = False
         while next_event < len(events) and events[next_event].block <= block:
-            tool = events[next_event].text.startswith("T")
+            stopped = events[next_event].text in STOPPING
             lines.append(events[next_event].text)
             next_event += 1
         end = program.end[block]
-        if kind == Kind.STOP and tool:
-            lines[-1] += " M6"
+        if kind == Kind.STOP and stopped:
+            pass  # by the last event
         elif kind in (Kind.STOP, Kind.DWELL):
             lines.append(f"G4 P{plain(float(program.dwell[block]))}")
         elif kind == Kind.RAPID:

@@ -60,7 +60,7 @@ class Contour:
 
 
 @dataclass(frozen=True)
-class Step:
+class TurningStep:
     """A move of a cycle: fast, or at the feed."""
 
     leg: Leg
@@ -83,28 +83,30 @@ class Roughing:
     more: complex = 0j
 
 
-def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterator[Step]:
+def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterator[TurningStep]:
     """The moves of G71, or with `facing` of G72. Raises ContourFault."""
     if not facing:
         yield from _removal(contour, given)
         return
     turned = replace(given, allowance=_exchanged(given.allowance), more=_exchanged(given.more))
     for step in _removal(contour.exchanged(), turned):
-        yield Step(step.leg.exchanged(), step.fast)
+        yield TurningStep(step.leg.exchanged(), step.fast)
 
 
-def pattern(contour: Contour, passes: int, shift: complex, allowance: complex) -> Iterator[Step]:
+def pattern_repeat(
+    contour: Contour, passes: int, shift: complex, allowance: complex
+) -> Iterator[TurningStep]:
     """The moves of G73: `passes` times along the profile, the first moved by `shift` more than the last. Raises ContourFault."""
     if not 1 <= passes <= PASSES_MAX:
         raise ContourFault(f"G73 makes 1 to {PASSES_MAX} passes, not {passes}")
     for n in range(passes):
         by = allowance + (shift * (passes - 1 - n) / (passes - 1) if passes > 1 else 0.0)
-        yield Step(Leg(contour.start + by), fast=True)
+        yield TurningStep(Leg(contour.start + by), fast=True)
         yield from _along(contour, by)
-    yield Step(Leg(contour.start), fast=True)
+    yield TurningStep(Leg(contour.start), fast=True)
 
 
-def _removal(contour: Contour, given: Roughing) -> Iterator[Step]:
+def _removal(contour: Contour, given: Roughing) -> Iterator[TurningStep]:
     """G71 of a profile; levels are imaginary parts."""
     _require_one_way(contour)
     moved = [leg.moved(given.allowance + given.more) for leg in contour.legs]
@@ -115,28 +117,28 @@ def _removal(contour: Contour, given: Roughing) -> Iterator[Step]:
         raise ContourFault(f"the depth of a pass must be above 0 and lead to at most {PASSES_MAX} passes")
     out = math.copysign(1.0, height)
     ahead = math.copysign(1.0, last.real - first.real)
-    yield Step(Leg(top), fast=True)
+    yield TurningStep(Leg(top), fast=True)
     n = 1
     while (level := top.imag - out * n * given.depth) * out - first.imag * out > SAME:
         end = _reached(moved, level, out)
         away = complex(-ahead, out) * given.retract
-        yield Step(Leg(complex(top.real, level)), fast=contour.fast)
+        yield TurningStep(Leg(complex(top.real, level)), fast=contour.fast)
         if (end - top.real) * ahead > SAME:
-            yield Step(Leg(complex(end, level)))
-            yield Step(Leg(complex(end, level) + away), fast=True)
-            yield Step(Leg(complex(top.real, level + away.imag)), fast=True)
+            yield TurningStep(Leg(complex(end, level)))
+            yield TurningStep(Leg(complex(end, level) + away), fast=True)
+            yield TurningStep(Leg(complex(top.real, level + away.imag)), fast=True)
         n += 1
-    yield Step(Leg(complex(top.real, first.imag)), fast=contour.fast)
+    yield TurningStep(Leg(complex(top.real, first.imag)), fast=contour.fast)
     yield from _along(contour, given.allowance)
-    yield Step(Leg(complex(contour.legs[-1].end.real + given.allowance.real, top.imag)), fast=True)
-    yield Step(Leg(contour.start), fast=True)
+    yield TurningStep(Leg(complex(contour.legs[-1].end.real + given.allowance.real, top.imag)), fast=True)
+    yield TurningStep(Leg(contour.start), fast=True)
 
 
-def _along(contour: Contour, by: complex) -> Iterator[Step]:
+def _along(contour: Contour, by: complex) -> Iterator[TurningStep]:
     """The profile, moved."""
-    yield Step(contour.legs[0].moved(by), fast=contour.fast)
+    yield TurningStep(contour.legs[0].moved(by), fast=contour.fast)
     for leg in contour.legs[1:]:
-        yield Step(leg.moved(by))
+        yield TurningStep(leg.moved(by))
 
 
 def _reached(legs: list[Leg], level: float, out: float) -> float:

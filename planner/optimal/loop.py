@@ -18,16 +18,17 @@ What is tried more than once:
   -----------------------------  ----------------------------------------  ----------------  ------------  -----------------------------
   full stop where a run gets no  no curve inside the tolerance, or a cusp  2 times           splines anew  at last fenced by two stops,
     spline                                                                                                   with its single corners
-  round of reshaping             on splines                                effort.py; 5 in   shape, solve  faster runs keep the new one,
-                                                                             vain                            others are pulled more
+  round of reshaping             on splines, while the last one promised   effort.py; 5      shape, solve  faster runs keep the new one,
+                                   more than effort.py asks for              that gain < 5e-5                others are pulled more
   only the runs that got faster  others got slower                         each round        solve         the fastest of three stays
-  corners between full stops     "auto", a bound on their time is lower    2                 solve         splines stay where faster
+  corners between full stops     "auto", a bound on their time is lower    3                 solve         splines stay where faster
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
   final grid                     rounds of reshaping are on a coarse one   1                 finer solve   that of the plan
   tighter limits in places       excess above 1e-5 between points          2                 solve         runs slower by the rest
   less feed in places            filters leave the tolerance               10                solve         waiting, slower runs
   the whole slower               excess below 0.5 % in the verdict         2                 verdict       the verdict stands
-  another plan                   "auto", a bound on its time is lower      3                 a plan        the fastest that passes
+  another plan                   "auto", a bound on its time is lower, or  4                 a plan        the fastest that passes
+                                   the plan fails its verdict
 
 Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
 certificate fails are tightened (smoothing/relax.py). Around the loop, a job is planned again with less tolerance where chords between

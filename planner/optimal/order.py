@@ -72,9 +72,7 @@ class ThirdOrder:
         samples: PathSamples | None = None,
     ) -> OnPath:
         """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as of `Order`."""
-        if samples is None:
-            with job.stage("geometry"):
-                samples = sample_path(path, job.machine, resolution, third_order=True)
+        samples = _sampled(self, path, job, resolution, samples)
         with job.stage("solve") as progress:
             samples = refine_for_jerk(samples, job.machine)
             problem = feedrate_problem(samples, job.machine, measured=True)
@@ -106,9 +104,7 @@ class SecondOrder:
         samples: PathSamples | None = None,
     ) -> OnPath:
         """The time-optimal motion without jerk limits, on a grid with points where the profile switches; arguments as of `Order`."""
-        if samples is None:
-            with job.stage("geometry"):
-                samples = sample_path(path, job.machine, resolution)
+        samples = _sampled(self, path, job, resolution, samples)
         with job.stage("solve"):
             if self.to_tighten:
                 samples = refine_for_jerk(samples, job.machine)
@@ -136,6 +132,16 @@ def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solve
         problem = feedrate_problem(samples, machine, measured=True)
         solution = solver.solve(problem)
     return OnPath(path=path, samples=samples, problem=problem, solution=solution)
+
+
+def _sampled(
+    order: Order, path: SmoothPath, job: Job, resolution: float, given: PathSamples | None
+) -> PathSamples:
+    """The samples that are given, or new ones."""
+    if given is not None:
+        return given
+    with job.stage("geometry"):
+        return sample_path(path, job.machine, resolution, third_order=order.jerk_limited)
 
 
 def _known(motions: Sequence[OnPath]) -> list[Known]:

@@ -25,6 +25,7 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.info import PLACES_SHOWN
+from planner.report.beside import beside_summary
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program, source_text
@@ -139,6 +140,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "status": plan.status.name,
             "sentence": plan.sentence,
             "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
+            "beside_motion": beside_summary(plan),
             "stop_time_s": plan.stop_time,
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
             "verdict": verdict_summary(verdict) if verdict is not None else None,

@@ -14,7 +14,9 @@ from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.nc.info import PLACES_SHOWN
+from planner.report.beside import beside_rows
 from planner.report.optimum import held_by_text, price_rows
+from planner.report.times import hours_text
 
 if TYPE_CHECKING:
     from planner.base.arrays import FloatArray
@@ -40,12 +42,14 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     table = _pairs()
     if plan.trajectory is not None:
         time = plan.trajectory.cycle_time
-        table.add_row("cycle time", f"{time:.4f} s{_hours(time)}")
+        table.add_row("cycle time", f"{time:.4f} s{hours_text(time)}")
         if plan.method != "stop" and np.isfinite(plan.stop_time):
             table.add_row(
                 "stopping at every block",
                 f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long",
             )
+        for row in beside_rows(plan.beside, time, float(plan.program.dwell.sum())):
+            table.add_row(row[0], Text(row[1]))
     if plan.verdict is not None:
         _add_verdict(table, plan.verdict)
     if plan.grid is not None:
@@ -257,14 +261,6 @@ def ratio_text(value: float) -> str:
     if not np.isfinite(value):
         return "-"
     return f"{value:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
-
-
-def _hours(seconds: float) -> str:
-    if seconds < SECONDS_PER_MINUTE:
-        return ""
-    minutes, rest = divmod(seconds, SECONDS_PER_MINUTE)
-    hours, minutes = divmod(int(minutes), 60)
-    return f" ({hours} h {minutes} min {rest:.0f} s)" if hours else f" ({minutes} min {rest:.0f} s)"
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -44,7 +44,7 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, 
             _write_csv(path, trajectory)
             path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
         case ".npz":
-            np.savez(path, metadata=np.array(text), allow_pickle=False, **columns_of(trajectory))
+            np.savez(path, metadata=np.array(text), allow_pickle=False, **trajectory_columns(trajectory))
         case _:
             raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
 
@@ -59,7 +59,7 @@ def units(axes: tuple[str, ...]) -> dict[str, str]:
     return said | {"s": "mm", "feed": "mm/s", "line": "1", "block": "1"}
 
 
-def columns_of(trajectory: Trajectory) -> dict[str, Array]:
+def trajectory_columns(trajectory: Trajectory) -> dict[str, Array]:
     """The columns of a trajectory file by their names, each (T,)."""
     columns: dict[str, Array] = {"t": trajectory.t}
     for k, axis in enumerate(trajectory.axes):
@@ -80,7 +80,7 @@ def _groups(trajectory: Trajectory) -> Iterator[dict[str, Array]]:
     parts: list[dict[str, Array]] = []
     count = 0
     for chunk in trajectory.chunks():
-        columns, done = columns_of(chunk), 0
+        columns, done = trajectory_columns(chunk), 0
         while done < len(chunk):
             new = min(ROW_GROUP - count, len(chunk) - done)
             parts.append({name: column[done : done + new] for name, column in columns.items()})

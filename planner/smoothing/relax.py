@@ -9,6 +9,7 @@ is too large, and relaxed again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
+from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
@@ -39,6 +41,7 @@ WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strict
 # -7e-4 to 3e-3, and FIRST_GAP = 10 and 100 by up to 2e-3 and 3e-5.
 WINDOW = 240  # control points relaxed at a time ...
 OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
+SPANS_SHARED = 2_000  # fewer are relaxed by one thread: threads take 1 ms to begin, a span some 20 us
 
 
 class Goal(NamedTuple):
@@ -246,14 +249,11 @@ def _run(q, corridor, splines, runs, used, goal):
     return Run(own, knots, sites, H, linear, middle, runs.fixed_first[q], runs.fixed_last[q])
 
 
-@njit(cache=True, error_model="numpy")
-def _relax(corridor, splines, runs, used, left, goal, only_outside):
-    """Columns of `Relaxed`."""
-    certified, multiplier = np.zeros(len(splines.fits), np.bool_), np.zeros(len(used))
-    control, radius, left = splines.control.copy(), used.copy(), left.copy()
-    for q in range(len(splines.fits)):
-        if not splines.fits[q]:
-            continue
+@njit(cache=True, error_model="numpy", nogil=True)
+def _relax(corridor, splines, runs, used, goal, only_outside, own, found):
+    """Write the runs `own` (k,) into the columns of `Relaxed`, which hold what was before."""
+    certified, control, radius, left, multiplier = found
+    for q in own:
         run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
         if not only_outside:
             for i in range(len(start)):
@@ -265,7 +265,17 @@ def _relax(corridor, splines, runs, used, left, goal, only_outside):
             _put(smaller, splines.site_first[q], radius)
         _put(kept, splines.span_first[q], left)
         _put(prices, splines.site_first[q], multiplier)
-    return certified, control, radius, left, multiplier
+
+
+def _shares(size: Array, count: int) -> list[Array]:
+    """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list that has least."""
+    lists: list[list[int]] = [[] for _ in range(count)]
+    total = [0] * count
+    for q in np.argsort(-size, kind="stable").tolist():
+        least = total.index(min(total))
+        lists[least].append(q)
+        total[least] += int(size[q])
+    return [np.array(sorted(own), dtype=np.int64) for own in lists if own]
 
 
 def relax(
@@ -277,10 +287,29 @@ def relax(
     goal: Goal,
     only_outside: bool = False,
 ) -> Relaxed:
-    """Relax the splines that fit (`Relaxed`).
+    """Relax the splines that fit (`Relaxed`), each run by itself, side by side: the result is the same for any number of threads.
 
     used : (J,) radius that each site may use [mm], the present splines strictly inside
     left : (S,) what the certificate leaves of the tolerance, of runs that do not fit [mm]
     only_outside : only where they have no certificate
     """
-    return Relaxed(*_relax(corridor, splines, runs, used, left, goal, only_outside))
+    found = Relaxed(
+        certified=np.zeros(len(splines.fits), dtype=np.bool_),
+        control=splines.control.copy(),
+        used=used.copy(),
+        left=left.copy(),
+        multiplier=np.zeros(len(used)),
+    )
+    fitting = np.flatnonzero(splines.fits)
+    size = np.diff(splines.span_first)[fitting]
+    shares = _shares(size, threads() if size.sum() >= SPANS_SHARED else 1)
+
+    def work(own: Array) -> Callable[[], None]:
+        return lambda: _relax(corridor, splines, runs, used, goal, only_outside, own, found)
+
+    tasks = [work(fitting[own]) for own in shares]
+    if len(tasks) > 1:
+        side_by_side(tasks, lambda: None, lambda: None)
+    elif tasks:
+        tasks[0]()
+    return found

@@ -91,7 +91,8 @@ def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> tuple[A
     least = np.maximum(least, run.length / (ARC_STEP * run.step_max))
     steps, times = np.empty(len(run), np.int64), []
     for r, (begin, end) in enumerate(pairwise(vertex_time)):
-        inside = motion.t[(motion.t > begin) & (motion.t < end)]
+        inside = motion.t[slice(*np.searchsorted(motion.t, [begin, end], side="right"))]
+        inside = inside[inside < end]
         t = np.concatenate([[begin], inside, [end]])
         even = (t - begin) / (end - begin)
         fraction = np.interp(t, motion.t, spent)

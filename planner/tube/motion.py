@@ -1,7 +1,7 @@
 """From steps to a motion: integrated exactly, ending exactly, and slowed down by what is left of rounding.
 
-The solver's rows have residuals of some 1e-8. The steps' jerks are integrated from rest, and the smallest change of the jerks that
-makes the last node meet the end at rest is added (least squares, per axis). Slowing down by lam divides speeds by lam, accelerations
+A solver's rows have residuals of some 1e-8. The steps' jerks are integrated from the first node, and the smallest change of the jerks
+that makes the last node meet its end is added (least squares, per axis). Slowing down by lam divides speeds by lam, accelerations
 by lam^2 and jerks by lam^3 and leaves the path as it is.
 """
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.tube.guess import Guess
-from planner.tube.outcome import TubeSolution
 from planner.tube.run import TubeRun
 
 # Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.
@@ -36,54 +35,52 @@ class Steps:
     jerk: FloatArray
 
 
-def steps_of(run: TubeRun, guess: Guess, solution: TubeSolution) -> Steps:
-    """The motion of a solution, from vertex to vertex and within all limits (module text).
+def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Steps:
+    """The motion with the jerk (N, A) [mm/s3] over steps of h (N,) [s], from vertex to vertex and within all limits (module text).
 
-    solution : one that found steps; `guess` is what it began with
+    guess : what the search began with
     """
-    assert solution.h is not None
-    assert solution.jerk is not None
-    h, jerk = solution.h, solution.jerk
-    steps = integrated(run, h, jerk - closing_jerks(run, h, jerk))
+    begin, end = (np.zeros((3, len(run.axis))) for _ in range(2))
+    begin[0], end[0] = run.vertex[0], run.vertex[-1]
+    jerk = closed(begin, end, h, jerk)
+    p, v, a = np.moveaxis(integrated(begin, h, jerk)[:-1], 1, 0)
+    steps = Steps(h=h, position=p, velocity=v, acceleration=a, jerk=jerk)
     by = max(_excess(run, guess, steps), 1.0)
-    return Steps(
-        h=h * by,
-        position=steps.position,
-        velocity=steps.velocity / by,
-        acceleration=steps.acceleration / by**2,
-        jerk=steps.jerk / by**3,
-    )
+    return Steps(h=h * by, position=p, velocity=v / by, acceleration=a / by**2, jerk=jerk / by**3)
 
 
-def integrated(run: TubeRun, h: FloatArray, jerk: FloatArray) -> Steps:
-    """The motion from rest at the first vertex with the jerk (N, A) [mm/s3], constant over steps of h (N,) [s]."""
-    h = h[:, None]
-    acceleration = _before(h * jerk)
-    velocity = _before(h * (acceleration + h * jerk / 2))
-    position = run.vertex[0] + _before(h * (velocity + h * (acceleration / 2 + h * jerk / 6)))
-    return Steps(h=h[:, 0], position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
+def integrated(begin: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
+    """(N+1, 3, A) position, velocity and acceleration at the nodes, from those at the first one, begin (3, A) [mm, s].
+
+    h    : (N,) durations [s]
+    jerk : (N, A) constant on each step [mm/s3]
+    """
+    h, state = h[:, None], np.empty((len(h) + 1, 3, jerk.shape[1]))
+    a = state[:, 2] = _summed(begin[2], h * jerk)
+    v = state[:, 1] = _summed(begin[1], h * (a[:-1] + h * jerk / 2))
+    state[:, 0] = _summed(begin[0], h * (v[:-1] + h * (a[:-1] / 2 + h * jerk / 6)))
+    return state
 
 
-def _before(change: FloatArray) -> FloatArray:
-    """(N, A) sums of the changes before each step."""
-    return np.vstack([np.zeros((1, change.shape[1])), np.cumsum(change, axis=0)[:-1]])
+def _summed(begin: FloatArray, change: FloatArray) -> FloatArray:
+    """(N+1, A) begin (A,) and the sums of the changes (N, A) after it."""
+    return begin + np.vstack([np.zeros_like(change[:1]), np.cumsum(change, axis=0)])
 
 
-def closing_jerks(run: TubeRun, h: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(N, A) the smallest change of jerk [mm/s3] without which the motion would not end at rest at the last vertex.
+def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
+    """(N, A) jerks that lead from `begin` (3, A) to `end` (3, A), position, velocity and acceleration: those given, changed least.
 
     h    : (N,) durations [s]
     jerk : (N, A) [mm/s3]
     """
-    rest = (h.sum() - np.cumsum(h)) / h.sum()  # after each step, in units of the whole time
-    own = h / h.sum()
+    lasts = h.sum()
+    rest = (lasts - np.cumsum(h)) / lasts  # after each step, in units of the whole time
+    own = h / lasts
     to_end = np.stack(
-        [own, own * (own / 2 + rest), own * (own**2 / 6 + rest * (own / 2 + rest / 2))]
-    )  # of a, v, p, in those units
-    apart = (run.vertex[-1] - run.vertex[0]) / h.sum() ** 3
-    missed = to_end @ jerk - np.stack([np.zeros_like(apart), np.zeros_like(apart), apart])
-    closing: FloatArray = np.linalg.lstsq(to_end, missed, rcond=None)[0]
-    return closing
+        [own * (own**2 / 6 + rest * (own / 2 + rest / 2)), own * (own / 2 + rest), own]
+    )  # of p, v, a, in those units
+    missed = (integrated(begin, h, jerk)[-1] - end) / lasts ** np.array([[3.0], [2.0], [1.0]])
+    return jerk - np.linalg.lstsq(to_end, missed, rcond=None)[0]
 
 
 def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:

@@ -44,20 +44,23 @@ def step_numbers(
             np.minimum(feed_end, fastest) / speed,
             np.minimum(run.across_max[leg], strongest) / acc,
             mean_step / length,
-            _pace(guess) / speed,
+            pace(guess.state[:, 1]) / speed,
         ]
     )
 
 
-def _pace(guess: Guess) -> FloatArray:
+def pace(velocity: FloatArray) -> FloatArray:
     """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
-    to be as small as the speed."""
-    at_nodes = np.linalg.norm(guess.state[:, 1], axis=1)
-    pace: FloatArray = np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * at_nodes.max())
-    return pace
+    to be as small as the speed.
+
+    velocity : (N+1, A) at the nodes [mm/s]
+    """
+    at_nodes = np.linalg.norm(velocity, axis=1)
+    return np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * float(at_nodes.max()))
 
 
 def acceleration_along(guess: Guess) -> FloatArray:
     """(N,) pace times u = v.a/|v|^2 in the middle of each step [mm/s2]."""
+    own = pace(guess.state[:, 1])
     v, a = (guess.state[:-1, k] / 2 + guess.state[1:, k] / 2 for k in (1, 2))
-    return _pace(guess) * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * _pace(guess)) ** 2)
+    return own * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * own) ** 2)

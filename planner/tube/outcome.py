@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.feedrate.solution import Status
+from planner.tube.motion import Steps
 
 SOLVED = (Status.OPTIMAL, Status.ACCEPTABLE)
 # What ipopt returns, as status and sentence.
@@ -42,17 +43,17 @@ class TubeSolution:
 
     status     : what is known of the steps
     sentence   : the same for a reader, with what to do about a failure
-    iterations : of ipopt
+    iterations : of the solver
     solve_time : [s]
-    h          : (N,) durations [s]
-    jerk       : (N, A) [mm/s3]
+    steps      : the motion, exact and within all limits
     place      : (N+1,) places of the nodes along the run [mm]
+    kept       : (N,) steps that stand for the motion of the start, which stays there; None for none
     """
 
     status: Status
     sentence: str
     iterations: int
     solve_time: float
-    h: FloatArray | None = None
-    jerk: FloatArray | None = None
+    steps: Steps | None = None
     place: FloatArray | None = None
+    kept: Array | None = None

@@ -1,9 +1,10 @@
-"""Runs of several motions, one after the other: each goes from rest to rest, so that nothing jumps where they meet."""
+"""Parts of several motions, one after the other: each goes from rest to rest, or the next one goes on as it ends, so that nothing jumps
+where they meet."""
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,12 +20,14 @@ SAME_TIME = 1e-9
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplicedRun:
-    """What a motion does from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it."""
+    """What a motion does from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it. If it is `moving`
+    at its end, the next one begins with the same position, velocity and acceleration."""
 
     motion: MotionInTime
     begin: float
     end: float
     hold: float = 0.0
+    moving: bool = False
 
     @property
     def lasting(self) -> float:
@@ -71,6 +74,8 @@ class Spliced:
         for k in np.unique(of):
             run, asked = self.runs[k], times[of == k]
             local = run.begin + (asked - self.begin[k])
+            if run.moving:  # rounding of times: its end belongs to the next one
+                local = np.minimum(local, np.nextafter(run.end, run.begin))
             single, which = np.unique(np.minimum(local, run.end), return_inverse=True)
             seen = run.motion.at(single, dt)
             columns = {name: getattr(seen, name)[which] for name in ("position", "block", "line")}
@@ -105,5 +110,5 @@ class Spliced:
             if more > 0:
                 motion = motion.waiting(at[inside] - self.begin[k] + run.begin, by[inside])
             hold = run.hold + float(by[behind].sum())
-            runs.append(SplicedRun(motion=motion, begin=run.begin, end=run.end + more, hold=hold))
+            runs.append(replace(run, motion=motion, end=run.end + more, hold=hold))
         return Spliced(runs=tuple(runs))

@@ -12,8 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.base import kept
+from planner.base import kept, kernels
 from planner.base.kernels import Kernel, njit
+
+# Elsewhere kernels are numba's own dispatchers.
+pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="another version of numba")
 
 KERNELS = """
 from typing import NamedTuple

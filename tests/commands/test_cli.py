@@ -11,8 +11,10 @@ import pytest
 from command_line import run
 from hand_made import SQUARE
 from rich.text import Text
+from typer.testing import CliRunner, Result
 
 import planner
+from planner.cli import app
 from planner.commands.terminal import show
 from planner.machine import builtin_machines, load_machine
 
@@ -178,3 +180,69 @@ def test_expand(tmp_path: Path) -> None:
     job.write_text("G21 F600\nG1 X[1/0]\n")
     assert run("expand", job, "-o", out, "--force").exit_code == 2
     assert "division by zero" in run("expand", job).stderr
+
+
+# ------------------------------------------------------------------------------------------ what a shell and a user may write
+
+
+def test_names_that_are_nearly_right(job: Path) -> None:
+    for arguments, said in (
+        (["plam", job], "Did you mean 'plan'?"),
+        (["plan", job, "--toleranse", "1"], "--tolerance"),
+        (["plan", job, "--method", "optimel"], "did you mean 'optimal'?"),
+        (["plan", job, "-m", "mil"], "did you mean 'mill'?"),
+        (["machine", "show", "mil"], "did you mean 'mill'?"),
+        (["compare", job, "--method", "stopp"], "did you mean 'stop'?"),
+        (["verify", job, job, "--not-limited", "jrek"], "did you mean 'jerk'?"),
+    ):
+        result = run(*arguments)
+        assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
+
+
+def test_options_without_an_effect_are_refused(job: Path) -> None:
+    for arguments, said in (
+        (["plan", job, "--json", "--corners"], "--json prints none"),
+        (["plan", job, "-v", "-q"], "--quiet"),
+        (["plan", job, "--force"], "without -o or --trace"),
+        (["compare", job, "--force"], "name one with -o FILE"),
+        (["expand", job, "--force"], "name one with -o FILE"),
+    ):
+        result = run(*arguments)
+        assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
+
+
+def test_a_program_on_the_standard_input(job: Path) -> None:
+    def piped(text: str, *arguments: object) -> Result:
+        return CliRunner().invoke(app, [str(argument) for argument in arguments], input=text)
+
+    alone = json.loads(run("info", job, "--json").stdout)
+    told = json.loads(piped(SQUARE, "info", "-", "--json").stdout)
+    assert told == alone | {"source": "<stdin>"}
+    planned = json.loads(piped(SQUARE, "plan", "-", "--method", "stop", "--json").stdout)
+    assert (planned["program"], planned["verdict"]["passed"]) == ("<stdin>", True)
+    assert piped(SQUARE, "expand", "-").stdout == SQUARE
+    assert piped("G1 X5 ?", "plan", "-").stderr.startswith("<stdin>:1:7: ")
+    assert piped("", "info", "-").stderr.startswith("<stdin>:1:1: the program is empty")
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("planner plan --method ki", "kinematic"),
+        ("planner plan -m pl", "plotter"),
+        ("planner what", "what-if"),
+    ],
+)
+def test_completion(words: str, offered: str) -> None:
+    env = {
+        "_PLANNER_COMPLETE": "complete_bash",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+    }
+    done = CliRunner().invoke(app, [], env=env, prog_name="planner")
+    assert done.stdout.split() == [offered]
+
+
+def test_units_in_brackets_are_printed(job: Path) -> None:
+    """They were taken for markup."""
+    assert "extent [mm]" in run("info", job).stdout

@@ -13,7 +13,7 @@ from planner.base import kernels
 from planner.base.names import METHODS
 from planner.commands import first_run
 from planner.commands.first_run import BESIDE, Helper, compile_beside
-from planner.commands.terminal import ProgressBar
+from planner.commands.progress import ProgressBar
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
 
@@ -52,11 +52,10 @@ def test_the_process_starts_once_with_the_first_kernel_and_ends_with_the_command
 
     monkeypatch.setattr(subprocess, "Popen", recorded)
     with Helper("mill", "stop") as helper, ProgressBar(quiet=True, at_first_kernel=helper.start):
-        assert kernels._told is not None
-        kernels._told(False)
+        kernels.compilation().begins(False)
         assert started == []  # what is compiled by another process could not be kept
-        kernels._told(True)
-        kernels._told(True)
+        kernels.compilation().begins(True)
+        kernels.compilation().begins(True)
         (process,) = started
         assert process.poll() is None
     assert process.returncode not in (None, 0)

@@ -17,8 +17,8 @@ import pytest
 import rich.progress
 from hand_made import SQUARE
 
-from planner.commands import terminal
-from planner.commands.terminal import ProgressBar
+from planner.commands import progress as progress_bar
+from planner.commands.progress import ProgressBar
 
 PYTHON = [sys.executable, "-c"]
 COMMAND = [*PYTHON, "from planner.cli import main; main()"]
@@ -178,8 +178,9 @@ def test_any_encoding_and_any_file_name(tmp_path: Path) -> None:
 
 
 def test_progress_without_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    monkeypatch.setattr(terminal, "PROGRESS_AFTER", 0.0)
-    monkeypatch.setattr(terminal, "LINE_EVERY", 0.0)
+    monkeypatch.setattr(progress_bar, "PROGRESS_AFTER", 0.0)
+    monkeypatch.setattr(progress_bar, "LINE_EVERY", -1.0)
+    monkeypatch.setattr(progress_bar, "LINE_SHARE", -1.0)
     with ProgressBar() as progress:
         progress("solve", 0.0)
         progress("solve", 1.0)
@@ -193,7 +194,7 @@ def test_progress_without_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: py
 
 
 def test_the_clock_of_the_bar_runs_on_after_a_stage(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(terminal, "PROGRESS_AFTER", 0.0)
+    monkeypatch.setattr(progress_bar, "PROGRESS_AFTER", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     bars: list[rich.progress.Progress] = []
 

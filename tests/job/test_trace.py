@@ -59,7 +59,10 @@ def test_second_order_is_told_likewise_and_other_methods_in_a_line():
     SecondOrderMethod(rounds=1).plan(program, machine, log=second)
     assert {"splines", "solve", "reshape 1", "plan"} <= {step.name for step in second.steps}
     StopMethod().plan(program, machine, log=stop)
-    assert [(step.name, step.facts["method"]) for step in stop.steps] == [("plan", "stop")]
+    assert [(step.name, step.facts.get("method")) for step in stop.steps] == [
+        ("programmed feed", None),
+        ("plan", "stop"),
+    ]
 
 
 def test_lines_of_a_table():
@@ -97,13 +100,13 @@ def test_the_command_line_has_lines_and_a_file(tmp_path: Path):
     program.write_text(SQUARE)
     result = run(program, "--method", "stop", "--verbose", "--trace", file, "--json")
     assert result.exit_code == 0
-    header, line = result.stderr.splitlines()
+    header, _, line = result.stderr.splitlines()
     assert header.split()[:3] == ["at", "took", "step"]
     assert "method stop" in line
     json.loads(result.stdout)
     written = json.loads(file.read_text())
     assert written["method"] == "stop"
-    assert [step["name"] for step in written["steps"]] == ["plan"]
+    assert [step["name"] for step in written["steps"]] == ["programmed feed", "plan"]
     assert run(program, "--method", "stop", "--trace", file).exit_code == 0  # a trace may be replaced
     refused = run(program, "--method", "stop", "--trace", program)
     assert refused.exit_code == 2

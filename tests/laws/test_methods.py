@@ -26,7 +26,7 @@ PLAIN = {"fir-plain", "fir-spline-plain"}
 HOLDING = tuple(name for name in METHODS if name not in PLAIN | {"tube"})
 # Methods that choose a full stop where it is faster: never slower than stopping everywhere, to the accuracy of their grids.
 NOT_SLOWER = {"optimal": 2e-3, "bezier": 1e-6, "kinematic": 1e-6, "second-order": 1e-6, "stop": 1e-9}
-FEW_ROUNDS = 3  # of reshaping: the laws hold after any number of them
+FEW_ROUNDS = 1  # of reshaping: the laws hold after any number of them
 seeds = st.integers(0, 10**6)
 UNITS = {"x": 1.0, "y": 1.0, "z": 1.0, "a": 180.0 / np.pi}  # a machine file's rotary axes are in degrees
 

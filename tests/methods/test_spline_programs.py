@@ -83,6 +83,7 @@ def test_a_circle_takes_as_long_as_the_arc(method: str, near: float) -> None:
     assert one == pytest.approx(other, rel=near)
 
 
+@pytest.mark.slow
 def test_a_spline_is_as_fast_as_its_fine_chords_or_faster() -> None:
     curve = curve_named("trident")
     how = {"method": "second-order", "effort": "quick", "tolerance": 0.01}

@@ -17,9 +17,9 @@ from planner.feedrate.solution import Status
 from planner.job.plan import Plan
 from planner.machine import Fir
 from planner.methods.optimal import OptimalMethod
-from planner.methods.tube import LEGS_MAX, TubeMethod
+from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
-from planner.tube.nlp import TubeNLP
+from planner.tube.nlp import LEGS_MAX, TubeNLP
 
 MACHINE = problems.machine()
 LEG = 4.0  # [mm]: room for a corner, and few steps
@@ -171,11 +171,11 @@ class NeverAsked(OptimalMethod):
 def test_a_job_that_is_too_long_is_refused_before_any_work():
     job = problems.star_spiral(LEGS_MAX // 4)
     points = np.vstack([[0.0, 0.0], *(np.asarray(job.end)[:, :2] for _ in range(5))])
-    with pytest.raises(InputError, match=f"at most {LEGS_MAX}.*split the program"):
-        TubeMethod(starts=(NeverAsked(),)).plan(problems.polyline(points), MACHINE)
+    with pytest.raises(InputError, match=f"at most {LEGS_MAX}.*with the solver own"):
+        TubeMethod(starts=(NeverAsked(),), solver="ipopt").plan(problems.polyline(points), MACHINE)
     turns = parse_program(f"G21 G17 G90 F6000\nG2 X0 Y0 I50 P{LEGS_MAX}\nM2\n")
     with pytest.raises(InputError, match="steps on arcs"):
-        TubeMethod(starts=(NeverAsked(),)).plan(turns, MACHINE)
+        TubeMethod(starts=(NeverAsked(),), solver="ipopt").plan(turns, MACHINE)
 
 
 HASTY = TubeNLP(max_iterations=2)
@@ -205,7 +205,9 @@ def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nG4 P0.1\nM2\n")
     made = TubeMethod(starts=SHORT, solver=SecondFails()).plan(job, MACHINE).require()
     assert made.verdict.passed, made.verdict.faults
-    first = TubeMethod(starts=SHORT).plan(parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n"), MACHINE)
+    first = TubeMethod(starts=SHORT, solver="ipopt").plan(
+        parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n"), MACHINE
+    )
     rest = SHORT[0].plan(parse_program("G21 G90 F6000\nG1 X4\nM2\n"), MACHINE)
     both = first.trajectory.cycle_time + rest.trajectory.cycle_time + 0.35
     assert made.trajectory.cycle_time == pytest.approx(both, rel=1e-6)

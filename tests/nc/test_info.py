@@ -23,7 +23,7 @@ def test_figures_of_a_small_program(tmp_path: Path) -> None:
     )
     assert found.blocks == {"rapid": 2, "line": 4, "arc": 2, "dwell": 1, "stop": 1}
     assert found.lines == 12
-    assert found.events == {"M3": 1, "S": 1, "T": 1}
+    assert found.events == {"M3": 1, "M6": 1, "S": 1, "T": 1}
     assert found.tools == (4,)
     assert (found.full_circles, found.helices) == (1, 1)
     assert found.dwell == 1.5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.base.errors import InputError
-from planner.machine import Machine
+from planner.machine import Machine, machine_from_dict
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 
@@ -132,3 +132,16 @@ def test_tools_of_a_machine_are_numbers_or_tables() -> None:
     assert (tools["1"].length, tools["1"].diameter, tools["2"].x) == (25.0, 0.0, 4.0)
     with pytest.raises(ValueError, match=r"tools\.1\.diameter"):
         Machine(**{**MACHINE.model_dump(), "tools": {"1": {"diameter": -1.0}}})
+
+
+def test_further_work_systems_of_fanuc() -> None:
+    given = MACHINE.model_copy(update={"work_offsets": {"g54.1p3": {"x": 5.0, "z": -2.0}}})
+    program = parse_program("G21 G0 X1\nG54.1 P3 G0 X1 Z1\nG54.1 P4 X1\nG54 X1\nM30", given)
+    assert program.end[:, 0].tolist() == [1.0, 6.0, 1.0, 1.0]
+    assert program.end[1, 2] == -1.0
+    assert [note for note in program.notes if "G54.1 P4 has no offset" in note]
+    for wrong in ("G54.1 X1", "G54.1 P0 X1", "G54.1 P301", "G54.1 P1.5"):
+        with pytest.raises(InputError, match="P"):
+            parse_program(f"G21 G0 X1\n{wrong}\nM30")
+    with pytest.raises(InputError, match=r"g54\.1p301"):
+        machine_from_dict({**MACHINE.model_dump(), "work_offsets": {"g54.1p301": {"x": 1.0}}})

@@ -11,12 +11,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from random_nc import KINDS
-from test_agreement import MACHINE, Canon, ask_oracle, assert_same_motion, needs_oracle, offsets_in_inches
+from random_nc import KINDS as OF_ONE_KIND
+from random_splines import random_splines
+from random_together import together
+from test_agreement import (
+    MACHINE,
+    Canon,
+    ask_oracle,
+    assert_same_motion,
+    needs_oracle,
+    offsets_in_inches,
+    random_program,
+)
 
 from planner.base.errors import InputError
 from planner.nc.reader import parse_program
 
+KINDS = {**OF_ONE_KIND, "moves": random_program, "splines": random_splines, "together": together}
 COUNT = 60  # of each kind; benchmarks/random_programs.py reads thousands
 GOUGES = 0.04  # share of programs that only the reader refuses, at most: 23 of 1500 were seen
 
@@ -45,7 +56,7 @@ class Tally:
             return
         try:
             assert not canon.error, f"only LinuxCNC refuses: {canon.error}"
-            assert_same_motion(program, canon, centre=1e-6, feeds=kind != "lathe")
+            assert_same_motion(program, canon, centre=1e-6, feeds=kind not in ("lathe", "together"))
         except AssertionError as fault:
             self.wrong += (f"{text}\n{fault}",)
         self.read += 1

@@ -235,7 +235,7 @@ def test_a_motion_code_alone_moves_nothing() -> None:
 def test_notes_say_what_is_missing() -> None:
     program = parse_program("T3 M6\nG43 H3\nG56\nG28\nG28\nG64 Q1 P1\nG64 Q1 P1\nG43 H3", machine())
     assert program.notes == (
-        "line 1: a tool change is a full stop that takes no time and moves nothing",
+        "line 1: a tool change is a full stop of the motion that moves nothing",
         "line 2: tool 3 has no length in the machine file: 0 (2 times)",
         "line 3: G56 has no offset in the machine file: 0",
         "line 4: G28 has no position in the machine file: machine zero (2 times)",

@@ -9,8 +9,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from planner.nc.lathe_thread import LatheThread, ThreadFault, depths, thread_passes
-from planner.nc.turning import Contour, ContourFault, Leg, Roughing, Step, pattern, stock_removal
+from planner.nc.lathe_thread import LatheThread, ThreadFault, lathe_depths, thread_passes
+from planner.nc.turning import (
+    Contour,
+    ContourFault,
+    Leg,
+    Roughing,
+    TurningStep,
+    pattern_repeat,
+    stock_removal,
+)
 
 # A shaft: face, chamfer, cylinder, fillet (an arc about (-40, 30)), cylinder, shoulder.
 SHAFT = Contour(
@@ -49,7 +57,7 @@ def mirrored(contour: Contour) -> Contour:
     return Contour(complex(contour.start.real, 40 - contour.start.imag), contour.fast, legs)
 
 
-def cuts(steps: list[Step], start: complex) -> list[tuple[complex, complex]]:
+def cuts(steps: list[TurningStep], start: complex) -> list[tuple[complex, complex]]:
     """Beginning and end of the moves at the feed."""
     found, at = [], start
     for step in steps:
@@ -136,7 +144,8 @@ def test_g72_is_g71_with_x_and_z_exchanged() -> None:
     given = Roughing(2.0, 0.4, ALLOWANCE)
     other = Roughing(2.0, 0.4, complex(0.25, 0.1))
     exchanged = [
-        Step(step.leg.exchanged(), step.fast) for step in stock_removal(SHAFT.exchanged(), other, facing=True)
+        TurningStep(step.leg.exchanged(), step.fast)
+        for step in stock_removal(SHAFT.exchanged(), other, facing=True)
     ]
     assert exchanged == list(stock_removal(SHAFT, given, facing=False))
 
@@ -153,7 +162,7 @@ def test_what_the_passes_leave_more_is_taken_by_the_last() -> None:
 
 
 def test_g73_is_the_profile_again_and_again() -> None:
-    steps = list(pattern(SHAFT, 4, complex(1.5, 3.0), ALLOWANCE))
+    steps = list(pattern_repeat(SHAFT, 4, complex(1.5, 3.0), ALLOWANCE))
     size = len(SHAFT.legs) + 1
     assert len(steps) == 4 * size + 1
     for n in range(4):
@@ -162,7 +171,7 @@ def test_g73_is_the_profile_again_and_again() -> None:
         assert part[0].leg.end == pytest.approx(SHAFT.start + by)
         for step, leg in zip(part[1:], SHAFT.legs, strict=True):
             assert step.leg.end == pytest.approx(leg.end + by)
-    assert [s.leg.end for s in pattern(SHAFT, 1, 5 + 5j, 0j)][1] == SHAFT.legs[0].end
+    assert [s.leg.end for s in pattern_repeat(SHAFT, 1, 5 + 5j, 0j)][1] == SHAFT.legs[0].end
 
 
 @pytest.mark.parametrize(
@@ -184,7 +193,7 @@ def test_refused_depths() -> None:
         with pytest.raises(ContourFault, match="depth"):
             list(stock_removal(SHAFT, Roughing(depth, 0.1, 0j), facing=False))
     with pytest.raises(ContourFault, match="passes"):
-        list(pattern(SHAFT, 0, 0j, 0j))
+        list(pattern_repeat(SHAFT, 0, 0j, 0j))
 
 
 M20 = LatheThread(complex(5, 12), complex(-25, 8.466), height=1.534, first=0.485, lead=2.5)
@@ -192,12 +201,14 @@ M20 = LatheThread(complex(5, 12), complex(-25, 8.466), height=1.534, first=0.485
 
 def test_passes_of_a_thread_take_the_same_section() -> None:
     """The section of a V thread grows with the square of its depth: by the same amount in every pass but the last."""
-    found = np.array(list(depths(M20)))
+    found = np.array(list(lathe_depths(M20)))
     grown = np.diff(found[:-1] ** 2)
     np.testing.assert_allclose(grown, M20.first**2, rtol=1e-12)
     assert found[-1] == M20.height
     assert len(found) == math.ceil((M20.height / M20.first) ** 2)
-    least = np.array(list(depths(LatheThread(**{**vars(M20), "least": 0.1, "finish": 0.05, "springs": 3}))))
+    least = np.array(
+        list(lathe_depths(LatheThread(**{**vars(M20), "least": 0.1, "finish": 0.05, "springs": 3})))
+    )
     assert (np.diff(least[:-4]) >= 0.1 - 1e-12).all()
     np.testing.assert_allclose(least[-4:], [1.484, 1.534, 1.534, 1.534])
 

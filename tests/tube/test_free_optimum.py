@@ -12,8 +12,8 @@ from planner.geometry.build import toolpath_from_program
 from planner.motion.timing import dense_motion
 from planner.motion.trajectory import joined
 from planner.tube.guess import guess_from
-from planner.tube.motion import steps_of
 from planner.tube.nlp import TubeNLP
+from planner.tube.own import TubeOwn
 from planner.tube.run import tube_runs_of
 
 LENGTH, JERK = 0.3, 2e5  # [mm], [mm/s3]: so short that neither 100 mm/s nor 2000 mm/s2 is reached
@@ -33,13 +33,14 @@ def begun(slower: float):
     return line(), guess_from(line(), seen, np.array([0.0, motion.end]))
 
 
+@pytest.mark.parametrize("solver", [TubeOwn(), TubeNLP()], ids=["own", "ipopt"])
 @pytest.mark.parametrize("slower", [1.1, 1.5])
-def test_a_line_from_rest_to_rest_takes_its_closed_form(slower):
+def test_a_line_from_rest_to_rest_takes_its_closed_form(slower, solver):
     """T = 4 (L/2j)^(1/3), from motions that take a tenth and half as long again."""
     run, guess = begun(slower)
-    solution = TubeNLP().solve(run, guess)
+    solution = solver.solve(run, guess)
     assert solution.status in (Status.OPTIMAL, Status.ACCEPTABLE), solution.sentence
-    steps = steps_of(run, guess, solution)
+    steps = solution.steps
     assert steps.h.sum() == pytest.approx(LEAST, rel=3e-4)
     assert np.abs(steps.jerk).max() <= JERK * (1 + 1e-9)
     assert steps.h.sum() >= LEAST * (1 - 1e-9)

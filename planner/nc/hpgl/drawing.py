@@ -18,7 +18,7 @@ from planner.nc.program import Kind, PathControl, Program
 
 Point = tuple[float, float]
 
-PEN_DOWN, PEN_UP = 3.0, 5.0  # M3 and M5
+PEN_DOWN, PEN_UP, PEN_CHANGE = 3.0, 5.0, 6.0  # M3, M5 and M6
 
 
 class Drawing:
@@ -81,6 +81,7 @@ class Drawing:
                 value=np.array([event[3] for event in self.events], dtype=np.float64),
             ),
             notes=tuple(notes),
+            pen=True,
         )
 
 

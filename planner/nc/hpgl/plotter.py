@@ -25,7 +25,7 @@ from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault
 from planner.nc.hpgl.arcs import circle_through
-from planner.nc.hpgl.drawing import PEN_DOWN, PEN_UP, Drawing, Point
+from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point
 from planner.nc.hpgl.instructions import ALLOWED, FORMS, IGNORED, PAGE_ENDS, REFUSED
 from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError
@@ -255,6 +255,7 @@ class _Run:
         self._move_pen(False, it.at)
         self.pen = int(pen)
         self.drawing.add_event("T", pen, it.at)
+        self.drawing.add_event("M", PEN_CHANGE, it.at)
         self.drawing.add_stop(self.position, 0.0, it.at)
         self._move_pen(was_down, it.at)
 

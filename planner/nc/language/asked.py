@@ -13,7 +13,7 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.program import PathControl
-from planner.nc.state import System
+from planner.nc.state import System, system_name
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
@@ -83,7 +83,10 @@ class Asked:
 
     def system(self) -> int:
         """The work coordinate system in force, G54 is 0."""
-        return _SYSTEMS.index(self.interpreter.state.system)
+        system = self.interpreter.state.system
+        if system not in _SYSTEMS:
+            raise ValueError(f"{system_name(system)} has no number that a program can ask for here")
+        return _SYSTEMS.index(system)
 
     def modes(self) -> Modes:
         """The words that bring back the present modes, all but the motion code: M70 and M72."""

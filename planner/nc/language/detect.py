@@ -17,11 +17,11 @@ from planner.machine import Machine
 from planner.nc.lexer import FAULT, Words
 from planner.nc.reading import AUTO, FANUC, LINUXCNC, Reading
 
-# Codes that call and return, save and restore modes.
 LATHE_NOTE = (
     "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
     "([dialect] lathe = false in the machine file if it is none)"
 )
+# Codes that call and return, save and restore modes.
 _CALLS = {ord("M"): (70, 71, 72, 73, 97, 98, 99), ord("G"): (65, 66, 67)}
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 _O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"

@@ -26,6 +26,7 @@ from planner.nc.language.linuxcnc.parser import LinuxcncParser
 from planner.nc.language.rows import AppendedRows
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import text as siemens_text
+from planner.nc.language.siemens.calls import files as siemens_files
 from planner.nc.language.siemens.parser import SiemensParser
 from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
@@ -93,7 +94,7 @@ _FRONTS = {
     FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
     LATHE: _Front(fanuc_text.LANGUAGE, LatheAsked, LatheParser, fanuc_files),
     HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
-    SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, lambda name: frozenset()),
+    SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, siemens_files),
 }
 
 
@@ -132,6 +133,9 @@ class _Files:
         faults = self.read(self.integers.applied(words), str(path))
         if faults:
             raise faults[0]
+        nameless = self.run.functions.pop("file", None)  # a subprogram that only its file names
+        if nameless is not None:
+            self.run.functions.setdefault(name, nameless)
         return True
 
     def _find(self, name: str) -> Path | None:

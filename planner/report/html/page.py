@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 REPORT = "report.html"
 PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
 CORNERS_MAX = 20_000  # corners that are listed, those closest to eq. 18-19
+CALLS_MAX = 10_000  # chains of calls that the page names; places in others have their line alone
 MARK = '<meta name="generator" content="feedrate-planner">'
 MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
 
@@ -94,6 +95,9 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         "line_limit": lines.limit.astype(np.uint8),
         "line_deviation": lines.deviation.astype(np.float32),
     }
+    program = plan.program
+    if program.frames:
+        columns["frame"] = program.frame[shown.block].astype(np.int32)
     for k, axis in enumerate(axes):
         columns[axis] = (shown.position[:, k] * scale[k]).astype(np.float32)
         columns[f"a{axis}"] = (shown.acceleration[:, k] * scale[k]).astype(np.float32)
@@ -114,6 +118,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "machine": {axis: machine.axes[axis].model_dump() for axis in axes},
         "corners": json_ready(_corners(plan)),
+        "calls": [program.called(frame) for frame in range(min(len(program.frames), CALLS_MAX))],
     }
     return columns, about
 

@@ -70,7 +70,7 @@
       head.append(make("th", "more of"), make("th", "saves [s]"));
       element("prices").append(head);
       for (const [name, seconds] of saved.sort((a, b) => b[1] - a[1]).slice(0, 8)) {
-        if (!(seconds > 0)) continue;
+        if (!(seconds > 1e-6)) continue;
         const row = make("tr"), more = name === "tolerance" ? `${1000 * prices.more_tolerance_mm} µm` : `${100 * prices.more_limit} %`;
         const hint = (prices.hints || []).includes(name) ? "about " : "";
         row.append(make("td", `${name}, ${more}`), make("td", hint + digits(seconds, 3)));
@@ -134,6 +134,7 @@
     return rows;
   }
   const pick = (column, rows) => Array.from(rows, (k) => column[k]);
+  const calls = (k) => (c.frame && about.calls[c.frame[k]]) || ""; // that led to the line, in an expanded program
   const place = (k) => [0, 1, 2].map((a) => (a < linear.length ? c[linear[a]][k] : 0));
   function pathTrace() {
     const rows = pathRows(), how = colourings[colouring], line = { width: 5, color: pick(how.column, rows), showscale: true };
@@ -152,7 +153,7 @@
     const at = [0, 1, 2].map((a) => (a < linear.length ? pick(c[linear[a]], rows) : rows.map(() => 0)));
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,
-      customdata: rows.map((k) => [c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? c.price[k] : 0]),
+      customdata: rows.map((k) => [calls(k) ? c.line[k] + calls(k) : c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? c.price[k] : 0]),
       hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} mm/s<br>held by %{customdata[2]}<br>" +
         "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm" +
         (c.price ? "<br>saved per µm %{customdata[5]:.3g} µs" : "") + "<extra></extra>",
@@ -372,7 +373,7 @@
   ], [
     (k) => c.line_number[k], (k) => (programLines[c.line_number[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
     (k) => c.line_planned[k] / c.line_programmed[k], (k) => c.line_highest[k], (k) => about.limits[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
-    ...(c.line_more ? [(k) => 1000 * c.line_more_feed[k], (k) => 1000 * c.line_more[k]] : []),
+    ...(c.line_more ? [c.line_more_feed, c.line_more].map((saved) => (k) => Math.round(1e6 * saved[k]) / 1e3) : []),
   ], c.line_number, c.line_more ? "cells ten" : "cells");
   const corner = about.corners;
   if (corner.line && corner.line.length) {
@@ -400,7 +401,7 @@
   function show(k, scroll) {
     now = k;
     element("clock").textContent = c.t[k].toFixed(3) + " s";
-    element("where").textContent = `line ${c.line[k]}, ${digits(c.feed[k])} mm/s, ${about.limits[c.limit[k]]}`;
+    element("where").textContent = `line ${c.line[k]}${calls(k)}, ${digits(c.feed[k])} mm/s, ${about.limits[c.limit[k]]}`;
     programList.mark(c.line[k] - 1, scroll);
     Plotly.restyle(pathPlot, marker(), [2]);
     Plotly.relayout(profilePlot, { "shapes[4].x0": c[against][k], "shapes[4].x1": c[against][k] });

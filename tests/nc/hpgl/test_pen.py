@@ -29,8 +29,9 @@ def told(program: Program) -> list[str]:
     [
         ("PU0,40;PD0,80;PU;", ["M5", "RAPID", "M3", "STOP", "LINE", "M5", "STOP"]),
         ("PU;PU;PD;PD;PU", ["M5", "M3", "STOP", "M5", "STOP"]),  # a dot
-        ("SP1;PD40,0;SP2;PA80,0;SP2;SP;", ["M5", "T1", "STOP", "M3", "STOP", "LINE", "M5", "STOP", "T2", "STOP", "M3", "STOP",
-                                           "LINE", "M5", "STOP", "T0", "STOP", "M3", "STOP"]),
+        ("SP1;PD40,0;SP2;PA80,0;SP2;SP;", ["M5", "T1", "M6", "STOP", "M3", "STOP", "LINE", "M5", "STOP", "T2", "M6", "STOP",
+                                           "M3", "STOP",
+                                           "LINE", "M5", "STOP", "T0", "M6", "STOP", "M3", "STOP"]),
         ("PD40,0;CI40;", ["M5", "M3", "STOP", "LINE", "M5", "STOP", "RAPID", "M3", "STOP", "ARC", "M5", "STOP", "RAPID",
                           "M3", "STOP"]),
         ("EA40,40", ["M5", "M3", "STOP", "LINE", "LINE", "LINE", "LINE", "M5", "STOP"]),

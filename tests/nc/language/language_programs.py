@@ -300,5 +300,5 @@ def same(one: Program, other: Program, *, apart: float = 0.0) -> None:
     """The same motion, whatever lines it comes from."""
     for name in ("kind", "path_control", "arc_block", "arc_normal"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-    for name in ("end", "feed", "dwell", "arc_center"):
+    for name in ("end", "feed", "dwell", "arc_center", "arc_sweep"):
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=apart, err_msg=name)

@@ -66,6 +66,22 @@ def test_columns_are_those_of_the_plan(page: str, plan: Plan) -> None:
     assert about["limits"][-1] == "none"
 
 
+def test_places_of_an_expanded_program_name_their_calls(tmp_path: Path) -> None:
+    file = tmp_path / "calls.ngc"
+    file.write_text(
+        "G21 F3000\no1 sub\nG1 X#1\no1 endsub\no2 sub\no1 call [9]\no2 endsub\nG1 Y5\no1 call [5]\no2 call\nM2\n"
+    )
+    plan = planner.plan(file, MILL, method="stop")
+    page = report_page(plan, file.read_bytes())
+    about = json.loads(re.search(r'id="about">(.*?)</script>', page, re.DOTALL).group(1))  # type: ignore[union-attr]
+    frame = column(page, "frame", "<i4")
+    assert plan.trajectory is not None
+    places = [f"line {line}{about['calls'][k]}" for line, k in zip(plan.trajectory.line, frame, strict=True)]
+    assert list(dict.fromkeys(places)) == [
+        "line 8", "line 3 (1), called from line 9", "line 3 (1), called from line 6 (2), called from line 10",
+    ]  # fmt: skip
+
+
 def test_deviation_is_that_of_the_verdict(plan: Plan) -> None:
     assert plan.verdict is not None
     worst = float(samples_of(plan).deviation.max())

@@ -18,7 +18,16 @@ from planner.nc.lexer import Words as LexedWords
 from planner.nc.program import Kind, Program
 from planner.nc.state import State
 from planner.nc.store import Store
-from planner.nc.turning import SAME, Contour, ContourFault, Leg, Roughing, Step, pattern, stock_removal
+from planner.nc.turning import (
+    SAME,
+    Contour,
+    ContourFault,
+    Leg,
+    Roughing,
+    TurningStep,
+    pattern_repeat,
+    stock_removal,
+)
 
 if TYPE_CHECKING:
     from planner.nc.language.run import ProgramRun
@@ -114,7 +123,7 @@ class LatheCycles:
     def _pattern(self, given: Given) -> Iterable[Words]:
         contour = self._contour()
         shift = complex(given.get("K", 0.0), given.get("I", 0.0)) * self._unit
-        return self._rows(pattern(contour, round(given["D"]), shift, self._allowance(given)))
+        return self._rows(pattern_repeat(contour, round(given["D"]), shift, self._allowance(given)))
 
     def _allowance(self, given: Given) -> complex:
         part = 0.5 if self.run.interpreter.state.diameters else 1.0
@@ -156,7 +165,7 @@ class LatheCycles:
     def _unit(self) -> float:
         return self.run.interpreter.state.unit
 
-    def _rows(self, steps: Iterable[Step]) -> list[Words]:
+    def _rows(self, steps: Iterable[TurningStep]) -> list[Words]:
         rows, at = [], self._point(self._start)
         try:
             for step in steps:

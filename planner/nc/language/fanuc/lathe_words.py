@@ -28,8 +28,12 @@ from planner.nc.language.tree import (
 )
 
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
-X_HERE, Z_HERE = Numbered(Number(5001.0)), Numbered(Number(5002.0))
+X_HERE, Z_HERE = (
+    Numbered(Number(5001.0)),
+    Numbered(Number(5002.0)),
+)  # parameters that hold the end of the last block
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
+# Codes that are not read, and why.
 _REFUSED = {
     **dict.fromkeys(("G74", "G75"), "peck drilling and grooving cycles of lathes are"),
     **dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are"),

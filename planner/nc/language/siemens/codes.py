@@ -5,6 +5,7 @@ from __future__ import annotations
 # Letters of words with the same meaning in RS274NGC.
 PLAIN_LETTERS = "NGXYZIJKFSM"
 # G codes with the same meaning.
+RETURNS = (2, 17, 30)  # M codes that end a subprogram
 SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 40, 54, 55, 56, 57, 90, 91, 94)
 # G codes of Siemens that are others here; an empty tuple changes nothing.
 CODES: dict[int, tuple[float, ...]] = {

@@ -9,7 +9,7 @@ from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
 from planner.nc.language.tree import ZERO, Expression, Line, Message, Number, Parameter, Statement, Word
 
-_TYPES = frozenset(("REAL", "INT", "BOOL"))
+TYPES = frozenset(("REAL", "INT", "BOOL"))
 
 
 class Commands(SiemensControl):
@@ -107,8 +107,8 @@ class Commands(SiemensControl):
     def _define(self, reader: TokenReader) -> None:
         kind = reader.peek()
         reader.next += 1
-        if kind not in _TYPES:
-            raise reader.fault(f"DEF {kind} is not read; read are {', '.join(sorted(_TYPES))}", 0)
+        if kind not in TYPES:
+            raise reader.fault(f"DEF {kind} is not read; read are {', '.join(sorted(TYPES))}", 0)
         while True:
             name = reader.peek()
             if reader.ended or reader.tokens[reader.next].kind != "name" or reader.peek(1) == "[":

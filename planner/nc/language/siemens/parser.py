@@ -21,7 +21,8 @@ import numpy as np
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.siemens import codes, drilling
-from planner.nc.language.siemens.commands import Commands, as_word
+from planner.nc.language.siemens.calls import Calls
+from planner.nc.language.siemens.commands import as_word
 from planner.nc.language.siemens.text import TokenReader, operation, variable
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
@@ -42,7 +43,7 @@ _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
-class SiemensParser(Commands):
+class SiemensParser(Calls):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
@@ -70,9 +71,10 @@ class SiemensParser(Commands):
             done = row + 1
         for left in self.open[:1]:
             self.faults.append(ProgramFault(left.place, f"this {left.kind} has no end"))
-        own = ("_depth", "_step", "_tx", "_ty", "_tz", *(f"_count{k}" for k in range(self.counters)))
+        own = ["_depth", "_step", *(f"_count{k}" for k in range(self.counters))]
+        own += [] if self.source.file else ["_tx", "_ty", "_tz"]
         first = Line(start, (), tuple((variable(name), ZERO) for name in own))
-        return [Procedure("", start, [first, *self.main])]
+        return [Procedure("file" if self.source.file else "", start, [first, *self.main])]
 
     def _special(self) -> list[int]:
         """Rows, ascending, that are not words of the same meaning in RS274NGC."""
@@ -80,7 +82,7 @@ class SiemensParser(Commands):
         letter, value = words.letter, words.value
         same = np.isin(letter, [ord(c) for c in codes.PLAIN_LETTERS])
         same &= (letter != ord("G")) | np.isin(value, codes.SAME_CODES)
-        same &= (letter != ord("M")) | (value != 17)
+        same &= (letter != ord("M")) | ~np.isin(value, codes.RETURNS if self.source.file else (17,))
         found = np.unique(np.searchsorted(words.first, np.flatnonzero(~same), side="right") - 1)
         return [int(row) for row in found if letter[words.first[row]] != ord("%")]
 
@@ -131,6 +133,8 @@ class SiemensParser(Commands):
             read(self, reader)
             if not reader.ended:
                 raise reader.fault(f"{reader.peek()} is not expected here")
+        elif self._is_call(reader):
+            self._call(reader)
         else:
             self._words(reader)
 
@@ -184,11 +188,14 @@ class SiemensParser(Commands):
                 raise reader.fault(
                     "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
                 )
-        if any(chr(word.letter) == "M" and word.value == Number(17.0) for word in words):
-            words = [
-                Word(word.letter, word.at, Number(30.0)) if word.value == Number(17.0) else word
-                for word in words
-            ]
+        returns = (17.0, *(codes.RETURNS if self.source.file else ()))
+        ended = [
+            word
+            for word in words
+            if chr(word.letter) == "M" and isinstance(word.value, Number) and word.value.value in returns
+        ]
+        words = [word for word in words if word not in ended]
+        words += [as_word("M", word.at, Number(30.0)) for word in ended if not self.source.file]
         if words or assigned:
             self.body.append(Line(reader.place, tuple(words), tuple(assigned)))
         if stops:
@@ -200,6 +207,8 @@ class SiemensParser(Commands):
             )
         if moved and self.cycle is not None:
             self.body += self.cycle
+        if ended and self.source.file:
+            self._return(reader)
 
     def _word(self, reader: TokenReader, name: str, at: int) -> list[Word]:
         """The words of RS274NGC for one word. Raises ProgramFault."""
@@ -275,7 +284,10 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
     **dict.fromkeys(("TRANS", "ATRANS"), SiemensParser._shift),
     "MCALL": SiemensParser._modal_call,
     "MSG": SiemensParser._message,
-    **dict.fromkeys(("EXTERN", "PROC", "WORKPIECE"), SiemensParser._idle),
+    **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
+    "PROC": SiemensParser._procedure,
+    "CALL": SiemensParser._call_text,
+    "RET": SiemensParser._return,
     **dict.fromkeys(
         codes.REFUSED,
         SiemensParser._refused,

@@ -102,9 +102,17 @@ def position(axis: str) -> Numbered:
     return Numbered(Number(float(FIRST_POSITION + "XYZ".index(axis))))
 
 
+_FRAME = frozenset(("_tx", "_ty", "_tz"))  # of TRANS, which subprograms do not reset
+
+
 def variable(name: str) -> Named:
-    """A variable of the program, or of the reader's own."""
-    return Named(name.lower(), True)
+    """A variable of the program, or of the reader's own: each call has its own ones, but for those of TRANS."""
+    return Named(name.lower(), name.lower() in _FRAME)
+
+
+def handed_over(number: int) -> Named:
+    """The value of that number, from 0, that a call hands to a subprogram."""
+    return Named(f"_value {number}", True)
 
 
 @dataclass(frozen=True)

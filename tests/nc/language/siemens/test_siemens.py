@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from language_programs import same
 
 from planner.base.errors import InputError
 from planner.machine import load_machine
 from planner.nc.program import Kind, PathControl, Program
-from planner.nc.reader import parse_program
+from planner.nc.reader import parse_program, read_program
 from planner.nc.reading import Reading
 
 MILL = load_machine("mill")
@@ -27,14 +28,9 @@ def read(text: str) -> Program:
     return parse_program(text, MILL, SIEMENS)
 
 
-def same(found: Program, text: str) -> None:
-    expected = parse_program(text, MILL)
-    assert found.kind.tolist() == expected.kind.tolist()
-    np.testing.assert_allclose(found.end, expected.end, atol=1e-9)
-    np.testing.assert_allclose(found.feed, expected.feed)
-    np.testing.assert_allclose(found.arc_center, expected.arc_center, atol=1e-9)
-    np.testing.assert_allclose(found.arc_sweep, expected.arc_sweep, atol=1e-9)
-    np.testing.assert_allclose(found.dwell, expected.dwell)
+def assert_reads_as(found: Program, text: str) -> None:
+    """The same motion as that of a program in RS274NGC."""
+    same(found, parse_program(text, MILL), apart=1e-9)
 
 
 def test_words_with_values_and_coordinates_of_both_kinds() -> None:
@@ -51,7 +47,7 @@ N80 G90 G4 F1.5
 N90 G0 SUPA Z=-3
 M30"""
     )
-    same(
+    assert_reads_as(
         found,
         """G21 G90 G94
 T0 M6
@@ -101,7 +97,7 @@ IF NOT (R1==4) AND TRUE GOTOF N900
 X999
 N900 Z=7 DIV 2"""
     )
-    same(
+    assert_reads_as(
         found,
         "G21 G0 X0 Y0\nG1 X10 F600\nX20\nX30\nY9\nY-2\nZ1\nZ0\nX29\nX28\nX11\nY-1\nY0\nY1\nZ3",
     )
@@ -123,7 +119,7 @@ X40
 TRANS
 X1""".replace("_NO", "1")
     )
-    same(
+    assert_reads_as(
         found,
         """G21 G90 G0 X0 Y0 Z30 F300
 G52 X15 Z1
@@ -225,3 +221,44 @@ def test_mutated_programs_end_in_a_program_or_a_sentence(monkeypatch: pytest.Mon
         except InputError:
             refused += 1
     assert 0 < refused < 200
+
+
+SUBPROGRAMS = {
+    "HOLE.SPF": "PROC HOLE(REAL DEPTH, INT TWICE)\nDEF REAL A=5\nG1 Z=-DEPTH\nIF TWICE==1\nG1 Z=-2*DEPTH\nENDIF\nG0 Z=A\nRET\nG0 X99\n",
+    "ROW.SPF": ";no first line\nG91 X2\nG90\nM17\n",
+    "L10.SPF": "R1=R1+1\nG1 Y=R1\nM30\n",
+    "10_deep.spf": "N10 TRANS X100\nG1 X1\nHOLE(1)\nM17\n",
+}
+
+
+def test_subprograms_in_files_of_their_own(tmp_path: Path) -> None:
+    for name, text in SUBPROGRAMS.items():
+        (tmp_path / name).write_text(text)
+    main = 'DEF REAL A=7\nEXTERN HOLE(REAL, INT)\nG0 X0 Y0 Z5 F100\nG1 X1\nHOLE(3, 1)\nROW P3\nL10\nL10\nCALL "10_DEEP"\nG1 X=A\nM30\n'
+    (tmp_path / "main.mpf").write_text(main)
+    program = read_program(tmp_path / "main.mpf", reading=Reading(dialect="siemens"))
+    written = "G21 G90 G0 X0 Y0 Z5 F100\nG1 X1\nG1 Z-3\nZ-6\nG0 Z5\nX3\nX5\nX7\nG1 Y1\nY2\nG1 X101\nZ-1\nG0 Z5\nG1 X107\nM30\n"
+    same(program, parse_program(written))
+    assert program.expansion is not None
+    assert dict(program.expansion.calls) == {"hole": 2, "row": 3, "l10": 2, "10_deep": 1}
+    place = program.place(len(program) - 2)
+    assert "HOLE.SPF" in place
+    assert "called from line 3" in place
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        ("NOFILE", "no such subprogram"),
+        ("HOLE(1", "missing"),
+        ("CALL 5", "followed by the name"),
+        ("POCKET3(1,2)", "not read"),
+        ("HOLE(1) X5", "not expected"),
+    ],
+)
+def test_calls_that_lead_nowhere_are_refused(call: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "HOLE.SPF").write_text(SUBPROGRAMS["HOLE.SPF"])
+    (tmp_path / "main.mpf").write_text(f"G0 X1\n{call}\nM30\n")
+    with pytest.raises(InputError, match=said) as found:
+        read_program(tmp_path / "main.mpf", reading=Reading(dialect="siemens"))
+    assert found.value.line == 2

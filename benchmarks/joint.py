@@ -1,0 +1,180 @@
+"""Geometry and feed together: what method `tube` with its own solver finds beyond `optimal`, on real programs and random jobs.
+
+    python -m benchmarks.joint [--random 20] [--only NAME ..]
+
+The named jobs are those of issue trackers and papers that the other benchmarks use: pentagon, zig-zag, circle and star spiral of
+problems.py on the built-in `mill` and on the machine of problems.py, the bracket, and windows of real programs of ../shared where
+these are there. `--random N`: the jobs 0 to N-1 of never_slower.py.
+
+Results: benchmarks/results/joint.json and .md, as far as they have come.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import planner
+from benchmarks import never_slower, problems
+from benchmarks.record import RESULTS, markdown, write_results
+from planner.base.errors import PlannerError
+from planner.machine import Machine
+from planner.methods.optimal import OptimalMethod
+from planner.methods.tube import TubeMethod
+from planner.nc.program import Program
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "nc"
+# File, first motion block, blocks, feed [mm/s]; the first is the window of the review.
+WINDOWS = {
+    "stellabee1, 121 blocks": ("LinuxCNC__linuxcnc__stellabee1.ngc", 18158, 121),
+    "trochoidal, 300 blocks": ("LinuxCNC__linuxcnc__trochoidal.ngc", 200, 300),
+    "vcarve, 300 blocks": ("CauldronDevelopmentLLC__CAMotics__vcarve.ngc", 1000, 300),
+}
+BRACKET = Path(planner.__file__).parent / "examples" / "bracket.ngc"
+# Settings of `optimal` from which the search may begin.
+STARTS = {
+    "normal": OptimalMethod(),
+    "first spline": OptimalMethod(effort="quick", rounds=0),
+}
+
+
+def window(name: str, machine: Machine) -> Program:
+    """Consecutive blocks of a program as a job of its own, as straight lines from its first point at rest."""
+    file, first, count = WINDOWS[name]
+    program = planner.read_program(SHARED / file, machine)
+    points = np.asarray(program.end)[first - 1 : first + count, :3]
+    feed = float(program.feed[first])
+    return problems.polyline(
+        points - points[0], feed=feed if np.isfinite(feed) else problems.FEED, source=name
+    )
+
+
+def relief(blocks: int) -> Program:
+    """A generated relief of steps of 0.3 mm, 400 a row, one run without stops."""
+    rng = np.random.default_rng(3)
+    amplitude, wave, phase = rng.normal(size=12), rng.uniform(0.05, 0.6, (12, 2)), rng.uniform(0, 6.28, 12)
+    n = np.arange(blocks + 1)
+    row, column = n // 400, n % 400
+    x, y = 0.3 * np.where(row % 2, 399 - column, column), 0.4 * row
+    z = 0.4 * (amplitude * np.sin(wave[:, 0] * x[:, None] + wave[:, 1] * y[:, None] + phase)).sum(axis=1)
+    z = np.where(z > 0.8, 0.8 + 0.3 * (z - 0.8), z)
+    points = np.round(np.stack([x, y, z], axis=1), 3)
+    return problems.polyline(points - points[0], source=f"relief of {blocks}")
+
+
+def jobs() -> dict[str, tuple[Callable[[], Program], Machine]]:
+    """The named jobs and their machines."""
+    mill, peers = planner.load_machine("mill"), problems.machine()
+    made: dict[str, tuple[Callable[[], Program], Machine]] = {
+        "pentagon, mill": (problems.pentagon, mill),
+        "zig-zag, mill": (problems.zigzag, mill),
+        "bracket, mill": (lambda: planner.read_program(BRACKET, mill), mill),
+        "relief of 1,000, mill": (lambda: relief(1000), mill),
+        "pentagon, peers": (problems.pentagon, peers),
+        "zig-zag, peers": (problems.zigzag, peers),
+        "circle, peers": (problems.chord_circle, peers),
+        "spiral of 1,000, peers": (problems.star_spiral, peers),
+        "relief of 1,000, peers": (lambda: relief(1000), peers),
+    }
+    if SHARED.exists():
+        for name in WINDOWS:
+            made[f"{name}, mill"] = (lambda name=name: window(name, mill), mill)  # type: ignore[misc]
+    return made
+
+
+def measured(program: Program, machine: Machine) -> dict[str, Any]:
+    """Cycle times [s], verdicts and CPU seconds from each start."""
+    row: dict[str, Any] = {"blocks": len(program.kind)}
+    for name, start in STARTS.items():
+        began = time.process_time()
+        try:
+            plan = TubeMethod(starts=(start,)).plan(program, machine)
+        except PlannerError as fault:
+            row[name] = {"sentence": str(fault)}
+            continue
+        kept = re.search(r"on ([0-9.e-]+) of the time no faster", plan.sentence)
+        took = re.search(r"its start, took ([0-9.e-]+) s", plan.sentence)
+        row[name] = {
+            "start_s": float(took[1]) if took else None,
+            "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
+            "passed": plan.verdict is not None and plan.verdict.passed,
+            "kept": 1.0 if "stays on" in plan.sentence else float(kept[1]) if kept else 0.0,
+            "cpu_s": time.process_time() - began,
+            "points": plan.grid_points,
+            "sentence": plan.sentence,
+        }
+    return row
+
+
+def main() -> None:
+    """Run the jobs and write the table."""
+    parser = argparse.ArgumentParser(description="geometry and feed together, against optimal")
+    parser.add_argument("--random", type=int, default=0, help="random jobs")
+    parser.add_argument("--only", nargs="*", help="names that contain one of these")
+    asked = parser.parse_args()
+    file = RESULTS / "joint.json"
+    rows: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))["jobs"] if file.exists() else {}
+    todo = {
+        name: pair for name, pair in jobs().items() if not asked.only or any(p in name for p in asked.only)
+    }
+    if asked.only == []:
+        todo = {}
+    for name, (make, machine) in todo.items():
+        rows[name] = measured(make(), machine)
+        print(name, rows[name], flush=True)
+        write_results("joint", {"jobs": rows}, _table(rows))
+    for seed in range(asked.random):
+        program, machine = never_slower.job(seed)
+        rows[f"random {seed}"] = measured(program, machine)
+        write_results("joint", {"jobs": rows}, _table(rows))
+
+
+def _table(rows: dict[str, Any]) -> str:
+    named = [[name, *_cells(row)] for name, row in rows.items() if not name.startswith("random")]
+    columns = ["job", "blocks"]
+    for name in STARTS:
+        columns += [f"`optimal`, {name} [s]", "tube [s]", "start kept on", "CPU [s]"]
+    text = "Cycle times of the start and of what method `tube` (solver own) finds from it; * the verdict failed. CPU seconds are of\n"
+    text += "the whole plan.\n\n" + markdown(columns, named)
+    random = [
+        row["normal"]
+        for name, row in rows.items()
+        if name.startswith("random") and "start_s" in row["normal"]
+    ]
+    if random:
+        gain = np.array([1.0 - row["cycle_time_s"] / row["start_s"] for row in random if row["cycle_time_s"]])
+        text += (
+            f"\n{len(random)} random jobs from `optimal`: {sum(row['passed'] for row in random)} passed, faster by "
+            f"{np.mean(gain):.2%} on the mean and {gain.max():.2%} at most, slower on {(gain < -1e-5).sum()}; the start stays whole "
+            f"on {sum(row['kept'] == 1.0 for row in random)} and in part on {sum(0 < row['kept'] < 1 for row in random)}.\n"
+        )
+    return text
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    cells = [str(row["blocks"])]
+    for name in STARTS:
+        found = row[name]
+        if found.get("cycle_time_s") is None:
+            cells += [found["sentence"][:40], "", "", ""]
+            continue
+        start = f"{found['start_s']:.5g}" if found["start_s"] else ""
+        fault = "" if found["passed"] else " *"
+        cells += [
+            start,
+            f"{found['cycle_time_s']:.5g}{fault}",
+            f"{found['kept']:.0%}",
+            f"{found['cpu_s']:.1f}",
+        ]
+    return cells
+
+
+if __name__ == "__main__":
+    main()

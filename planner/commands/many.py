@@ -1,0 +1,208 @@
+"""`planner plan` with several programs: each in a process of its own, as many at a time as there are cores.
+
+A process each, because a program that uses the memory up, or finds a bug, then ends alone. Its command line is that of one program,
+with `--json` and its share of the threads. What it writes stands in DIR/NAME, all of it or nothing, so that Ctrl-C loses only what was
+not finished.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from planner.base.errors import InputError
+from planner.base.files import STDIN
+from planner.base.threads import cores
+from planner.commands.interrupt import INTERRUPTED, interrupts_raise
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import BUG, say, show
+
+OUTCOMES = {0: "passed", 1: "failed", 2: "refused", 3: "not solved", INTERRUPTED: "interrupted"}
+CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
+ENDING = 5.0  # that processes get to remove what they have half written [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Done:
+    """What came of a program: exit code, the content of `summary.json` if there is any, and what the process said."""
+
+    job: Path
+    code: int
+    summary: dict[str, Any] = field(default_factory=dict)
+    said: str = ""
+
+    @property
+    def outcome(self) -> str:
+        """In words."""
+        return OUTCOMES.get(self.code, "a bug")
+
+
+def folders_of(jobs: Sequence[Path], output: Path) -> list[Path]:
+    """Where the files of each program go: DIR/NAME without the suffix, with it where another program has the same name otherwise.
+
+    Raises InputError if two programs have the same name, or one is there twice.
+    """
+    stems = [job.stem for job in jobs]
+    names = [job.name if stems.count(job.stem) > 1 else job.stem for job in jobs]
+    for name in names:
+        same = [str(job) for job, other in zip(jobs, names, strict=True) if other == name]
+        if len(same) > 1:
+            raise InputError(
+                f"{' and '.join(same)} would be written into the same {output / name}; plan them one by one"
+            )
+    return [output / name for name in names]
+
+
+def plan_many(
+    jobs: Sequence[Path],
+    options: Sequence[str],
+    output: Path | None,
+    *,
+    threads: int | None,
+    quiet: bool,
+    as_json: bool,
+) -> int:
+    """Plan programs side by side and print a table of them; returns the largest exit code, 130 after Ctrl-C.
+
+    options : of the command line, for each of them
+    output  : directory for a directory of each; None to write nothing
+    threads : to use in all; None for one per core
+    """
+    if Path(STDIN) in jobs:
+        raise InputError(f"{STDIN} is the standard input, which holds one program")
+    if len({job.resolve() for job in jobs}) < len(jobs):
+        raise InputError("a program is named twice")
+    folders = [None] * len(jobs) if output is None else folders_of(jobs, output)
+    many = min(threads or cores(), len(jobs))
+    each = ["--threads", str(max((threads or cores()) // many, 1)), *options]
+    tasks = [
+        _Task(job, [*each, *([] if folder is None else ["-o", str(folder)])])
+        for job, folder in zip(jobs, folders, strict=True)
+    ]
+    done: dict[Path, Done] = {}
+    interrupted = False
+    with ProgressBar(quiet=quiet) as progress, interrupts_raise():
+        pool = ThreadPoolExecutor(max_workers=many)
+        try:
+            running = [pool.submit(task.run) for task in tasks]
+            progress.count(0, len(jobs), 0)
+            for future in as_completed(running):
+                found = future.result()
+                done[found.job] = found
+                if not quiet:
+                    say(f"{found.job}: {_told(found)}", err=True)
+                progress.count(len(done), len(jobs), 0)
+        except KeyboardInterrupt:
+            interrupted = True
+            pool.shutdown(wait=False, cancel_futures=True)
+            _end(tasks)
+        pool.shutdown(wait=True, cancel_futures=True)
+    rows = [done.get(job) or Done(job=job, code=INTERRUPTED) for job in jobs]
+    _report(rows, as_json)
+    return INTERRUPTED if interrupted else max(row.code for row in rows)
+
+
+class _Task:
+    """A program and the process that plans it."""
+
+    def __init__(self, job: Path, options: Sequence[str]):
+        self.job, self._options = job, options
+        self.unwanted = False  # Ctrl-C came
+        self.process: subprocess.Popen[str] | None = None
+
+    def run(self) -> Done:
+        """Start the process, wait for it, and read what it says."""
+        path = os.pathsep.join(os.path.abspath(place) for place in sys.path)
+        command = [
+            sys.executable,
+            "-P",
+            "-c",
+            CHILD,
+            "plan",
+            *self._options,
+            "--json",
+            "-q",
+            "--",
+        ]
+        errors: list[str] = []
+        with subprocess.Popen(
+            [*command, str(self.job)],
+            env={**os.environ, "PYTHONPATH": path},
+            stdin=subprocess.PIPE,  # its end tells the process that this one has gone
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        ) as self.process:
+            if self.unwanted:
+                self.process.terminate()
+            assert self.process.stdout is not None
+            assert self.process.stderr is not None
+            said_there = self.process.stderr
+            reader = threading.Thread(target=lambda: errors.append(said_there.read()))
+            reader.start()
+            text = self.process.stdout.read()
+            code = self.process.wait()
+            reader.join()
+        summary: dict[str, Any] = {}
+        with suppress(ValueError):
+            summary = json.loads(text)
+        said = "".join(errors).strip()
+        if code < 0:
+            said, code = f"its process was ended by signal {-code}; {said}".rstrip("; "), BUG
+        return Done(job=self.job, code=code, summary=summary, said=said)
+
+
+def _end(tasks: Sequence[_Task]) -> None:
+    """End processes as Ctrl-C does, and harder where that does not help."""
+    for task in tasks:
+        task.unwanted = True
+    processes = [task.process for task in tasks if task.process is not None]
+    for number in (signal.SIGINT, signal.SIGTERM):
+        for process in processes:
+            with suppress(OSError, ValueError):  # gone already; no such signal on Windows
+                process.send_signal(number)
+        for process in processes:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(ENDING)
+
+
+def _told(done: Done) -> str:
+    time = done.summary.get("cycle_time_s")
+    return done.outcome if time is None else f"{time:.4f} s, {done.outcome}"
+
+
+def _report(rows: Sequence[Done], as_json: bool) -> None:
+    """Print the table, and why programs did not pass."""
+    if as_json:
+        programs = [
+            {"program": str(row.job), "exit_code": row.code, "outcome": row.outcome, "said": row.said, "summary": row.summary or None}
+            for row in rows
+        ]  # fmt: skip
+        say(json.dumps({"programs": programs}, indent=2, allow_nan=False))
+        return
+    from planner.report.programs import programs_table
+
+    show(programs_table([(str(row.job), row.outcome, row.summary, row.said) for row in rows]))
+
+
+def end_with_the_first() -> None:
+    """Let this process end, as Ctrl-C ends it, when the one that has started it ends."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def wait() -> None:
+        os.read(0, 1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=wait, daemon=True).start()

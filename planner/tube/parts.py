@@ -1,0 +1,92 @@
+"""What was found along a run as parts of a motion: steps of constant jerk, and between them the start's motion where it stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.feedrate.solution import Status
+from planner.geometry.toolpath import Toolpath
+from planner.motion.axis_motion import AxisMotion
+from planner.tube.motion import Steps
+from planner.tube.run import TubeRun
+from planner.tube.splice import SplicedRun
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """How the search along a run ended.
+
+    steps : None where the start stays
+    place : (N+1,) of the nodes along the run [mm]
+    times : (N+1,) of the nodes in the motion of the start [s]
+    kept  : (N,) steps that stand for the motion of the start; None for none
+    """
+
+    run: TubeRun
+    status: Status
+    sentence: str
+    steps: Steps | None = None
+    place: FloatArray | None = None
+    times: FloatArray | None = None
+    kept: Array | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing of the start's motion is left."""
+        return self.steps is not None and (self.kept is None or not self.kept.any())
+
+
+def parts_of(toolpath: Toolpath, found: Found, start: SplicedRun) -> list[SplicedRun]:
+    """The parts of the motion along a run, with the dwell before it, and the one at the end of the job.
+
+    start : the motion of the start along the run
+    """
+    assert found.steps is not None
+    assert found.times is not None
+    steps = len(found.steps.h)
+    kept = np.zeros(steps, dtype=bool) if found.kept is None else found.kept
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(kept)) + 1, [steps]])
+    parts = []
+    for lo, hi in pairwise(edges.tolist()):
+        if kept[lo]:
+            begin = start.begin if lo == 0 else float(found.times[lo])
+            end = start.end if hi == steps else float(found.times[hi])
+            parts.append(SplicedRun(motion=start.motion, begin=begin, end=end, moving=hi < steps))
+        else:
+            motion = _motion(toolpath, found, lo, hi)
+            parts.append(SplicedRun(motion=motion, begin=0.0, end=motion.end, moving=hi < steps))
+    return parts
+
+
+def _motion(toolpath: Toolpath, found: Found, lo: int, hi: int) -> AxisMotion:
+    """The steps lo .. hi - 1; before the first one of the run its dwell, and after the last one that at the end of the job."""
+    run, steps, place = found.run, found.steps, found.place
+    assert steps is not None
+    assert place is not None
+    first, last = run.first[0], run.first[-1]
+    before = toolpath.dwell[first] if lo == 0 else 0.0
+    behind = toolpath.dwell[last] if last == len(toolpath) and hi == len(steps.h) else 0.0
+    standing = int(before > 0)  # a step without motion before the others
+    along = np.append(0.0, np.cumsum(toolpath.length[first:last]))
+    inside = np.searchsorted(along[1:-1], (place[lo:hi] + place[lo + 1 : hi + 1]) / 2, side="right")
+    segment: Array = np.append([first] * standing, first + inside).astype(np.int64)
+    columns = {}
+    for name in ("position", "velocity", "acceleration", "jerk"):
+        whole = np.zeros((standing + hi - lo, len(toolpath.axes)))
+        if name == "position":
+            whole += toolpath.start[first]
+        whole[standing:, run.axis] = getattr(steps, name)[lo:hi]
+        columns[name] = whole
+    t = np.append(0.0, np.cumsum(np.append([before] * standing, steps.h[lo:hi])))
+    return AxisMotion(
+        axes=toolpath.axes,
+        t=t[:-1],
+        block=toolpath.block[segment],
+        line=toolpath.line[segment],
+        end=float(t[-1] + behind),
+        **columns,
+    )

@@ -17,6 +17,7 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.control_files.chords import DECIMALS, Polyline
 from planner.nc.events import plain
 from planner.nc.program import Kind, Program
+from planner.nc.text import STOPPING
 from planner.nc.writer import round_down
 
 PAUSE = "M0"
@@ -87,10 +88,10 @@ def polyline_text(
 def _between(program: Program, dialect: Dialect) -> list[tuple[int, int, str]]:
     """What stands between the moves, in order: the block before which it stands, a rank among those, and its text.
 
-    A full stop is a change of tool where a T word stands before it, which only LinuxCNC can do by itself, and a pause anywhere else.
+    A full stop is a change of tool where it is an M6, which of these controls only LinuxCNC has, and a pause anywhere else.
     """
-    found = [(event.block, 0, event.text) for event in program.events]
-    tools = {event.block for event in program.events if event.text.startswith("T")}
+    found = [(event.block, 0, event.text) for event in program.events if event.text not in STOPPING]
+    tools = {event.block for event in program.events if event.text == "M6"}
     for k in np.flatnonzero((program.kind == Kind.DWELL) | (program.kind == Kind.STOP)).tolist():
         change = dialect.name == "linuxcnc" and k in tools
         stop = "M6" if change else PAUSE

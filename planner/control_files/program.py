@@ -56,7 +56,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     control   : "grbl", "klipper", "marlin" or "linuxcnc"
     tolerance : of the path [mm], which plan and chords share
 
-    Raises InputError if the plan leaves no room for chords, or turns a rotary axis.
+    Raises InputError if the plan leaves no room for chords, or leaves the program.
     """
     room = _room(plan, tolerance)
     dialect = DIALECTS[control]

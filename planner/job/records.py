@@ -9,6 +9,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 
 SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
+PRICES_SHOWN = 4  # of a price list, in a line
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -125,7 +126,7 @@ class PlacePrices:
             freeze(self, "tolerance", np.float64, (segments + 1,))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PriceList:
     """What limits and tolerance cost: derivatives of the cycle time T, negative where more of a limit saves time.
 
@@ -148,6 +149,11 @@ class PriceList:
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     hints: tuple[str, ...] = ()
     places: PlacePrices | None = None
+
+    def __repr__(self) -> str:
+        """What would save most, in a line."""
+        most = ", ".join(f"{name} {saved:.3g} s" for name, saved in self.ranked()[:PRICES_SHOWN])
+        return f"<PriceList: more would save {most or 'nothing'}>"
 
     def ranked(self) -> list[tuple[str, float]]:
         """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""

@@ -14,7 +14,7 @@ from planner.base.arrays import Array, FloatArray, freeze
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Trajectory:
     """T samples over A axes. The last sample is the programmed end; the period before it may be shorter than dt.
 
@@ -58,6 +58,11 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __repr__(self) -> str:
+        """Setpoints, axes, period and duration, in a line."""
+        end = f", {self.cycle_time:.4f} s" if len(self) else ""
+        return f"<Trajectory: {len(self):,} setpoints, axes {' '.join(self.axes)}, dt {self.dt:g} s{end}>"
 
     @property
     def cycle_time(self) -> float:

@@ -18,8 +18,8 @@ What is tried more than once:
   -----------------------------  ----------------------------------------  ----------------  ------------  -----------------------------
   full stop where a run gets no  no curve inside the tolerance, or a cusp  2 times           splines anew  at last fenced by two stops,
     spline                                                                                                   with its single corners
-  round of reshaping             on splines, while the last one promised   effort.py; 5      shape, solve  faster runs keep the new one,
-                                   more than effort.py asks for              that gain < 5e-5                others are pulled more
+  round of reshaping             on splines, while the last one promised   effort.py; a run  shape, solve  faster runs keep the new one,
+                                   more than effort.py asks for              2 in vain                       others are pulled more
   only the runs that got faster  others got slower                         each round        solve         the fastest of three stays
   corners between full stops     "auto", a bound on their time is lower    3                 solve         splines stay where faster
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
@@ -65,8 +65,9 @@ from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# No round after so many that together gained less than this [-]: half of the gap that the solver leaves.
-ROUNDS_SEEN, GAIN_MIN = 5, 5e-5
+# A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
+# than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
+QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
 # Of a round, at first and at least (smoothing/joint.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
 # same time within 1e-4.
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
@@ -211,30 +212,35 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
     if rounds is None:
         rounds = min(settings.effort.work // len(best.samples), settings.effort.rounds)
     pull, gap = np.full(len(shape.splines.fits), FIRST_PULL), FIRST_GAP
-    reached = [best.solution.cycle_time]
+    quiet, done = np.zeros(len(pull)), ~shape.splines.fits
     for n in range(1, rounds + 1):
-        if len(reached) > ROUNDS_SEEN and reached[-1] > (1.0 - GAIN_MIN) * reached[-1 - ROUNDS_SEEN]:
-            break
         with job.stage("geometry"):
-            shape, promised = reshape(best, pull, gap)
+            shape, promised = reshape(best, np.where(done, np.inf, pull), gap)
         before, tried = best, solve(shape, best)
-        _tell_of(job, f"reshape {n}", tried, best)
+        _tell_of(job, f"reshape {n}", tried, best, of=int((~done).sum()))
         if not tried.solution.solved:
             break
-        gained = run_times(before) - run_times(tried)
+        time = run_times(before)
+        gained = time - run_times(tried)
         faster = gained > 0.0
         if tried.faster_than(best):
             best = tried
-        if faster.any() and not (faster | ~shape.splines.fits).all():
+        if faster.any() and not (faster | done).all():
             mixed = solve(chosen(before, shape, faster), before, tried)
-            _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=len(faster))
+            _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=int((~done).sum()))
             if mixed.faster_than(best):
                 best = mixed
+        # a promise of nothing or less is none: the convex problem was not solved to the end, and the run is pulled more
+        sound = promised > 0.0
+        little = (gained < QUIET_GAIN * time) & (promised < QUIET_PROMISE * time)
+        quiet = np.where(sound & little, quiet + 1.0, 0.0)
         change = np.where(gained > GOOD * promised, LESS, np.where(gained > POOR * promised, 1.0, MORE))
-        pull = np.maximum(change * pull, LEAST_PULL)
-        reached.append(best.solution.cycle_time)
-        left = float(promised.sum()) / reached[-1]
-        if left < settings.effort.left:
+        pull = np.maximum(np.where(sound, change, MORE) * pull, LEAST_PULL)
+        left = float(promised[sound].sum()) / best.solution.cycle_time
+        if left < settings.effort.left and (sound | done).all():
+            break
+        done |= (quiet >= QUIET_ROUNDS) | (pull > MOST_PULL)
+        if done.all():
             break
         gap = min(FIRST_GAP, max(GAP_SHARE * left, LAST_GAP))
     return best

@@ -71,8 +71,8 @@ def chosen(planned: OnPath, new: SplineShape, better: Array) -> SplineShape:
 
 
 def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape, FloatArray]:
-    """The shape after one round with the pull (Q,) of each run, and what it gains to first order (Q,) [s]. A run without a certificate
-    keeps its shape.
+    """The shape after one round with the pull (Q,) of each run, inf for those that stay as they are, and what it gains to first order
+    (Q,) [s]. A run without a certificate keeps its shape.
 
     gap : of the convex problem, share of the time [-]
     """

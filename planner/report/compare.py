@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 AFTER_PLANNING = ("read", "sample", "verify")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Row:
     """The result of one method.
 
@@ -64,8 +64,13 @@ class Row:
     after_filters: float | None = None
     ringing: float | None = None
     planning_time: float | None = None
-    summary: dict[str, Any] | None = field(default=None, repr=False)
-    shown: Samples | None = field(default=None, repr=False, compare=False)
+    summary: dict[str, Any] | None = None
+    shown: Samples | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        """Method, cycle time and outcome, in a line."""
+        time = "" if self.cycle_time is None else f"{self.cycle_time:.4f} s, "
+        return f"<Row of {self.method}: {time}{self.outcome}>"
 
     @property
     def passed(self) -> bool:

@@ -35,7 +35,9 @@ from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.joint_rows import Places, gain_of_step, places_of_run, pull_of_window, rows_of_window
+from planner.smoothing.joint_objective import gain_of_step, objective_of_window
+from planner.smoothing.joint_places import Places, places_of_run
+from planner.smoothing.joint_rows import rows_of_window
 from planner.smoothing.joint_solver import JointProblem, improve_window
 from planner.smoothing.relax import TIGHTENED, next_window
 from planner.smoothing.runs import SplineRuns
@@ -67,11 +69,13 @@ class Improved(NamedTuple):
 
 
 class JointRun(NamedTuple):
-    """One run that is improved: n control points."""
+    """One run that is improved: n control points, in the A axes that it moves in."""
 
-    corridor: Corridor
+    corridor: Corridor  # in all axes
     knots: Knots
     sites: Sites
+    whole: FloatArray  # (n, all axes) control points
+    moving: Array  # (A,) its axes
     control: FloatArray  # (n, A)
     places: Places
     free: Array  # (n, A+1) False for what stays
@@ -92,6 +96,39 @@ def _sites_of_window(sites, lo, hi, spans):
         sites.span[a:b] - max(lo - DEGREE, 0), sites.place[a:b], sites.weights[a:b], sites.target[a:b], sites.along[a:b],
         sites.slide[a:b], sites.radius[a:b],
     )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _moving(control, sites):
+    """(A,) axes in which a curve moves or is not where its sites want it: a step does nothing in the others."""
+    found = np.zeros(control.shape[1], np.bool_)
+    for k in range(control.shape[1]):
+        still = control[0, k]
+        for i in range(len(control)):
+            found[k] |= control[i, k] != still
+        for j in range(len(sites.span)):
+            found[k] |= sites.target[j, k] != still
+    return np.flatnonzero(found)
+
+
+@njit(cache=True, error_model="numpy")
+def _columns(values, axes):
+    """The columns `axes` of values (n, all axes)."""
+    out = np.empty((len(values), len(axes)))
+    for i in range(len(values)):
+        for k in range(len(axes)):
+            out[i, k] = values[i, axes[k]]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _moved(run, y):
+    """(n, all axes) control points after the step y (n, A+1)."""
+    control = run.whole.copy()
+    for i in range(len(control)):
+        for k in range(len(run.moving)):
+            control[i, run.moving[k]] += y[i, k]
+    return control
 
 
 @njit(cache=True, error_model="numpy")
@@ -121,7 +158,7 @@ def _improve_window(run, radius, lo, hi, y):
     free = np.zeros((b - a, axes + 1), np.bool_)
     free[lo - a : hi - a] = run.free[lo:hi]
     band, linear = np.zeros(((b - a) * (axes + 1), ORDER * (axes + 1))), np.zeros((b - a, axes + 1))
-    pull_of_window(places, first, last, run.pull, run.pulled, a, band, linear)
+    objective_of_window(places, (first, last, a), run.pull, run.pulled, band, linear)
     rows = rows_of_window(places, first, last, a)
     sites = _sites_of_window(with_radius(run.sites, radius), lo, hi, spans)
     problem = JointProblem(band, linear, free, rows, run.control[a:b], sites)
@@ -145,7 +182,7 @@ def _improve_run(run):
             break
         lo = hi - OVERLAP
     for _ in range(run.again):
-        certificate = certify(run.corridor, run.knots, run.sites.place, run.control + y[:, :axes])
+        certificate = certify(run.corridor, run.knots, run.sites.place, _moved(run, y))
         if certificate.span.max() <= 1.0:
             break
         for j in range(len(radius)):
@@ -167,20 +204,28 @@ def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, ag
     count, radius = len(splines.fits), used.copy()
     control, gain, iterations = splines.control.copy(), np.zeros(count), np.zeros(count)
     for q in range(count):
-        if not splines.fits[q]:
+        if not splines.fits[q] or pull[q] == np.inf:
             continue
-        knots, own, begin = run_knots(splines, q), run_control(splines, q), control_first(splines, q)
+        knots, whole, begin = run_knots(splines, q), run_control(splines, q), control_first(splines, q)
         first, last = motion.interval[q], motion.interval[q + 1]
-        places = places_of_run(knots, own, motion, bound, limits.axes, first, last)
-        sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
-        free = _free(len(own), own.shape[1], (runs.fixed_first[q], runs.fixed_last[q]))
+        sites = run_sites(splines, q)
+        moving = _moving(whole, sites)
+        own = _columns(whole, moving)
+        sites = Sites(
+            sites.span, sites.place, sites.weights, _columns(sites.target, moving), _columns(sites.along, moving),
+            sites.slide, used[splines.site_first[q] : splines.site_first[q + 1]],
+        )  # fmt: skip
+        places = places_of_run(knots, own, motion, bound, _columns(limits.axes, moving), first, last)
+        free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
+        pulled = limits.pulled[moving]
         run = JointRun(
-            run_corridor(corridor, q), knots, sites, own, places, free, limits.pulled, pull[q], gap, again
-        )
+            run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, pull[q], gap, again
+        )  # fmt: skip
         y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)
+        moved = _moved(run, y)
         for i in range(len(own)):
-            for k in range(own.shape[1]):
-                control[begin + i, k] += y[i, k]
+            for k in range(whole.shape[1]):
+                control[begin + i, k] = moved[i, k]
         gain[q] = gain_of_step(places, y)
     return control, radius, gain, iterations
 
@@ -201,7 +246,7 @@ def improve(
 
     used   : (J,) radius that each site may use [mm]
     bound  : (I, 2) of the feed [mm/s], and of the acceleration across the path [mm/s2], in each interval of the motion
-    pull   : (Q,) of each run
+    pull   : (Q,) of each run, inf for those that stay
     gap    : of the convex problem, share of the time [-]
     """
     return Improved(*_improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, again))

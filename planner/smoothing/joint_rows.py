@@ -1,6 +1,10 @@
-"""Limits of a motion along a spline, linear in its control points and in its time (joint.py): their rows, and what is done with them.
+"""Limits of a motion along a spline, linear in its control points and in its time (joint.py): the rows of joint_solver.py.
 
-A row depends on the six control points of a span: of one axis and of theta, or of all axes and theta.
+A row is a number times what one axis does at a place, or what happens along or across the path there (a kind), plus three
+numbers times theta and its derivatives. `weigh`, `predict` and `move` are the three passes of an iteration over all rows. With both
+slacks s and multipliers z of a row, value + s = upper and s - value = lower up to what is missing, they are those of Mehrotra (1992):
+
+    ds = -missing -+ slope,      dz = (aim - ds_predicted dz_predicted - z ds)/s - z.
 """
 
 from __future__ import annotations
@@ -11,304 +15,269 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.basis import ORDER, derivatives
-from planner.smoothing.joint_matrix import EVERY, SQUARE, add_outer, pattern, scatter
+from planner.smoothing.basis import ORDER
+from planner.smoothing.joint_matrix import (
+    CONTRACT,
+    SQUARE,
+    add_balls,
+    add_row,
+    blocks_of,
+    put_products,
+    scatter,
+)
 
-NONE = 1e12  # stands for a bound that there is none of
 # Rows of which the motion uses less than this share are left out [-]: velocities of the axes, accelerations, jerks, and the last two of
 # `Places.bound`. All rows cost three times as much, and eight rounds on the bracket end at the same time to 1e-4; without the jerks
 # below 0.4 they end 1e-3 later.
 NEAR = np.array([0.8, 0.6, 0.2, 0.8])
+LEAST_SLACK = 0.05  # of a start [-]
 
-
-# Places at which the limits are kept: so many in each interval of the grid at least, and in each span.
-PER_INTERVAL, PER_SPAN = 2, 5.0
-EDGE = 0.5 - np.sqrt(3.0) / 6.0  # of them from the ends of the interval [-]: Gauss's rule of two points
-
-
-SLOWER = 10.0  # how much theta counts beside jerks in the pull [-]
-
-
-class Places(NamedTuple):
-    """P places on a run, some inside each interval of the grid, and the motion there. Its R limits are velocity, acceleration and
-    jerk of each axis, the feed, and the acceleration across the path."""
-
-    span: Array  # (P,)
-    weight: FloatArray  # (P,) time that each stands for [s]
-    basis: FloatArray  # (P, 4, 6) basis functions of the span, and their first three time derivatives along the motion
-    jet: FloatArray  # (P, 3, A) velocity, acceleration and jerk of the axes
-    along: FloatArray  # (P, 2, A) directions of the velocity and of the acceleration across it
-    share: FloatArray  # (P, R) of its limit that the motion uses
-    least: FloatArray  # (P, R) smallest share in the interval, at its ends or inside
-    most: FloatArray  # (P, R) and the largest
-    limit: FloatArray  # (P, R)
+OWN, T0, T1, T2, LOWER, UPPER = range(6)  # columns of `Rows.factor`
+VALUE, SLOPE, S_UP, Z_UP, S_LOW, Z_LOW, DS_UP, DZ_UP, DS_LOW, DZ_LOW = range(10)  # columns of a state
 
 
 class Rows(NamedTuple):
-    """R rows of a window, ascending by their spans."""
+    """R rows of the P places of a window, those of place p are first[p] : first[p+1]."""
 
-    span: Array  # (R,) counted from the first control point of the window
-    axis: Array  # (R,) the axis, or EVERY
-    factor: FloatArray  # (R, A+1, 6) of each control point; for one axis only its own and the last, those of theta
-    lower: FloatArray  # (R,) how far the row may go down: what the limit leaves in the interval of the grid
-    upper: FloatArray  # (R,) and up
-
-
-@njit(cache=True, error_model="numpy")
-def time_derivatives(rows, tangent, feed, acc, jerk, out):
-    """out (4, 6) = the basis functions and their time derivatives in a motion with feed, acc and jerk along the path (forms.py),
-    from the derivatives by the spline's parameter, `rows` (4, 6) of the basis functions and `tangent` (3, A) of the curve; returns
-    |p_u|."""
-    square, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
-    for k in range(tangent.shape[1]):
-        square += tangent[0, k] * tangent[0, k]
-        along2 += tangent[0, k] * tangent[1, k]
-        along3 += tangent[0, k] * tangent[2, k]
-        bend += tangent[1, k] * tangent[1, k]
-    speed = np.sqrt(square)
-    grows = along2 / speed  # d|p'|/du, and then its derivative
-    grows2 = along3 / speed + (bend - grows * grows) / speed
-    du = feed / speed
-    ddu = (acc - grows * du * du) / speed
-    dddu = (jerk - grows2 * du * du * du - 3.0 * grows * du * ddu) / speed
-    for b in range(ORDER):
-        out[0, b] = rows[0, b]
-        out[1, b] = rows[1, b] * du
-        out[2, b] = rows[2, b] * du * du + rows[1, b] * ddu
-        out[3, b] = rows[3, b] * du * du * du + 3.0 * rows[2, b] * du * ddu + rows[1, b] * dddu
-    return speed
-
-
-@njit(cache=True, error_model="numpy")
-def _put_shares(jet, tangent, acc, limits, bound, along, share, limit):
-    """Directions along (2, A), shares (R,) and limits (R,) of a place with `jet` (3, A), the curve's tangent (A,) of length 1, and acc
-    along the path; limits (3, A), bound (2,) of feed and of acceleration across the path."""
-    axes = len(tangent)
-    feed, across = 0.0, 0.0
-    for k in range(axes):
-        for m in range(3):
-            limit[m * axes + k] = limits[m, k]
-            share[m * axes + k] = jet[m, k] / limits[m, k]
-        along[0, k] = tangent[k]
-        along[1, k] = jet[1, k] - acc * tangent[k]
-        feed += tangent[k] * jet[0, k]
-        across += along[1, k] * along[1, k]
-    across = np.sqrt(across)
-    for k in range(axes):
-        along[1, k] /= max(across, 1.0 / NONE)
-    limit[3 * axes], limit[3 * axes + 1] = bound
-    share[3 * axes], share[3 * axes + 1] = feed / bound[0], across / bound[1]
-
-
-@njit(cache=True, error_model="numpy")
-def _count(motion, n):
-    """How many places interval n gets."""
-    return max(int(np.ceil(PER_SPAN * (motion.tau[n, 1] - motion.tau[n, 0]))), PER_INTERVAL)
-
-
-@njit(cache=True, error_model="numpy")
-def places_of_run(knots, control, motion, bound, limits, first, last):
-    """The `Places` of the grid intervals first .. last - 1 of a `SplineMotion` that is given at both ends of each; bound (I, 2) of feed
-    and of acceleration across the path, limits (3, A)."""
-    axes = control.shape[1]
-    kinds = 3 * axes + 2
-    count = 0
-    for n in range(first, last):
-        count += _count(motion, n)
-    span, weight = np.empty(count, np.int64), np.empty(count)
-    basis, jet = np.empty((count, 4, ORDER)), np.empty((count, 3, axes))
-    along, limit = np.empty((count, 2, axes)), np.empty((count, kinds))
-    share, least, most = np.empty((count, kinds)), np.empty((count, kinds)), np.empty((count, kinds))
-    rows, tangent, unit, edge = (
-        np.empty((4, ORDER)),
-        np.empty((3, axes)),
-        np.empty(axes),
-        np.empty((4, ORDER)),
+    first: Array  # (P+1,)
+    span: Array  # (P,) counted from the first control point of the window
+    basis: FloatArray  # (P, 24) and
+    along: FloatArray  # (P, 2, A) of `Places`
+    kind: Array  # (R,) velocity, acceleration and jerk of each axis, velocity along the path, acceleration across
+    factor: (
+        FloatArray  # (R, 6) of the kind, of theta and its derivatives; how far the row may go down, and up
     )
-    edge_jet, edge_share = np.empty((3, axes)), np.empty((2, kinds))
-    edge_way, edge_limit = np.empty((2, axes)), np.empty(kinds)
-    begin = 0
-    for n in range(first, last):
-        i, inside = motion.span[n], _count(motion, n)
-        h = knots.breaks[i + 1] - knots.breaks[i]
-        for side in range(inside + 2):  # the places inside, and then both ends
-            at = EDGE + side * (1.0 - 2.0 * EDGE) / (inside - 1.0) if side < inside else side - inside * 1.0
-            tau = motion.tau[n, 0] + at * (motion.tau[n, 1] - motion.tau[n, 0])
-            v0, v1 = motion.feed[n, 0], motion.feed[n, 1]
-            feed = np.sqrt(v0 * v0 + at * (v1 * v1 - v0 * v0))
-            acc = motion.acc[n, 0] + at * (motion.acc[n, 1] - motion.acc[n, 0])
-            derivatives(knots.basis[i], tau, h, rows)
-            _products(rows, control, i, tangent)
-            p, end = begin + side, side - inside
-            here = basis[p] if end < 0 else edge
-            speed = time_derivatives(rows, tangent, feed, acc, motion.jerk[n], here)
-            for k in range(axes):
-                unit[k] = tangent[0, k] / speed
-            if end < 0:
-                span[p], weight[p] = i, motion.duration[n] / inside
-                _products(here, control, i, jet[p])
-                _put_shares(jet[p], unit, acc, limits, bound[n], along[p], share[p], limit[p])
-            else:
-                _products(here, control, i, edge_jet)
-                _put_shares(edge_jet, unit, acc, limits, bound[n], edge_way, edge_share[end], edge_limit)
-        for kind in range(kinds):
-            low = min(edge_share[0, kind], edge_share[1, kind])
-            high = max(edge_share[0, kind], edge_share[1, kind])
-            for p in range(begin, begin + inside):
-                low, high = min(low, share[p, kind]), max(high, share[p, kind])
-            for p in range(begin, begin + inside):
-                least[p, kind], most[p, kind] = low, high
-        begin += inside
-    return Places(span, weight, basis, jet, along, share, least, most, limit)
+    theta: FloatArray  # (R, 6) what the row has of theta's control points, over its first factor
+    products: FloatArray  # (R, 2, 48) `put_products`
 
 
-@njit(cache=True, error_model="numpy")
-def _products(rows, control, i, out):
-    """out (3, A) = the last three of `rows` (4, 6) times the control points of span i."""
-    for m in range(3):
-        for k in range(control.shape[1]):
-            out[m, k] = 0.0
-            for b in range(ORDER):
-                out[m, k] += rows[m + 1, b] * control[i + b, k]
+class State(NamedTuple):
+    """Where an iteration is."""
 
-
-@njit(cache=True, error_model="numpy")
-def _put_row(places, p, kind, factor):
-    """Row `kind` of a place into factor (A+1, 6) (joint.py)."""
-    axes = places.jet.shape[2]
-    basis, jet, limit = places.basis[p], places.jet[p], places.limit[p, kind]
-    factor[:] = 0.0
-    if kind >= 3 * axes:
-        m = kind - 3 * axes
-        for b in range(ORDER):
-            for k in range(axes):
-                factor[k, b] = places.along[p, m, k] * basis[m + 1, b] / limit
-            factor[axes, b] = -(m + 1.0) * places.share[p, kind] * basis[0, b]
-        return
-    m, k = kind // axes, kind % axes
-    for b in range(ORDER):
-        slower = jet[0, k] * basis[m, b]
-        if m == 1:
-            slower += 2.0 * jet[1, k] * basis[0, b]
-        elif m == 2:
-            slower += 3.0 * jet[1, k] * basis[1, b] + 3.0 * jet[2, k] * basis[0, b]
-        factor[k, b], factor[axes, b] = basis[m + 1, b] / limit, -slower / limit
+    sides: FloatArray  # (R, 10) value, slope, and slack, multiplier and their steps of the upper and of the lower side
+    moves: FloatArray  # (P, K + 3) for `_put_moves`
+    force: FloatArray  # (P, K + 3) zeros, for `_add_forces`
+    force_too: FloatArray  # (P, K + 3) likewise
 
 
 @njit(cache=True, error_model="numpy")
 def rows_of_window(places, first, last, lo):
     """The `Rows` of the places first .. last - 1 of which the motion uses more than `NEAR`; control points count from `lo`."""
     axes, kinds = places.jet.shape[2], places.share.shape[1]
-    used = np.zeros((last - first, kinds), np.bool_)
-    for kind in range(kinds):
-        near = NEAR[min(kind // axes, len(NEAR) - 1)]
-        for p in range(first, last):
-            used[p - first, kind] = max(places.most[p, kind], -places.least[p, kind]) > near
-    count = used.sum()
-    span, axis = np.empty(count, np.int64), np.empty(count, np.int64)
-    factor, lower, upper = np.empty((count, axes + 1, ORDER)), np.empty(count), np.empty(count)
+    begin, kind = np.zeros(last - first + 1, np.int64), np.empty((last - first) * kinds, np.int64)
+    factor = np.empty((len(kind), 6))
+    span = np.empty(last - first, np.int64)
     r = 0
     for p in range(first, last):
-        for kind in range(kinds):
-            if not used[p - first, kind]:
-                continue
-            span[r], axis[r] = places.span[p] - lo, kind % axes if kind < 3 * axes else EVERY
-            _put_row(places, p, kind, factor[r])
-            lower[r] = max(1.0 + places.least[p, kind], 0.0)
-            upper[r] = max(1.0 - places.most[p, kind], 0.0)
-            r += 1
-    return Rows(span, axis, factor, lower, upper)
-
-
-@njit(cache=True, error_model="numpy")
-def row_values(rows, y, out):
-    """out (R,) = rows times the step y (n, A+1)."""
-    axes = y.shape[1] - 1
-    turned = y.T.copy()
-    for r in range(len(out)):
-        i, k, factor = rows.span[r], rows.axis[r], rows.factor[r]
-        total = 0.0
-        for b in range(ORDER):
-            total += factor[axes, b] * turned[axes, i + b]
-        if k != EVERY:
+        for own in range(kinds):
+            least, most = places.least[p, own], places.most[p, own]
+            if max(most, -least) > NEAR[min(own // axes, 3)]:
+                kind[r], factor[r, LOWER], factor[r, UPPER] = own, max(1.0 + least, 0.0), max(1.0 - most, 0.0)
+                _put_row(places, p, own, factor[r])
+                r += 1
+        begin[p - first + 1], span[p - first] = r, places.span[p] - lo
+    basis, kind, factor = places.basis.reshape(-1, 4 * ORDER)[first:last], kind[:r].copy(), factor[:r].copy()
+    theta, products = np.empty((r, ORDER)), np.zeros((r, 2, SQUARE))
+    for p in range(last - first):
+        for r in range(begin[p], begin[p + 1]):
             for b in range(ORDER):
-                total += factor[k, b] * turned[k, i + b]
-        else:
-            for m in range(axes):
-                for b in range(ORDER):
-                    total += factor[m, b] * turned[m, i + b]
-        out[r] = total
+                of_theta = factor[r, T0] * basis[p, b] + factor[r, T1] * basis[p, ORDER + b]
+                theta[r, b] = (of_theta + factor[r, T2] * basis[p, 2 * ORDER + b]) / factor[r, OWN]
+            way = kind[r] - 3 * axes
+            put_products(basis, p, (way if way >= 0 else kind[r] // axes) + 1, theta[r], products[r])
+    return Rows(begin, span, basis, places.along[first:last], kind, factor, theta, products)
 
 
 @njit(cache=True, error_model="numpy")
-def add_rows(rows, q, out):
-    """out (n, A+1) += rows, each times its q (R,)."""
-    n, axes = out.shape[0], out.shape[1] - 1
-    turned = np.zeros((axes + 1, n))
-    for r in range(len(q)):
-        i, k, factor = rows.span[r], rows.axis[r], rows.factor[r]
-        for b in range(ORDER):
-            turned[axes, i + b] += factor[axes, b] * q[r]
-        if k != EVERY:
-            for b in range(ORDER):
-                turned[k, i + b] += factor[k, b] * q[r]
-        else:
-            for m in range(axes):
-                for b in range(ORDER):
-                    turned[m, i + b] += factor[m, b] * q[r]
-    for i in range(n):
-        for k in range(axes + 1):
-            out[i, k] += turned[k, i]
-
-
-@njit(cache=True, error_model="numpy")
-def sideways(places, p):
-    """What a square of the velocity across the path costs at a place [s3/mm2] (joint.py): where the feed is held."""
+def _put_row(places, p, kind, factor):
+    """Row `kind` of a place into the first four of factor (6,) (joint.py)."""
     axes = places.jet.shape[2]
-    share = places.share[p, 3 * axes]
-    return places.weight[p] / (share * places.limit[p, 3 * axes]) ** 2 if share > NEAR[3] else 0.0
+    jet, limit = places.jet[p], places.limit[p, kind]
+    m, k = kind // axes, kind % axes
+    factor[OWN], factor[T1], factor[T2] = 1.0 / limit, 0.0, 0.0
+    if kind >= 3 * axes:
+        factor[T0] = -(kind - 3 * axes + 1.0) * places.share[p, kind]
+    elif m == 0:
+        factor[T0] = -jet[0, k] / limit
+    elif m == 1:
+        factor[T0], factor[T1] = -2.0 * jet[1, k] / limit, -jet[0, k] / limit
+    else:
+        factor[T0], factor[T1], factor[T2] = (
+            -3.0 * jet[2, k] / limit,
+            -3.0 * jet[1, k] / limit,
+            -jet[0, k] / limit,
+        )
 
 
-@njit(cache=True, error_model="numpy")
-def pull_of_window(places, first, last, pull, pulled, lo, band, linear):
-    """Add to band and linear (n, A+1) the objective of joint.py at the places first .. last - 1; control points count from `lo`.
-
-    pull, pulled : as there, and the jerks (A,) that it counts in
-    """
-    axes = len(pulled)
-    blocks, where = np.zeros((axes + 1, axes + 1, SQUARE)), pattern(axes + 1)
-    for p in range(first, last):
-        i, basis, own = places.span[p] - lo, places.basis[p], places.weight[p]
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _put_moves(span, basis, along, y, moves):
+    """What the step y (n, A+1) does at the places (P,) of `Rows`, into moves (P, K + 3): all kinds of rows, and theta with its
+    derivatives."""
+    axes = along.shape[2]
+    at = 3 * axes
+    for p in range(len(span)):
+        i = span[p]
+        t0, t1, t2, feed, across = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(axes):
-            add_outer(blocks[k, k], basis[3], basis[3], pull * own / pulled[k] ** 2)
-        add_outer(blocks[axes, axes], basis[0], basis[0], SLOWER * pull * own)
-        cost = sideways(places, p)
-        if cost > 0.0:
-            for k in range(axes):
-                for m in range(k, axes):
-                    across = (1.0 if k == m else 0.0) - places.along[p, 0, k] * places.along[p, 0, m]
-                    add_outer(blocks[k, m], basis[1], basis[1], cost * across)
-        for b in range(ORDER):
-            linear[i + b, axes] += own * basis[0, b]
-        if p + 1 == last or places.span[p + 1] != places.span[p]:
-            scatter(blocks, i, where, band)
-
-
-@njit(cache=True, error_model="numpy")
-def gain_of_step(places, y):
-    """By how much the step y (n, A+1) shortens the time (joint.py) [s]."""
-    axes = places.jet.shape[2]
-    gain = 0.0
-    for p in range(len(places.span)):
-        i, basis = places.span[p], places.basis[p]
-        theta, square, along = 0.0, 0.0, 0.0
-        for b in range(ORDER):
-            theta += basis[0, b] * y[i + b, axes]
-        for k in range(axes):
-            move = 0.0
+            d1, d2, d3 = 0.0, 0.0, 0.0
             for b in range(ORDER):
-                move += basis[1, b] * y[i + b, k]
-            square += move * move
-            along += move * places.along[p, 0, k]
-        gain -= places.weight[p] * theta + 0.5 * sideways(places, p) * (square - along * along)
-    return gain
+                value = y[i + b, k]
+                d1 += basis[p, ORDER + b] * value
+                d2 += basis[p, 2 * ORDER + b] * value
+                d3 += basis[p, 3 * ORDER + b] * value
+            moves[p, k], moves[p, axes + k], moves[p, 2 * axes + k] = d1, d2, d3
+            feed += along[p, 0, k] * d1
+            across += along[p, 1, k] * d2
+        for b in range(ORDER):
+            value = y[i + b, axes]
+            t0 += basis[p, b] * value
+            t1 += basis[p, ORDER + b] * value
+            t2 += basis[p, 2 * ORDER + b] * value
+        moves[p, at], moves[p, at + 1] = feed, across
+        moves[p, at + 2], moves[p, at + 3], moves[p, at + 4] = t0, t1, t2
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _add_forces(span, basis, along, force, out):
+    """out (n, A+1) += the derivative by the step of the sum of force (P, K + 3) times `_put_moves`; the force becomes 0."""
+    axes = along.shape[2]
+    at = 3 * axes
+    for p in range(len(span)):
+        i = span[p]
+        feed, across = force[p, at], force[p, at + 1]
+        t0, t1, t2 = force[p, at + 2], force[p, at + 3], force[p, at + 4]
+        for k in range(axes):
+            d1, d2, d3 = (
+                force[p, k] + feed * along[p, 0, k],
+                force[p, axes + k] + across * along[p, 1, k],
+                force[p, 2 * axes + k],
+            )
+            for b in range(ORDER):
+                out[i + b, k] += (
+                    d1 * basis[p, ORDER + b] + d2 * basis[p, 2 * ORDER + b] + d3 * basis[p, 3 * ORDER + b]
+                )
+        for b in range(ORDER):
+            out[i + b, axes] += t0 * basis[p, b] + t1 * basis[p, ORDER + b] + t2 * basis[p, 2 * ORDER + b]
+    force[:] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def first_state(rows, y, product):
+    """The `State` at the step y (n, A+1): slacks that are at least `LEAST_SLACK`, and multipliers with this product with them."""
+    factor, kinds, P = rows.factor, 3 * rows.along.shape[2] + 2, len(rows.span)
+    sides, moves = np.zeros((len(factor), 10)), np.empty((P, kinds + 3))
+    _put_moves(rows.span, rows.basis, rows.along, y, moves)
+    for p in range(P):
+        for r in range(rows.first[p], rows.first[p + 1]):
+            value = factor[r, OWN] * moves[p, rows.kind[r]]
+            for m in range(3):
+                value += factor[r, T0 + m] * moves[p, kinds + m]
+            up, low = max(factor[r, UPPER] - value, LEAST_SLACK), max(factor[r, LOWER] + value, LEAST_SLACK)
+            sides[r, VALUE], sides[r, S_UP], sides[r, S_LOW] = value, up, low
+            sides[r, Z_UP], sides[r, Z_LOW] = product / up, product / low
+    return State(sides, moves, np.zeros((P, kinds + 3)), np.zeros((P, kinds + 3)))
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def weigh(rows, state, lengths, balls, band, residual, push):
+    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls` (joint_sites.py) to the
+    matrix `band`, and the rows to `residual` (n, A+1), what multipliers pull, and to `push`, what drives a step without a barrier.
+    Returns sum(s z) and the most that is missing."""
+    first, span, basis, along, kinds_of, factor, theta, products = rows
+    sides, _, pull, ahead = state
+    (primal, dual), axes = lengths, along.shape[2]
+    kinds = 3 * axes + 2
+    total, missed, j = 0.0, 0.0, 0
+    values, source, target = blocks_of(axes + 1)
+    for p in range(len(span)):
+        for r in range(first[p], first[p + 1]):
+            value = sides[r, VALUE] + primal * sides[r, SLOPE]
+            up, low = sides[r, S_UP] + primal * sides[r, DS_UP], sides[r, S_LOW] + primal * sides[r, DS_LOW]
+            z_up, z_low = sides[r, Z_UP] + dual * sides[r, DZ_UP], sides[r, Z_LOW] + dual * sides[r, DZ_LOW]
+            sides[r, VALUE], sides[r, S_UP], sides[r, S_LOW] = value, up, low
+            sides[r, Z_UP], sides[r, Z_LOW] = z_up, z_low
+            miss_up, miss_low = value + up - factor[r, UPPER], low - value - factor[r, LOWER]
+            total += up * z_up + low * z_low
+            missed = max(missed, max(miss_up, miss_low))
+            per_up, per_low = z_up / up, z_low / low
+            kind, weight = kinds_of[r], per_up + per_low
+            q, q_ahead = z_up - z_low, per_low * miss_low - per_up * miss_up
+            add_row(values, along, p, kind, weight * factor[r, OWN] ** 2, theta[r], products[r])
+            pull[p, kind], ahead[p, kind] = q * factor[r, OWN], q_ahead * factor[r, OWN]
+            for m in range(3):
+                pull[p, kinds + m] += q * factor[r, T0 + m]
+                ahead[p, kinds + m] += q_ahead * factor[r, T0 + m]
+        if p + 1 == len(span) or span[p + 1] != span[p]:
+            j = add_balls(balls, j, span[p], values)
+            scatter(values, source, target, span[p], axes + 1, band)
+    _add_forces(span, basis, along, pull, residual)
+    _add_forces(span, basis, along, ahead, push)
+    return total, missed
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def predict(rows, state, step, barrier, bent, seen):
+    """What the predictor's `step` (n, A+1) does: into `barrier` and `bent` (n, A+1) the forces of a barrier of 1 and of the terms of
+    second order, into seen (5,) of all constraints the smallest and the largest share of a slack that the step adds, the sums of s z,
+    of it times the share, and times its square."""
+    first, span, basis, along, kinds_of, factor = rows[:6]
+    sides, moves, of_barrier, of_bent = state
+    kinds = 3 * along.shape[2] + 2
+    least, most, plain, once, twice = seen[0], seen[1], seen[2], seen[3], seen[4]
+    _put_moves(span, basis, along, step, moves)
+    for p in range(len(span)):
+        for r in range(first[p], first[p + 1]):
+            kind = kinds_of[r]
+            slope = factor[r, OWN] * moves[p, kind]
+            for m in range(3):
+                slope += factor[r, T0 + m] * moves[p, kinds + m]
+            value, up, low = sides[r, VALUE], sides[r, S_UP], sides[r, S_LOW]
+            z_up, z_low = sides[r, Z_UP], sides[r, Z_LOW]
+            inverse = 1.0 / (up * low)
+            per_up, per_low = inverse * low, inverse * up
+            share = (factor[r, UPPER] - value - up - slope) * per_up
+            share_low = (factor[r, LOWER] + value - low + slope) * per_low
+            sides[r, DS_UP], sides[r, DS_LOW] = share, share_low
+            least, most = min(least, min(share, share_low)), max(most, max(share, share_low))
+            gap, gap_low = up * z_up, low * z_low
+            plain += gap + gap_low
+            once += gap * share + gap_low * share_low
+            twice += gap * share * share + gap_low * share_low * share_low
+            q = per_low - per_up
+            second = z_low * share_low * (1.0 + share_low) - z_up * share * (1.0 + share)
+            of_barrier[p, kind], of_bent[p, kind] = q * factor[r, OWN], second * factor[r, OWN]
+            for m in range(3):
+                of_barrier[p, kinds + m] += q * factor[r, T0 + m]
+                of_bent[p, kinds + m] += second * factor[r, T0 + m]
+    _add_forces(span, basis, along, of_barrier, barrier)
+    _add_forces(span, basis, along, of_bent, bent)
+    seen[0], seen[1], seen[2], seen[3], seen[4] = least, most, plain, once, twice
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def move(rows, state, step, aim):
+    """What the corrector's `step` (n, A+1) to s z = aim does to slacks and multipliers, into the state; the largest share of slacks,
+    and of multipliers, that it takes away."""
+    first, span, basis, along, kinds_of, factor = rows[:6]
+    sides, moves, _, _ = state
+    kinds = 3 * along.shape[2] + 2
+    most, most_dual = 0.0, 0.0
+    _put_moves(span, basis, along, step, moves)
+    for p in range(len(span)):
+        for r in range(first[p], first[p + 1]):
+            slope = factor[r, OWN] * moves[p, kinds_of[r]]
+            for m in range(3):
+                slope += factor[r, T0 + m] * moves[p, kinds + m]
+            value, up, low = sides[r, VALUE], sides[r, S_UP], sides[r, S_LOW]
+            z_up, z_low = sides[r, Z_UP], sides[r, Z_LOW]
+            inverse = 1.0 / (up * low)
+            per_up, per_low = inverse * low, inverse * up
+            ds, ds_low = factor[r, UPPER] - value - up - slope, factor[r, LOWER] + value - low + slope
+            share, share_low = sides[r, DS_UP], sides[r, DS_LOW]
+            dz = (aim - z_up * ds) * per_up + z_up * share * (1.0 + share) - z_up
+            dz_low = (aim - z_low * ds_low) * per_low + z_low * share_low * (1.0 + share_low) - z_low
+            sides[r, SLOPE], sides[r, DS_UP], sides[r, DZ_UP] = slope, ds, dz
+            sides[r, DS_LOW], sides[r, DZ_LOW] = ds_low, dz_low
+            most = max(most, max(-ds * per_up, -ds_low * per_low))
+            most_dual = max(most_dual, max(-dz / z_up, -dz_low / z_low))
+    return most, most_dual

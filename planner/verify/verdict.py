@@ -64,7 +64,7 @@ class AfterFilters:
     faults: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Verdict:
     """The findings of `verify`.
 
@@ -105,6 +105,11 @@ class Verdict:
     ringing: tuple[Ringing, ...] = ()
     lost_after: int | None = None
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Whether it passed, and the first fault."""
+        more = f", and {len(self.faults) - 1} more" if len(self.faults) > 1 else ""
+        return "<Verdict: passed>" if self.passed else f"<Verdict: failed, {self.faults[0]}{more}>"
 
     def summary(self) -> dict[str, Any]:
         """The part `verdict` of `summary.json`."""

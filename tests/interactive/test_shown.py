@@ -43,6 +43,23 @@ def test_the_line_says_what_was_planned(plan: Plan, unsolved: Plan) -> None:
     assert plan.cycle_time == plan.trajectory.cycle_time
 
 
+def test_records_are_lines_too(plan: Plan) -> None:
+    assert plan.trajectory is not None
+    assert repr(plan.verdict) == "<Verdict: passed>"
+    count = f"{len(plan.trajectory):,}"
+    assert repr(plan.trajectory) == (
+        f"<Trajectory: {count} setpoints, axes x y z, dt 0.001 s, {plan.cycle_time:.4f} s>"
+    )
+    assert repr(plan.program).startswith("<Program ")
+    assert repr(plan.prices).startswith("<PriceList: more would save feed ")
+    (row,) = planner.compare(planner.path([[0, 0], [5, 0]], 20.0), "mill", ["stop"])
+    assert repr(row) == f"<Row of stop: {row.cycle_time:.4f} s, passed>"
+    far = planner.verify([0.0, 0.1], [[0, 9], [0, 9]], planner.path([[0, 0], [5, 0]], 20.0), "mill")
+    assert repr(far).startswith("<Verdict: failed, ")
+    assert repr(far).endswith(" more>")
+    assert len(repr(far)) < 300
+
+
 def test_without_a_motion_nothing_is_made_up(unsolved: Plan, tmp_path: Path) -> None:
     for ask in (
         lambda: unsolved.cycle_time,

@@ -19,8 +19,9 @@ from planner.optimal.reshape import reshape, run_times
 from planner.path.samples import sample_path
 from planner.smoothing.basis import knots_at
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.joint_matrix import EVERY
-from planner.smoothing.joint_rows import places_of_run, rows_of_window
+from planner.smoothing.joint_places import places_of_run
+from planner.smoothing.joint_rows import first_state, predict, rows_of_window, weigh
+from planner.smoothing.joint_sites import balls_of
 from planner.smoothing.joint_solver import JointProblem, improve_window
 from planner.smoothing.sites import Sites
 from planner.smoothing.spline_path import spline_shape, with_spline
@@ -74,12 +75,33 @@ def some_places(seed=1):
     return rng, control, places
 
 
+def dense(rows, n):
+    """(R, n, A+1) the rows as they are defined (joint.py), from their places, kinds and factors."""
+    out = np.zeros((len(rows.kind), n, AXES + 1))
+    for p in range(len(rows.span)):
+        basis = rows.basis[p].reshape(4, 6)
+        for r in range(rows.first[p], rows.first[p + 1]):
+            own, kind = slice(rows.span[p], rows.span[p] + 6), rows.kind[r]
+            if kind < 3 * AXES:
+                out[r, own, kind % AXES] = rows.factor[r, 0] * basis[kind // AXES + 1]
+            else:
+                way = kind - 3 * AXES
+                out[r, own, :AXES] = rows.factor[r, 0] * np.outer(basis[way + 1], rows.along[p, way])
+            out[r, own, AXES] = rows.factor[r, 1:4] @ basis[:3]
+    return out
+
+
+def no_sites():
+    empty = np.zeros((0, AXES))
+    return Sites(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 6)), empty, empty, np.zeros(0), np.zeros(0))
+
+
 def test_rows_are_the_derivatives_of_what_a_slower_motion_on_another_shape_does():
     """v/(1+theta), and what comes of it by the chain rule in time, against the rows, by central differences."""
     rng, _, places = some_places()
     rows = rows_of_window(places, 0, len(places.span), 0)
     y = rng.normal(size=(SPANS + 5, AXES + 1))
-    r = 0
+    values = np.einsum("rnk,nk->r", dense(rows, len(y)), y)
     seen = set()
     for p in range(len(places.span)):
         own = slice(places.span[p], places.span[p] + 6)
@@ -105,20 +127,37 @@ def test_rows_are_the_derivatives_of_what_a_slower_motion_on_another_shape_does(
             return np.concatenate([(np.stack([first, second, third]) / LIMITS).ravel(), ways])
 
         slope = (shares(1e-5) - shares(-1e-5)) / 2e-5
-        while r < len(rows.upper) and rows.span[r] == places.span[p]:
-            value = (rows.factor[r] * y[own].T).sum()
-            match = np.flatnonzero(np.isclose(slope, value, rtol=1e-5, atol=1e-7))
-            kinds = [
-                k
-                for k in match
-                if (k < 3 * AXES and k % AXES == rows.axis[r]) or (k >= 3 * AXES and rows.axis[r] == EVERY)
-            ]
-            if not kinds:
-                break
-            seen.add(int(kinds[0]))
-            r += 1
-    assert r == len(rows.upper)
+        here = slice(rows.first[p], rows.first[p + 1])
+        np.testing.assert_allclose(values[here], slope[rows.kind[here]], rtol=1e-5, atol=1e-7)
+        seen |= set(rows.kind[here].tolist())
     assert seen == set(range(3 * AXES + 2))
+
+
+def test_the_newton_matrix_and_the_forces_are_those_of_dense_rows():
+    """weigh: sum (z/s) row row', sum (z_up - z_low) row; predict: sum of rows over their slacks."""
+    rng, control, places = some_places(3)
+    rows = rows_of_window(places, 0, len(places.span), 0)
+    n, columns = len(control), AXES + 1
+    y = rng.normal(size=(n, columns)) * 0.1
+    state = first_state(rows, y, 1.0)
+    state.sides[:, [3, 5]] = rng.uniform(0.1, 2.0, (len(rows.kind), 2))  # multipliers
+    up, z_up, low, z_low = state.sides[:, 2:6].T.copy()
+    every = dense(rows, n)
+    np.testing.assert_allclose(state.sides[:, 0], np.einsum("rnk,nk->r", every, y), rtol=1e-9, atol=1e-12)
+    band, residual, push = (np.zeros(shape) for shape in ((n * columns, 6 * columns), y.shape, y.shape))
+    balls = balls_of(no_sites(), control, y, 1.0)
+    products, _ = weigh(rows, state, (0.0, 0.0), balls, band, residual, push)
+    assert products == pytest.approx((up * z_up + low * z_low).sum())
+    flat = every.reshape(len(every), -1)
+    matrix = flat.T @ ((z_up / up + z_low / low)[:, None] * flat)
+    for d in range(6 * columns):
+        np.testing.assert_allclose(band[: n * columns - d, d], np.diagonal(matrix, d), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(residual, np.einsum("rnk,r->nk", every, z_up - z_low), rtol=1e-9, atol=1e-9)
+    barrier, bent = np.zeros_like(y), np.zeros_like(y)
+    predict(rows, state, y, barrier, bent, np.zeros(5))
+    np.testing.assert_allclose(
+        barrier, np.einsum("rnk,r->nk", every, 1.0 / low - 1.0 / up), rtol=1e-9, atol=1e-9
+    )
 
 
 def test_a_window_ends_at_the_optimum_of_its_problem():
@@ -130,30 +169,24 @@ def test_a_window_ends_at_the_optimum_of_its_problem():
     band = np.zeros((n * columns, 6 * columns))
     band[:, 0] = rng.uniform(1.0, 2.0, n * columns)
     linear = rng.normal(size=(n, columns))
-    empty = np.zeros((0, AXES))
-    sites = Sites(
-        np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 6)), empty, empty, np.zeros(0), np.zeros(0)
-    )
     free = np.ones((n, columns), bool)
     free[0, :AXES] = free[-1, :AXES] = False
     y, _ = improve_window(
-        JointProblem(band, linear, free, rows, control, sites), np.zeros((n, columns)), 1.0, 1e-7, 60
+        JointProblem(band, linear, free, rows, control, no_sites()), np.zeros((n, columns)), 1.0, 1e-7, 60
     )
-    dense = np.zeros((len(rows.upper), n, columns))
-    for r in range(len(rows.upper)):
-        dense[r, rows.span[r] : rows.span[r] + 6] = rows.factor[r].T
-    dense = dense.reshape(len(dense), -1)[:, free.ravel()]
-    at = dense @ y.ravel()[free.ravel()]
-    assert (at <= rows.upper + 1e-4).all()
-    assert (at >= -rows.lower - 1e-4).all()
+    every = dense(rows, n).reshape(len(rows.kind), -1)[:, free.ravel()]
+    lower, upper = rows.factor[:, 4:].T
+    at = every @ y.ravel()[free.ravel()]
+    assert (at <= upper + 1e-4).all()
+    assert (at >= -lower - 1e-4).all()
     assert not y[~free].any()
     found = scipy.minimize(
         lambda z: (0.5 * band[free.ravel(), 0] * z**2 + linear.ravel()[free.ravel()] * z).sum(),
         np.zeros(free.sum()),
         jac=lambda z: band[free.ravel(), 0] * z + linear.ravel()[free.ravel()],
         constraints=[
-            {"type": "ineq", "fun": lambda z: rows.upper - dense @ z, "jac": lambda z: -dense},
-            {"type": "ineq", "fun": lambda z: rows.lower + dense @ z, "jac": lambda z: dense},
+            {"type": "ineq", "fun": lambda z: upper - every @ z, "jac": lambda z: -every},
+            {"type": "ineq", "fun": lambda z: lower + every @ z, "jac": lambda z: every},
         ],
         method="SLSQP",
         options={"maxiter": 500, "ftol": 1e-12},

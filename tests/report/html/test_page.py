@@ -291,3 +291,15 @@ def test_prices_are_a_colour_and_columns(browser: Any, plan: Plan) -> None:
         "10 % more F saves [ms]",
         "10 % more of all limits saves [ms]",
     ]
+
+
+@pytest.mark.slow
+def test_zoomed_in_what_is_in_sight_is_drawn_finer(browser: Any, plan: Plan) -> None:
+    browser.execute_script("Plotly.relayout('profile', {'xaxis.autorange': true})")
+    everywhere = wait_for(browser, "const n = report.drawn(); return n > 2000 ? n : null")
+    close = "{'scene.camera.eye': {x: 0, y: 0, z: 0.3}, 'scene.camera.center': {x: 0, y: 0, z: 0}}"
+    browser.execute_script(f"Plotly.relayout('path', {close})")
+    less = wait_for(browser, f"const n = report.drawn(); return n < {everywhere} ? n : null")
+    assert less > everywhere / 3, "what is out of sight is still there, coarser"
+    browser.execute_script("Plotly.relayout('path', {'scene.camera.eye': {x: 0, y: 0, z: 1.6}})")
+    assert wait_for(browser, f"return report.drawn() === {everywhere}")

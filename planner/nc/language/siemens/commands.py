@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from planner.nc.language.siemens import codes, drilling
+from planner.nc.language.siemens import codes, drilling, patterns
 from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
 from planner.nc.language.tree import ZERO, Expression, Line, Message, Number, Parameter, Statement, Word
@@ -64,6 +64,17 @@ class Commands(SiemensControl):
             if not reader.take(",") and reader.peek() != ")":
                 raise reader.fault(") is missing")
         return given
+
+    def _pattern(self, reader: TokenReader) -> None:
+        """HOLES1 and HOLES2: the modal cycle at every place of a pattern."""
+        name = reader.peek(-1)
+        if self.cycle is None:
+            raise reader.fault(f"{name} stands behind MCALL with a drilling cycle, which it repeats", 0)
+        given = self._arguments(reader)
+        try:
+            self.body += patterns.pattern_rows(reader.place, name, given, self.cycle)
+        except ValueError as fault:
+            raise reader.fault(str(fault), 0) from fault
 
     def _modal_call(self, reader: TokenReader) -> None:
         if reader.ended:

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.language.siemens import codes, drilling
+from planner.nc.language.siemens import codes, drilling, patterns
 from planner.nc.language.siemens.calls import Calls
 from planner.nc.language.siemens.commands import as_word
 from planner.nc.language.siemens.text import TokenReader, operation, variable
@@ -283,6 +283,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
     **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
     **dict.fromkeys(("TRANS", "ATRANS"), SiemensParser._shift),
     "MCALL": SiemensParser._modal_call,
+    **dict.fromkeys(patterns.ARGUMENTS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
     **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
     "PROC": SiemensParser._procedure,

@@ -262,3 +262,27 @@ def test_calls_that_lead_nowhere_are_refused(call: str, said: str, tmp_path: Pat
     with pytest.raises(InputError, match=said) as found:
         read_program(tmp_path / "main.mpf", reading=Reading(dialect="siemens"))
     assert found.value.line == 2
+
+
+def test_patterns_of_holes() -> None:
+    head = "G0 X0 Y0 Z10 F100\nMCALL CYCLE81(5,0,2,-3)\n"
+    row = read(head + "HOLES1(10,20,30,5,4,3)\nMCALL\nG0 X0 Y0\nM30")
+    holes = row.end[row.kind == Kind.LINE]
+    along = 5 + 4 * np.arange(3)
+    np.testing.assert_allclose(holes[:, 0], 10 + along * np.cos(np.pi / 6), atol=1e-12)
+    np.testing.assert_allclose(holes[:, 1], 20 + along * np.sin(np.pi / 6), atol=1e-12)
+    assert (holes[:, 2] == -3).all()
+    assert row.end[-1].tolist() == [0, 0, 5]
+    for step, apart in ((0, 72.0), (20, 20.0)):
+        circle = read(head + f"HOLES2(1,2,15,10,{step},5)\nMCALL\nM30")
+        holes = circle.end[circle.kind == Kind.LINE]
+        angle = np.radians(10 + apart * np.arange(5))
+        np.testing.assert_allclose(
+            holes[:, :2], np.stack([1 + 15 * np.cos(angle), 2 + 15 * np.sin(angle)], axis=1), atol=1e-12
+        )
+    for text, said in (
+        ("HOLES1(1,2,3,4,5,6)", "stands behind MCALL"),
+        ("MCALL CYCLE81(5,0,2,-3)\nHOLES2(1,2,,0)", "needs RAD"),
+    ):
+        with pytest.raises(InputError, match=said):
+            read(f"G0 X0\n{text}\nM30")

@@ -37,6 +37,18 @@ M2
 )
 
 
+class _Starts(kernels.Compilation):
+    """Starts the second process with the first kernel that is kept."""
+
+    def __init__(self, helper: Helper):
+        self._helper = helper
+
+    def begins(self, is_kept: bool) -> None:
+        """A kernel is about to be compiled."""
+        if is_kept:
+            self._helper.start()
+
+
 def compile_ahead() -> list[str]:
     """Plan `PROGRAMS`; returns the files of the kernels that this took, sorted. Empty where kernels are numba's own."""
     from planner.machine import load_machine
@@ -47,7 +59,7 @@ def compile_ahead() -> list[str]:
         return []
     machine = load_machine(MACHINE)
     with Helper(MACHINE, OPTIMAL) as helper:
-        kernels.at_compilation(lambda kept: helper.start() if kept else None)
+        kernels.at_compilation(_Starts(helper))
         try:
             for program in PROGRAMS:
                 plan(parse_program(program, machine), machine)

@@ -23,6 +23,8 @@ from benchmarks import record
 
 ROOT = Path(__file__).resolve().parents[1]
 NC = ROOT.parent / "shared" / "nc"
+BOARD = NC / "pcb2gcode__pcb2gcode__multivibrator-extra-passes-two-isolators-tiles-milldrill.ngc"
+TURTLE = NC / "winder__Universal-G-Code-Sender__electric_turtle.nc"
 SHAPEOKO = NC / "winder__Universal-G-Code-Sender__ShapeOko_Calibration_Pattern_01b.ngc"
 SPIRAL = NC / "vilemduha__blendercam__Spiral.gcode"
 MOMENTS, FROM, CLOSE = (
@@ -34,19 +36,39 @@ MOMENTS, FROM, CLOSE = (
 Job = tuple[str, Path, str, str, str, int | None]
 FITTED: list[Job] = [
     ("bracket", ROOT / "planner" / "examples" / "bracket.ngc", "mill", "normal", "optimal", None),
-    ("bracket, quick", ROOT / "planner" / "examples" / "bracket.ngc", "mill", "quick", "optimal", None),
     ("Spiral, 30,000 lines", SPIRAL, "mill", "normal", "optimal", 30_000),
-    ("ShapeOko pattern", SHAPEOKO, "router", "normal", "optimal", None),
-    ("arc spiral", NC / "LinuxCNC__linuxcnc__arcspiral.ngc", "mill", "normal", "optimal", None),
-    ("trochoidal", NC / "LinuxCNC__linuxcnc__trochoidal.ngc", "mill", "normal", "optimal", None),
-]  # fmt: skip
-NEW: list[Job] = [
-    ("electric turtle", NC / "winder__Universal-G-Code-Sender__electric_turtle.nc", "router", "normal", "optimal", None),
     ("Spiral, 8,000 lines", SPIRAL, "router", "normal", "optimal", 8_000),
-    ("tight corners", NC / "LinuxCNC__linuxcnc__tight-corner-tolerance.ngc", "mill", "normal", "optimal", None),
-    ("circuit board", NC / "pcb2gcode__pcb2gcode__KNoT-Gateway_Mini_Starter_Board-back.ngc", "router", "quick", "optimal", None),
-    ("electric turtle, kinematic", NC / "winder__Universal-G-Code-Sender__electric_turtle.nc", "mill", "normal", "kinematic", None),
-]  # fmt: skip
+    ("ShapeOko pattern", SHAPEOKO, "router", "normal", "optimal", None),
+    (
+        "tight corners",
+        NC / "LinuxCNC__linuxcnc__tight-corner-tolerance.ngc",
+        "mill",
+        "normal",
+        "optimal",
+        None,
+    ),
+]
+NEW: list[Job] = [
+    ("circuit board, milling", BOARD, "router", "normal", "optimal", None),
+    ("electric turtle, kinematic", TURTLE, "mill", "normal", "kinematic", None),
+    (
+        "circuit board",
+        NC / "pcb2gcode__pcb2gcode__KNoT-Gateway_Mini_Starter_Board-back.ngc",
+        "router",
+        "quick",
+        "optimal",
+        None,
+    ),
+    (
+        "mold, 4,000 lines",
+        NC / "CauldronDevelopmentLLC__CAMotics__flower_mold.nc",
+        "mill",
+        "normal",
+        "optimal",
+        4_000,
+    ),
+    ("electric turtle", TURTLE, "router", "normal", "optimal", None),
+]
 
 CHILD = """
 import json, sys, time
@@ -59,7 +81,7 @@ import planner
 path, machine, effort, method, lines, moments = sys.argv[1:]
 use_threads(1)
 text = open(path, encoding="utf-8", errors="replace").readlines()
-text = "".join(text if lines == "all" else text[: int(lines)])
+text = "".join(text if lines == "all" else [*text[: int(lines)], "M2\\n"])
 shapes = METHODS[method].shapes
 began = time.process_time()
 told = []

@@ -8,6 +8,7 @@ Nothing is imported before Ctrl-C has its handler, so that an interrupt during t
 
 from __future__ import annotations
 
+import gc
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,12 +16,16 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
+# So many new objects before a collection of garbage; Python's 700 means 155 collections, 0.1 s of a plan of ten lines (now 10, 0.04 s).
+OBJECTS = 10_000
+
 
 def main() -> None:
     """Entry point of the command `planner`."""
     from planner.commands.interrupt import end_at_interrupts, no_more_interrupts
 
     end_at_interrupts()
+    gc.set_threshold(OBJECTS)
     from planner.commands.app import app
     from planner.commands.terminal import prepare_streams
 

@@ -23,6 +23,7 @@ LAYERS = (
     "planner.base.called",
     "planner.base.files",
     "planner.base.glossary",
+    "planner.base.processor",
     "planner.base.kept",
     "planner.base.linking",
     "planner.base.compiling",

@@ -37,7 +37,7 @@ def test_the_python_example_runs_and_the_output_is_that_of_plan(monkeypatch: pyt
     assert f"{len(plan.program)} blocks" in README  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("command", ["plan", "compare", "verify", "info", "pulses"])
+@pytest.mark.parametrize("command", ["plan", "what-if", "sweep", "compare", "verify", "info", "pulses"])
 def test_options_that_are_shown_exist_and_the_others_are_shown(
     command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,9 +3,10 @@
 A kernel that Python calls (a root) contains all the kernels that it calls, optimised once as a whole. As it comes, numba also
 optimises each of these by itself, turns each into machine code, and makes an entry for Python and one for C, none of which is used. So
 
+  processor   code is made for a level of the architecture (processor.py): `_Generator`
   libraries   what is compiled inside a root stays a library of instructions that the root links: `_Inner`; only the root is optimised
               as a whole and turned into machine code, with everything in it
-  entries     kernels inside a root have no entry for Python: `ENTRIES`
+  entries     kernels inside a root have no entry for Python: `ENTRIES`; nor have functions of numba's own: `_of_roots`
   values      they are not compiled once more for every number that an argument is in some call: `_without_values`
   typing      numba asks all of its definitions of an operator again at every place; here each question is asked once: `_call_type`
   settings    of which numba compares and hashes 20 values, many times for each expression: `_same_settings`, `_hash_of_settings`
@@ -29,8 +30,10 @@ from numba.core import codegen, compiler, registry, targetconfig, types
 from numba.core.types import functions
 
 from planner.base.kept import Kept
+from planner.base.processor import processor
 
 ENTRIES = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+WRAPPERS = ("create_cpython_wrapper", "create_cfunc_wrapper")
 
 _environments: dict[str, Any] = {}  # of what is compiled inside roots, until a root has their place
 _by_function: weakref.WeakKeyDictionary[Any, dict[Any, Any]] = weakref.WeakKeyDictionary()
@@ -108,6 +111,24 @@ class _LaterEnvironment:
         return getattr(self._numba_s, name)
 
 
+class _Generator(codegen.JITCPUCodegen):
+    """numba's code generator, for the processor of processor.py."""
+
+    _library_class = _Inner
+
+    def _get_host_cpu_name(self) -> str:
+        return processor().name
+
+    def _get_host_cpu_features(self) -> str:
+        return processor().features
+
+
+@functools.cache
+def _generator() -> _Generator:
+    """The one of this process."""
+    return _Generator("planner")
+
+
 class _RootCompiler(compiler.Compiler):
     """Gives a root a library with machine code, as numba does it."""
 
@@ -127,7 +148,7 @@ class _Compiler:
     def compile(self, args: Any, return_type: Any) -> Any:
         with _replaced():
             made = self._numba_s.compile(args, return_type)
-        generator = registry.cpu_target.target_context.codegen()
+        generator = _generator()
         for name in [name for name in _environments if generator._engine.is_symbol_defined(name)]:
             generator.set_env(name, _environments.pop(name))
         return made
@@ -138,9 +159,10 @@ class _Compiler:
 
 @contextmanager
 def _replaced() -> Iterator[None]:
-    settings = targetconfig.TargetConfig
+    settings, context = targetconfig.TargetConfig, registry.cpu_target.target_context
     replacements: list[tuple[Any, str, Any]] = [
-        (registry.cpu_target.target_context.codegen(), "_library_class", _Inner),
+        (context, "_internal_codegen", _generator()),
+        *((type(context), name, _of_roots(getattr(type(context), name))) for name in WRAPPERS),
         (functions.BaseFunction, "get_call_type", _call_type),
         (settings, "__eq__", _same_settings),
         (settings, "__hash__", _hash_of_settings),
@@ -157,6 +179,16 @@ def _replaced() -> Iterator[None]:
             setattr(owner, name, value)
         if collecting:
             gc.enable()
+
+
+def _of_roots(numba_s: Callable[..., None]) -> Callable[..., None]:
+    """numba's function that adds an entry to a library, for libraries of roots only."""
+
+    def add(context: Any, library: Any, *args: Any, **kws: Any) -> None:
+        if not isinstance(library, _Inner):
+            numba_s(context, library, *args, **kws)
+
+    return add
 
 
 _numba_s_call_type = functions.BaseFunction.get_call_type
@@ -179,9 +211,14 @@ _numba_s_same_settings = targetconfig.TargetConfig.__eq__
 
 
 def _same_settings(self: Any, other: Any) -> Any:
-    if self is other or (type(self) is type(other) and self._values == other._values):
-        return True
-    return _numba_s_same_settings(self, other)
+    if type(self) is not type(other):
+        return _numba_s_same_settings(self, other)
+    a, b = self._values, other._values  # those that are set
+    return self is other or all(
+        a.get(name, option.default) == b.get(name, option.default)
+        for name, option in self.options.items()
+        if name in a or name in b
+    )
 
 
 def _hash_of_settings(self: Any) -> int:

@@ -20,9 +20,12 @@ from functools import cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
+from planner.base.processor import processor
+
 FORMAT = 1  # of the files
 # Other versions of a kernel are kept so long [s], 30 days: they may be of another processor or checkout that shares the folder.
 OTHERS_KEPT = 30 * 86_400.0
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 _NOT_OF_CODE = {
     "NUMBA_CACHE_DIR",
     "NUMBA_NUM_THREADS",
@@ -70,12 +73,13 @@ def place(function: FunctionType, content: bytes, arguments: object) -> KernelNa
     return KernelName(f"{named}-{of.hexdigest()[:12]}", version.hexdigest()[:24], single)
 
 
-def read(where: KernelName) -> Kept | None:
-    """The kernel of this name, or None. Raises OSError if it is there and cannot be read."""
-    for folder in folders():
+def read(where: KernelName) -> tuple[Kept, str] | None:
+    """The kernel of this name and its file, or None. Raises OSError if it is there and cannot be read."""
+    for folder in (*folders(), installed()):
+        name = os.path.join(folder, where.name)
         try:
-            with open(os.path.join(folder, where.name), "rb") as file:
-                return Kept(*pickle.load(file))
+            with open(name, "rb") as file:
+                return Kept(*pickle.load(file)), name
         except (FileNotFoundError, NotADirectoryError):
             continue
         except _UNREADABLE:
@@ -83,17 +87,18 @@ def read(where: KernelName) -> Kept | None:
     return None
 
 
-def write(where: KernelName, kernel: Kept) -> None:
-    """Keep a kernel, in place of its old versions. Raises OSError if it can be written nowhere."""
+def write(where: KernelName, kernel: Kept) -> str:
+    """Keep a kernel, in place of its old versions; returns its file. Raises OSError if it can be written nowhere."""
     faults: list[OSError] = []
     for folder in folders():
-        part = os.path.join(folder, f"{where.name}.{os.getpid()}")
+        written = os.path.join(folder, where.name)
+        part = f"{written}.{os.getpid()}"
         try:
             os.makedirs(folder, exist_ok=True)
             try:
                 with open(part, "wb") as file:
                     pickle.dump(tuple(kernel), file, protocol=pickle.HIGHEST_PROTOCOL)
-                os.replace(part, os.path.join(folder, where.name))
+                os.replace(part, written)
             except BaseException:
                 _remove([part])
                 raise
@@ -101,29 +106,33 @@ def write(where: KernelName, kernel: Kept) -> None:
             faults.append(fault)
             continue
         if not where.single:
-            return
+            return written
         same = [
             name for name in os.listdir(folder) if name.startswith(f"{where.kernel}.") and name != where.name
         ]
         _remove(os.path.join(folder, name) for name in same if _is_old(os.path.join(folder, name)))
-        return
+        return written
     raise faults[0]
 
 
 def folders() -> list[str]:
-    """Where kernels may lie, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the package, or the user's
+    """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the package, or the user's
     cache directory."""
     named = os.environ.get("NUMBA_CACHE_DIR")
     if named:
         return [os.path.join(named, "planner")]
-    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     if sys.platform == "win32":
         of_user = os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")
     elif sys.platform == "darwin":
         of_user = os.path.expanduser("~/Library/Caches")
     else:
         of_user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return [os.path.join(package, "__pycache__", "kernels"), os.path.join(of_user, "planner", "kernels")]
+    return [os.path.join(_PACKAGE, "__pycache__", "kernels"), os.path.join(of_user, "planner", "kernels")]
+
+
+def installed() -> str:
+    """Where those lie that came with the installation (setup.py)."""
+    return os.path.join(_PACKAGE, "kernels")
 
 
 def _is_old(file: str) -> bool:
@@ -146,17 +155,15 @@ def _surroundings() -> bytes:
     """What machine code depends on besides the kernel."""
     from llvmlite import binding
 
-    features = sorted(name for name, has in binding.get_host_cpu_features().items() if has)
     settings = sorted(
         item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] not in _NOT_OF_CODE
     )
     known = (
         FORMAT,
-        sys.version,
-        sys.platform,
-        numba_version(),
-        binding.get_host_cpu_name(),
-        features,
+        sys.implementation.cache_tag,
+        binding.get_process_triple(),
+        numba_version().split(".")[:2],
+        *processor(),
         settings,
     )
     return repr(known).encode()

@@ -27,13 +27,16 @@ from planner.base import kept
 
 FIRST, LAST = (0, 68), (0, 68)  # versions of numba that the tests have run with
 PLATFORM = "linux"  # where they have
-# What numba's type of an array depends on besides its dtype and dimensions: bits of `flags.num` for contiguous in C's and in Fortran's
-# order, aligned, writable.
-_LAYOUT = 0x0001 | 0x0002 | 0x0100 | 0x0400
+# What numba's type of an array depends on besides its dtype and dimensions: bits of `flags.num` for contiguous in C's order, if not in
+# that then in Fortran's, aligned, writable.
+_IN_C_S = 0x0001
+_LAYOUT_IN_C_S = _IN_C_S | 0x0100 | 0x0400
+_LAYOUT = _LAYOUT_IN_C_S | 0x0002
 # Arguments whose type says all of numba's type; numbers of NumPy's are told by their dtype.
 _SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "none", str: "str"}
 
 _warned = False
+_files: set[str] = set()
 _one_at_a_time = threading.RLock()
 
 
@@ -63,6 +66,11 @@ def at_compilation(listener: Compilation | None) -> None:
 def compilation() -> Compilation:
     """Who is told."""
     return _listener
+
+
+def files_used() -> list[str]:
+    """The files of all kernels that this process has loaded or written, sorted."""
+    return sorted(_files)
 
 
 def known_numba() -> bool:
@@ -127,17 +135,18 @@ class Kernel:
 
     def _loaded(self, where: kept.KernelName) -> Callable[..., Any] | None:
         try:
-            kernel = kept.read(where)
+            found = kept.read(where)
         except OSError as fault:
             _warn(fault)
             return None
-        if kernel is None:
+        if found is None:
             return None
         from planner.base.linking import linker
 
-        found = linker().function(kernel, self.py_func)
+        kernel, file = found
         self.loaded += 1
-        return found
+        _files.add(file)
+        return linker().function(kernel, self.py_func)
 
     def _compiled(self, args: tuple[Any, ...], where: kept.KernelName | None) -> Callable[..., Any]:
         from planner.base.compiling import compiled, to_keep
@@ -146,7 +155,7 @@ class Kernel:
         self.compiled += 1
         if where is not None:
             try:
-                kept.write(where, to_keep(made))
+                _files.add(kept.write(where, to_keep(made)))
             except OSError as fault:
                 _warn(fault)
         return made.entry_point
@@ -187,7 +196,8 @@ def _kind(value: Any) -> Hashable:
     """What numba's type of an argument depends on."""
     of = type(value)
     if of is np.ndarray:
-        return value.dtype, value.ndim, value.flags.num & _LAYOUT
+        flags = value.flags.num
+        return value.dtype, value.ndim, flags & (_LAYOUT_IN_C_S if flags & _IN_C_S else _LAYOUT)
     if of in _SCALARS:
         return _SCALARS[of]
     if isinstance(value, tuple):

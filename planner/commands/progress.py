@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
 # Between lines of progress where there is no terminal: so long at least [s], and so much of the time since the start [-], so that an
-# hour has 30 of them and not 360.
+# hour has about 30 of them and not 360.
 LINE_EVERY, LINE_SHARE = 10.0, 0.15
 COMPILING = "compiling, once"
 KEPT = "kept for the next run"

@@ -10,8 +10,8 @@ still expected, counted in a unit that this job has measured itself: one grid an
     files      samples times WRITTEN seconds, if any are written
 
 less what the stage that is running has had already. Where a stage tells what share of it is done, that takes the place of what was
-expected. Before the first solve tells a share nothing is known, and nothing is said. The numbers were read off nine plans
-(`benchmarks/progress.py`, which also says how true the estimates are).
+expected. Before the first solve tells a share nothing is known, and nothing is said. The numbers were read off plans of a
+dozen programs; `benchmarks/progress.py` says how true the estimates are on these and on others.
 """
 
 from __future__ import annotations
@@ -44,6 +44,9 @@ SURE = 2.0  # times the share that is done: how far it is trusted, against what 
 LATE = 0.3  # of the time it has had, what a stage that has had more than expected still gets
 FALLING = 0.3  # gain of a round over the gain of the one before, as long as there is only one
 STEADY = 0.8  # the same at most
+SEEN = (
+    5  # rounds that gain next to nothing before they are given up, where they do not keep what they promise
+)
 ENOUGH = 1e-5  # gain after which there are no more rounds [share of the time]
 
 BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)
@@ -81,6 +84,7 @@ class TimeLeft:
     _plans: int = 0
     _round: float = math.nan
     _gains: list[float] = field(default_factory=list)
+    _slower: bool = False  # the last round as a whole
     _verdicts: int = 0
 
     def stage(self, now: float, name: str, fraction: float) -> None:
@@ -112,6 +116,7 @@ class TimeLeft:
             self._solved(now, step)
         elif step.name.startswith("reshape") and self._phase == ROUNDS:
             gain = max(step.gain or 0.0, 0.0)
+            self._slower = not step.kept if "mixed" not in step.name else self._slower
             if "mixed" in step.name and self._gains:
                 self._gains[-1] += gain
             else:
@@ -195,6 +200,9 @@ class TimeLeft:
             sum(math.log(max(g, 0.1 * enough)) for g in self._gains[-LAST_GAINS:])
             / len(self._gains[-LAST_GAINS:])
         )
+        if self._slower:
+            idle = next((k for k, g in enumerate(reversed(self._gains)) if g > enough), made)
+            return max(min(most - made, float(max(SEEN - idle, 1))), 0.0)
         if self._gains[-1] <= enough and made <= IN_VAIN[0]:
             return min(most - made, 1.0)
         falling = FALLING if made < 2 else (gain / max(self._gains)) ** (1.0 / (made - 1))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from planner.base.names import AUTO, NORMAL, effort_name
+from planner.base.names import AUTO, BEST, NORMAL, effort_name
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
@@ -33,7 +33,8 @@ class OptimalMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver
-    effort : "quick", "normal" or "best": grids and rounds of reshaping (optimal/effort.py)
+    effort : "quick", "normal" or "best": grids and rounds of reshaping (optimal/effort.py); with "best" and geometry "auto" the
+             motion is then improved without a path parameter (free.py)
     rounds : of reshaping splines (optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
@@ -63,4 +64,11 @@ class OptimalMethod(Method):
             effort=EFFORTS[effort_name(self.effort)],
             rounds=self.rounds,
         )
-        return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)
+        if self.shaped:
+            return shaped_plan(job, settings)
+        plan = fastest_plan(job, settings)
+        if self.effort != BEST or self.corner != AUTO:
+            return plan
+        from planner.methods.free import freed  # other plans need not load what it uses
+
+        return freed(job, plan)

@@ -226,7 +226,8 @@ def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:
     if not len(runs.joint_first):
         return np.zeros(0)
     edges = np.stack([runs.joint_first - 1, runs.joint_last + 1], axis=1).ravel()
-    return np.minimum.reduceat(np.append(longest, np.inf), edges)[::2]
+    least = np.minimum.reduceat(np.append(longest, np.inf), edges)
+    return least[::2].copy()  # in one piece: for another layout the kernel would be compiled again
 
 
 def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:

@@ -39,7 +39,25 @@ def nonsense(x):
 def state_of_numba() -> list[object]:
     settings = targetconfig.TargetConfig
     owners = (functions.BaseFunction.get_call_type, settings.__eq__, settings.__hash__)
-    return [*owners, registry.cpu_target.target_context.codegen()._library_class]
+    context = registry.cpu_target.target_context
+    wrappers = [getattr(type(context), name) for name in compiling.WRAPPERS]
+    return [*owners, *wrappers, context.codegen(), context.codegen()._library_class]
+
+
+@njit(cache=False)
+def spread(x):
+    return np.arange(x).sum() + np.empty(int(x)).shape[0] * 0.5
+
+
+def test_a_function_of_numba_s_own_is_of_use_outside_after_a_kernel_had_it() -> None:
+    """Its library is one without entries."""
+    assert spread(4) == 8.0
+
+    @numba.njit
+    def outside(x: int) -> float:
+        return np.empty(x).shape[0] + np.arange(x).sum()
+
+    assert outside(4) == 10
 
 
 def test_numba_is_as_it_was_after_a_kernel_and_after_a_fault() -> None:

@@ -99,7 +99,10 @@ def test_command_lines_of_earlier_versions(
 
     monkeypatch.setattr(SecondOrderMethod, "plan", refused)
     result = CliRunner().invoke(app, ["plan", str(job), *arguments])
-    assert (result.exit_code, result.stderr.splitlines()[-1]) == (2, "seen")  # after lines of progress, where kernels compile
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (
+        2,
+        "seen",
+    )  # after lines of progress, where kernels compile
     assert method_name(arguments[1]) == method
     assert seen[0].corner == corner
     assert seen[0].solver == (arguments[3] if arguments[2] == "--solver" else "reachability")

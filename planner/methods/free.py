@@ -1,0 +1,220 @@
+"""A plan's motion made faster, geometry and feed together: from where the search begins (tube/) to what is delivered."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.delivery.periods import missed
+from planner.feedrate.solution import Status
+from planner.geometry.toolpath import Toolpath
+from planner.job.job import Delivered, Job
+from planner.job.method import Method
+from planner.job.plan import Plan
+from planner.motion.timing import MotionInTime, in_chunks
+from planner.motion.trajectory import Trajectory, joined
+from planner.motion.vertex_times import passing_times, standstills
+from planner.tube.guess import Guess, guess_from
+from planner.tube.own import TubeOwn
+from planner.tube.parts import Found, parts_of
+from planner.tube.run import TubeRun, tube_runs_of
+from planner.tube.solvers import TubeSolver
+from planner.tube.splice import Spliced, SplicedRun
+
+# The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
+START_PERIOD, START_SAMPLES = 0.02, 200_000
+
+
+def freed(job: Job, plan: Plan) -> Plan:
+    """The plan with a faster motion near its own where one is found (tube/own.py), else the plan.
+
+    What holds the motion at its limits is not told of the faster one, and what limits cost stays that of the plan.
+    """
+    filtered, curves = job.real[0].fir is not None, (job.toolpath.curve >= 0).any()
+    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed or filtered or curves:
+        return plan
+    with job.stage("solve") as report:
+        runs = list(tube_runs_of(job.toolpath, job.machine))
+        starts, found = Starts((), job, plan), []
+        for k, run in enumerate(runs):
+            found.append(search(k, run, starts, TubeOwn()))
+            report((k + 1) / len(runs))
+    made, kept, why = delivered(job, starts.made[0], found)
+    job.tell(
+        "free",
+        found=made[0].cycle_time,
+        before=plan.trajectory.cycle_time,
+        kept=made[0] is not plan.trajectory,
+    )
+    if made[0] is plan.trajectory:
+        return plan
+    if plan.prices is not None:
+        job.note("what limits cost is told of the motion before geometry and feed were found together")
+    return dataclasses.replace(
+        plan,
+        trajectory=made[0],
+        verdict=made[1],
+        grid=None,
+        sentence=f"{plan.sentence}; then {said(job, starts.made[0], found, kept, why)[1]}",
+        notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),
+        timings=job.stages.timings,
+    )
+
+
+class Start:
+    """A motion from which the search begins, and where in it the runs are."""
+
+    def __init__(self, plan: Plan, motion: MotionInTime, job: Job):
+        acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
+        period = max(START_PERIOD * float((acceleration / jerk).min()), motion.end / START_SAMPLES)
+        even = np.arange(0.0, motion.end, period)
+        edges = np.append(motion.t, motion.end)
+        self.plan, self.motion = plan, motion
+        self.seen = joined(list(in_chunks(motion, period, np.concatenate([even, edges]))))
+        self.times = passing_times(self.seen, job.toolpath)
+        self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
+
+    def lasting(self, k: int) -> float:
+        """Time along run k [s]."""
+        return float(self.arrival[k + 1] - self.departure[k])
+
+    def spliced(self, k: int) -> SplicedRun:
+        """The motion along run k, with the standstill before it, and the one at the end of the job."""
+        begin = self.arrival[k] if k else 0.0
+        last = k + 2 == len(self.arrival)
+        return SplicedRun(
+            motion=self.motion,
+            begin=float(begin),
+            end=self.motion.end if last else float(self.arrival[k + 1]),
+        )
+
+    def guess(self, k: int, run: TubeRun) -> Guess:
+        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts of it can stay."""
+        guess = guess_from(run, *self.window(k, run))
+        inner = self.departure[k] + np.cumsum(guess.h[:-1])
+        seen = self.motion.at(inner, 1.0)
+        state = guess.state.copy()
+        for m, name in enumerate(("position", "velocity", "acceleration")):
+            state[1:-1, m] = getattr(seen, name)[:, run.axis]
+        return dataclasses.replace(guess, state=state)
+
+    def window(self, k: int, run: TubeRun) -> tuple[Trajectory, FloatArray]:
+        """The motion along run k, and when it passes the run's vertices (R+1,) [s]."""
+        begin, end = self.departure[k], self.arrival[k + 1]
+        inside = np.searchsorted(self.seen.t, [begin, end])
+        window = slice(inside[0], inside[1] + 1)
+        columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
+        along = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
+        t = np.clip(self.times[run.first], begin, end)
+        t[[0, -1]] = begin, end
+        # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
+        seen = np.append(np.diff(t) > 0, True)
+        seen[1:-1] &= t[1:-1] < end
+        return along, np.interp(run.offset, run.offset[seen], t[seen])
+
+
+class Starts:
+    """The motions of the starting methods, made when they are asked for."""
+
+    def __init__(self, methods: tuple[Method, ...], job: Job, plan: Plan | None = None):
+        """plan : one that has been made already, whose motion is the first"""
+        self.made: list[Start] = []
+        if plan is not None and plan.trajectory is not None:
+            self.made.append(Start(plan, job.motion_of[plan.trajectory], job))
+        self.failed: list[Plan] = []
+        self._methods, self._job = list(methods), job
+
+    def __iter__(self) -> Iterator[Start]:
+        yield from list(self.made)
+        while self._methods:
+            own_clock = dataclasses.replace(self._job, stages=self._job.stages.own_clock(), noted=[])
+            plan = self._methods.pop(0).plan_best(own_clock)
+            if plan.trajectory is None:
+                self.failed.append(plan)
+                continue
+            self.made.append(Start(plan, own_clock.motion_of[plan.trajectory], self._job))
+            yield self.made[-1]
+
+
+def search(k: int, run: TubeRun, starts: Starts, solver: TubeSolver) -> Found:
+    """What the search along run k leads to from one start after the other, until it is faster than the first start."""
+    least, why = np.inf, []
+    for start in starts:
+        least = min(least, start.lasting(k)) if start is starts.made[0] else least
+        guess = start.guess(k, run)
+        solution = solver.solve(run, guess)
+        steps, kept = solution.steps, solution.kept
+        if steps is None:
+            why.append(solution.sentence)
+            continue
+        # parts of another start's motion do not join those of the first one
+        other = start is not starts.made[0] and kept is not None and kept.any()
+        if other or steps.h.sum() >= least:
+            why.append("the search did not end faster than its start")
+            continue
+        times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
+        return Found(run, solution.status, solution.sentence, steps, solution.place, times, kept)
+    return Found(run, Status.ACCEPTABLE, why[0])
+
+
+def delivered(job: Job, first: Start, found: list[Found]) -> tuple[Delivered, list[int], str]:
+    """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
+    motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
+    start = first.plan.trajectory, first.plan.verdict
+    assert start[0] is not None
+    assert start[1] is not None
+    kept, why = [k for k, one in enumerate(found) if one.steps is None], ""
+    filtered = job.real[0].fir is not None  # what goes on between two stops is felt behind them
+    if filtered and not all(one.whole for one in found):
+        kept = list(range(len(found)))
+    while len(kept) < len(found):
+        parts: list[SplicedRun] = []
+        for k, one in enumerate(found):
+            own = first.spliced(k)
+            parts += [own] if k in kept else parts_of(job.toolpath, one, own)
+        motion = Spliced(runs=tuple(parts))
+        made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
+        passed = made[1].passed or not start[1].passed
+        if passed and made[0].cycle_time <= start[0].cycle_time:
+            return made, kept, why
+        why = "what was found there is slower with its standstills" if passed else made[1].faults[0]
+        missed = set() if filtered else _missed(job, motion, found) - set(kept)
+        kept = sorted(missed | set(kept)) if missed else list(range(len(found)))
+    return (start[0], start[1]), kept, why
+
+
+def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:
+    """The runs on which chords between samples miss vertices by more than the tolerance."""
+    machine, toolpath = job.real
+    _, far = missed(motion, toolpath, machine.dt)
+    over = np.flatnonzero(far > toolpath.tolerance)
+    return {
+        k for k, one in enumerate(found) if ((over > one.run.first[0]) & (over < one.run.first[-1])).any()
+    }
+
+
+def said(job: Job, first: Start, found: list[Found], kept: list[int], why: str) -> tuple[Status, str]:
+    """Status and sentence: of the worst search, and where the start stays."""
+    took = [one for k, one in enumerate(found) if k not in kept]
+    worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
+    text = worst.sentence if worst else "no motion faster than the start's was found"
+    start = first.plan
+    assert start.trajectory is not None
+    text += f"; {start.method}{f' with corner {start.corner}' if start.corner else ''}, its start, took "
+    text += f"{start.trajectory.cycle_time:.6g} s"
+    if kept:
+        run = found[kept[0]].run
+        why = why or found[kept[0]].sentence
+        text += (
+            f" and stays on {len(kept)} of {len(found)} runs between full stops, the first on lines "
+            f"{_lines(run, job.toolpath)}: {why}"
+        )
+    return worst.status if worst and not kept else Status.ACCEPTABLE, text
+
+
+def _lines(run: TubeRun, toolpath: Toolpath) -> str:
+    """The source lines of a run."""
+    return f"{toolpath.line[run.first[0]]} to {toolpath.line[run.first[-1] - 1]}"

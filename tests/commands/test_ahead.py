@@ -1,0 +1,58 @@
+"""Kernels compiled ahead: those that plans need, and what an installation does with them."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from planner.base import kernels
+from planner.commands.ahead import PROGRAMS
+
+ROOT = Path(__file__).resolve().parents[2]
+SETUPTOOLS = 77  # pyproject.toml asks for it to build
+
+pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="kernels are numba's own here")
+
+
+def cycle_time(job: Path, package: Path, **variables: str) -> str:
+    """Of a job, with the package in a folder."""
+    env = {**os.environ, "PYTHONPATH": str(package), **variables}
+    command = [sys.executable, "-P", "-m", "planner", "plan", str(job), "--quiet"]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = re.search(r"cycle time +(\S+)", done.stdout)
+    assert found
+    return found.group(1)
+
+
+@pytest.mark.slow
+def test_a_package_that_was_built_plans_without_compiling(tmp_path: Path) -> None:
+    """`setup.py` builds, as pip lets it do; then another program than the one that it planned is planned with what it built."""
+    if int(version("setuptools").split(".")[0]) < SETUPTOOLS:
+        pytest.skip(f"setuptools {SETUPTOOLS} or newer is needed to build")
+    build = tmp_path / "build"
+    command = [sys.executable, "setup.py", "--quiet", "build_py", "--build-lib", str(build)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    built = {file.name for file in (build / "planner" / "kernels").iterdir()}
+    assert len(built) > 30
+    assert all(name.endswith(".kernel") for name in built)
+    job = tmp_path / "job.ngc"
+    job.write_text(
+        "G21 G90 G64 P0.02 F3000\nG1 X20\nG2 X24 Y4 I4\nG1 X40 Y3 Z1\nX15 Y20\nM2\n", encoding="utf-8"
+    )
+    cache = tmp_path / "cache"
+    assert cycle_time(job, build, NUMBA_CACHE_DIR=str(cache)) == cycle_time(job, ROOT)
+    assert not cache.exists()  # nothing was compiled
+
+
+def test_the_programs_have_every_kind_of_move() -> None:
+    """A move of another kind would be compiled by the first plan that has one."""
+    words = set(re.findall(r"\bG\d+", " ".join(PROGRAMS)))
+    assert {"G1", "G2", "G3", "G61", "G64"} <= words

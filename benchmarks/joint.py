@@ -31,7 +31,7 @@ from planner.methods.tube import TubeMethod
 from planner.nc.program import Program
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "nc"
-# File, first motion block, blocks, feed [mm/s]; the first is the window of the review.
+# File, first motion block, blocks, feed [mm/s].
 WINDOWS = {
     "stellabee1, 121 blocks": ("LinuxCNC__linuxcnc__stellabee1.ngc", 18158, 121),
     "trochoidal, 300 blocks": ("LinuxCNC__linuxcnc__trochoidal.ngc", 200, 300),

@@ -26,16 +26,13 @@ from planner.tube.rows import VECTORS, Linear, linearise, slopes
 LEAST_SLACK = 0.05  # of a start [-]
 FIRST_GAP = 0.3  # complementarity of the start, share of the time [-]
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
-FREEZE, FROZEN = (
-    1.5,
-    100.0,
-)  # growth of prox per iteration, and its largest value [-]; 3 leaves one window of five without an end
+# Growth of prox per iteration once it grows, and its largest value [-]; a growth of 3 leaves one window of five without an end.
+FREEZE, FROZEN = 1.5, 100.0
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two starts of the bracket all
 # of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
 PREDICTED = 0.3
-MISSED = (
-    1e-6  # by how much a row may be missed at the end [-]: limits are narrowed by more than that (problem.py)
-)
+# By how much a row may be missed at the end [-]: limits are narrowed by more than that (problem.py).
+MISSED = 1e-6
 OFF = 1e-8  # largest gap of the kinematics at the end, in mean steps [-]
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 100  # 20 to 60 are the rule

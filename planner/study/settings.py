@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.constraints import normal_limit
 from planner.machine import ROTARY_AXES, Machine, machine_from_dict
 from planner.nc.program import Program
 
@@ -39,7 +40,7 @@ _OF_MACHINE = {
     TOLERANCE: _LENGTH,
     "dt": _TIME,
     "feed_max": _SPEED,
-    "normal_acceleration": _ACCELERATION,
+    normal_limit.NAME: _ACCELERATION,
     "fir.phase_lag_max": _ANGLE,
     FEED: _NONE,
 }

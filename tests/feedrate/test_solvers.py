@@ -188,7 +188,7 @@ def test_names():
         ("casadi", {"solver": "ipopt", "corner": "bezier"}),
         ("casadi", {"solver": "fatrop", "corner": "bezier"}),
         ("casadi", {"solver": "sequential-convex", "corner": "bezier"}),
-        ("casadi", {"method": "tube"}),
+        ("casadi", {"method": "tube", "solver": "ipopt"}),
         ("toppra", {"method": "toppra", "solver": "toppra", "corner": "bezier"}),
     ],
 )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.geometry.chords import arc_point
+from planner.geometry.chords import polyline
 from planner.job.plan import Plan
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Kind
@@ -83,25 +83,14 @@ def programmed_polyline(plan: Plan, within: float) -> Polyline:
     toolpath = plan.toolpath
     chord = np.sqrt(8.0 * within / np.maximum(toolpath.curvature, 1e-12))
     count = np.where(toolpath.straight, 1, np.ceil(toolpath.length / chord)).astype(np.int64)
-    segment = np.repeat(np.arange(len(toolpath)), count)
-    number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 1
-    ends = toolpath.end[segment].copy()
-    inner = np.flatnonzero(number < count[segment])
-    at = segment[inner]
-    along = toolpath.length[at] * number[inner] / count[at]
-    bent = toolpath.arc[at] >= 0
-    arcs, curves = at[bent], at[~bent]
-    ends[inner[bent]] = toolpath.arcs.center[toolpath.arc[arcs]] + arc_point(toolpath, arcs, along[bent])
-    ends[inner[~bent]] = toolpath.curves.at(toolpath.curve[curves], toolpath.length[curves], along[~bent])[
-        :, 0
-    ]
+    ends, segment = polyline(toolpath, count)
     vertices: FloatArray = np.vstack([toolpath.start[:1], ends])
     return Polyline(
         points=_rounded(vertices),
         feed=toolpath.feed[segment],
         block=toolpath.block[segment],
         rapid=toolpath.rapid[segment],
-        miss=within if len(inner) else 0.0,
+        miss=within if (count > 1).any() else 0.0,
     )
 
 

@@ -138,6 +138,20 @@ def points_on(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
     return out
 
 
+def polyline(toolpath: Toolpath, count: Array) -> tuple[FloatArray, Array]:
+    """The path as a polyline: its points (N, A) [mm] behind the start, and the segment (N,) of each.
+
+    count : (M,) points on every segment, evenly along it, the last at its end; 1 on lines
+    """
+    segment = np.repeat(np.arange(len(toolpath)), count)
+    number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 1
+    points = toolpath.end[segment].copy()
+    inner = np.flatnonzero(number < count[segment])
+    at = segment[inner]
+    points[inner] = points_on(toolpath, at, toolpath.length[at] * number[inner] / count[at])
+    return points, segment
+
+
 def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
     """(n, A) points of arcs [mm], relative to their centres.
 

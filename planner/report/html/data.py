@@ -14,7 +14,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import RAD_PER_DEG
-from planner.geometry.chords import arc_point
+from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import Trajectory, joined
@@ -196,18 +196,7 @@ def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArra
     if not len(toolpath):
         return np.zeros((0, 3))
     count = np.where(toolpath.straight, 1, ARC_POINTS)
-    segment = np.repeat(np.arange(len(toolpath)), count)
-    number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 1
-    points = toolpath.end[segment].copy()
-    inner = np.flatnonzero(number < count[segment])
-    at = segment[inner]
-    along = toolpath.length[at] * number[inner] / count[at]
-    bent = toolpath.arc[at] >= 0
-    arcs, curves = at[bent], at[~bent]
-    points[inner[bent]] = toolpath.arcs.center[toolpath.arc[arcs]] + arc_point(toolpath, arcs, along[bent])
-    points[inner[~bent]] = toolpath.curves.at(toolpath.curve[curves], toolpath.length[curves], along[~bent])[
-        :, 0
-    ]
+    points, _ = polyline(toolpath, count)
     points = np.vstack([toolpath.start[:1], points])[:, linear]
     points = points[:: max(1, -(-len(points) // most))]
     return np.pad(points, ((0, 0), (0, 3 - len(linear))))

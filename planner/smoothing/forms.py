@@ -92,6 +92,31 @@ def add_square(band, i, row, weight):
 
 
 @njit(cache=True, error_model="numpy")
+def time_derivatives(rows, tangent, feed, acc, jerk, out):
+    """out (4, 6) = the basis functions and their time derivatives in a motion with feed, acc and jerk along the path,
+    from the derivatives by the spline's parameter, `rows` (4, 6) of the basis functions and `tangent` (3, A) of the curve; returns
+    |p_u|."""
+    square, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
+    for k in range(tangent.shape[1]):
+        square += tangent[0, k] * tangent[0, k]
+        along2 += tangent[0, k] * tangent[1, k]
+        along3 += tangent[0, k] * tangent[2, k]
+        bend += tangent[1, k] * tangent[1, k]
+    speed = np.sqrt(square)
+    grows = along2 / speed  # d|p'|/du, and then its derivative
+    grows2 = along3 / speed + (bend - grows * grows) / speed
+    du = feed / speed
+    ddu = (acc - grows * du * du) / speed
+    dddu = (jerk - grows2 * du * du * du - 3.0 * grows * du * ddu) / speed
+    for b in range(ORDER):
+        out[0, b] = rows[0, b]
+        out[1, b] = rows[1, b] * du
+        out[2, b] = rows[2, b] * du * du + rows[1, b] * ddu
+        out[3, b] = rows[3, b] * du * du * du + 3.0 * rows[2, b] * du * ddu + rows[1, b] * dddu
+    return speed
+
+
+@njit(cache=True, error_model="numpy")
 def _add_prices(knots, control, motion, at, limits, H, Q):
     """Add what a motion pays at one end of a grid interval, at = (interval, end), to H, and its squared jerks to Q (`motion_bands`)."""
     interval, end = at
@@ -106,32 +131,17 @@ def _add_prices(knots, control, motion, at, limits, H, Q):
         for m in range(3):
             for d in range(ORDER):
                 jet[m, k] += rows[m + 1, d] * control[i + d, k]
-    speed_sq, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
-    for k in range(axes):
-        speed_sq += jet[0, k] * jet[0, k]
-        along2 += jet[0, k] * jet[1, k]
-        along3 += jet[0, k] * jet[2, k]
-        bend += jet[1, k] * jet[1, k]
-    speed = np.sqrt(speed_sq)
-    grows = along2 / speed  # d|p'|/du, and then its derivative
-    grows2 = along3 / speed + (bend - grows * grows) / speed
-    du = v / speed
-    ddu = (a - grows * du * du) / speed
-    dddu = (jerk - grows2 * du * du * du - 3.0 * grows * du * ddu) / speed
-    row_v, row_a, row_j = np.empty(ORDER), np.empty(ORDER), np.empty(ORDER)
-    for d in range(ORDER):
-        row_v[d] = rows[1, d] * du
-        row_a[d] = rows[2, d] * du * du + rows[1, d] * ddu
-        row_j[d] = rows[3, d] * du * du * du + 3.0 * rows[2, d] * du * ddu + rows[1, d] * dddu
+    in_time = np.empty((4, ORDER))
+    time_derivatives(rows, jet, v, a, jerk, in_time)
     for k in range(axes):
         if weight[k, 0] > 0.0:
-            add_square(H[k], i, row_v, weight[k, 0])
+            add_square(H[k], i, in_time[1], weight[k, 0])
         if weight[k, 1] > 0.0:
-            add_square(H[k], i, row_a, weight[k, 1] / limits[0, k] ** 2)
+            add_square(H[k], i, in_time[2], weight[k, 1] / limits[0, k] ** 2)
         share = 1.0 / limits[1, k] ** 2
         if weight[k, 2] > 0.0:
-            add_square(H[k], i, row_j, weight[k, 2] * share)
-        add_square(Q[k], i, row_j, own * share)
+            add_square(H[k], i, in_time[3], weight[k, 2] * share)
+        add_square(Q[k], i, in_time[3], own * share)
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,6 +9,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER, derivatives
+from planner.smoothing.forms import time_derivatives
 
 NONE = 1e12  # stands for a bound that there is none of
 # Places at which the limits are kept: so many in each interval of the grid at least, and in each span.
@@ -29,31 +30,6 @@ class Places(NamedTuple):
     least: FloatArray  # (P, R) smallest share in the interval, at its ends or inside
     most: FloatArray  # (P, R) and the largest
     limit: FloatArray  # (P, R)
-
-
-@njit(cache=True, error_model="numpy")
-def time_derivatives(rows, tangent, feed, acc, jerk, out):
-    """out (4, 6) = the basis functions and their time derivatives in a motion with feed, acc and jerk along the path (forms.py),
-    from the derivatives by the spline's parameter, `rows` (4, 6) of the basis functions and `tangent` (3, A) of the curve; returns
-    |p_u|."""
-    square, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
-    for k in range(tangent.shape[1]):
-        square += tangent[0, k] * tangent[0, k]
-        along2 += tangent[0, k] * tangent[1, k]
-        along3 += tangent[0, k] * tangent[2, k]
-        bend += tangent[1, k] * tangent[1, k]
-    speed = np.sqrt(square)
-    grows = along2 / speed  # d|p'|/du, and then its derivative
-    grows2 = along3 / speed + (bend - grows * grows) / speed
-    du = feed / speed
-    ddu = (acc - grows * du * du) / speed
-    dddu = (jerk - grows2 * du * du * du - 3.0 * grows * du * ddu) / speed
-    for b in range(ORDER):
-        out[0, b] = rows[0, b]
-        out[1, b] = rows[1, b] * du
-        out[2, b] = rows[2, b] * du * du + rows[1, b] * ddu
-        out[3, b] = rows[3, b] * du * du * du + 3.0 * rows[2, b] * du * ddu + rows[1, b] * dddu
-    return speed
 
 
 @njit(cache=True, error_model="numpy")

@@ -88,7 +88,7 @@ def freed(job: Job, plan: Plan, steps_max: float = np.inf) -> Freed:
         rounded=None,
         grid=None,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
-        sentence=f"{plan.sentence}; then {said(job, start, found, kept, why)[1]}",
+        sentence=said(job, start, found, kept, why, "a path first, then its feed")[1],
         notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),
         timings=job.stages.timings,
     )
@@ -243,15 +243,16 @@ def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:
     }
 
 
-def said(job: Job, first: Start, found: list[Found], kept: list[int], why: str) -> tuple[Status, str]:
-    """Status and sentence: of the worst search, and where the start stays."""
+def said(
+    job: Job, first: Start, found: list[Found], kept: list[int], why: str, what: str
+) -> tuple[Status, str]:
+    """Status and sentence: of the worst search, and where the start stays. `what` the start is."""
     took = [one for k, one in enumerate(found) if k not in kept]
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
     text = worst.sentence if worst else "no motion faster than the start's was found"
     start = first.plan
     assert start.trajectory is not None
-    text += f"; {start.method}{f' with corner {start.corner}' if start.corner else ''}, its start, took "
-    text += f"{start.trajectory.cycle_time:.6g} s"
+    text += f"; its start ({what}) took {start.trajectory.cycle_time:.6g} s"
     if kept:
         run = found[kept[0]].run
         why = why or found[kept[0]].sentence

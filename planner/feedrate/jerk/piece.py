@@ -10,9 +10,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 from planner.feedrate.jerk.chain import Chain, Task
+from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.held import Held, held_ranges, hold
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.part import Part
+from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.slowing import slower_by
 
 
@@ -48,13 +50,7 @@ class Piece:
         found, columns = task.profile, task.columns
         for held in self.held:
             hold(found, columns, held)
-        own, intervals = slice(self.first, self.last + 1), slice(self.first, self.last)
-        by = float(slower_by(columns, self.first, found.x[own], found.u[own], found.jerk[intervals], 1.0))
-        found.x[own] /= by**2
-        found.u[own] /= by**2
-        found.jerk[own] /= by**3
-        found.duration[own] *= by
-        return by
+        return slow_down(found, columns, self.first, self.last)
 
     @property
     def chains(self) -> list[Chain]:
@@ -75,3 +71,16 @@ class Piece:
     def stops(self) -> list[int]:
         """Points where the profile rests because nothing better was found."""
         return [stop for part in self.parts for stop in part.stops]
+
+
+def slow_down(profile: Profile, columns: ProblemColumns, first: int, last: int) -> float:
+    """Slow a profile down between two full stops, at the points first and last, until it keeps every limit at the grid points; returns
+    by what factor."""
+    own, intervals = slice(first, last + 1), slice(first, last)
+    x, u, jerk = profile.x[own], profile.u[own], profile.jerk[intervals]
+    by = float(slower_by(columns, first, x, u, jerk, 1.0))
+    profile.x[own] /= by**2
+    profile.u[own] /= by**2
+    profile.jerk[own] /= by**3
+    profile.duration[own] *= by
+    return by

@@ -60,7 +60,7 @@ from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Sta
 
 PLACES_NAMED = 3  # in a sentence
 # Where more than this share of what was solved for has to be solved again, all of it is [-].
-SHARE_MAX = 0.6
+SHARE_MAX = 0.8
 CHANGE_MAX = 0.05  # ... and where limits of speed change by more than this [-]: it is felt beyond the ranges
 POINTS_SHARED = 3_000  # fewer are solved by one thread: threads take 1 ms to begin, a point some us
 

@@ -158,11 +158,12 @@ def within_limits(
     if not order.jerk_limited:
         return planned, motion
     factor = excess(motion, toolpath, machine)
-    best, least = (planned, motion, factor), slowed(motion, toolpath, machine, factor).end
+    best, least = (planned, factor), slowed(motion, toolpath, machine, factor).end
     tell("between points", found=least, excess=float(factor.max() - 1.0))
     large = len(planned.samples) > TIGHTENED_POINTS
     unslowed = motion.end
     tighter = planned
+    del planned, motion  # half a kilobyte a point, which long jobs need for the next one
     least_excess = 1.0 + (WORTH if large else TIGHTENED_EXCESS)
     for _ in range(LONG_ROUNDS if large else TIGHTENING_ROUNDS):
         if factor.max() <= 1.0 + TIGHTENED_EXCESS or (large and least < (1.0 + TIGHTENED_LOSS) * unslowed):
@@ -177,9 +178,10 @@ def within_limits(
         facts = {name: count for name, count in tighter.solution.effort.items() if name.endswith("again")}
         tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0), **facts)
         if end < least:
-            best, least = (tighter, motion, factor), end
-    planned, motion, factor = best
-    motion = slowed(motion, toolpath, machine, factor)
+            best, least = (tighter, factor), end
+        del motion
+    planned, factor = best
+    motion = slowed(planned.motion(), toolpath, machine, factor)
     return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
 
 

@@ -52,7 +52,8 @@ from planner.feedrate.jerk.again import RangeAgain, ranges_of
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
-from planner.feedrate.jerk.piece import Piece, slow_down
+from planner.feedrate.jerk.part import LONG
+from planner.feedrate.jerk.piece import Piece, Solved, slow_down
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.lagrangian import lagrangian
@@ -96,9 +97,9 @@ class JerkLimited:
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
         profile = Profile.at_rest(*problem.d1.shape)
-        pieces, slower = self._solve_pieces(problem, profile, progress)
+        pieces = self._solve_pieces(problem, profile, progress)
         stops = [stop for piece in pieces for stop in piece.stops]
-        chains = [chain for piece in pieces for chain in piece.chains]
+        slower = max(piece.slower for piece in pieces)
         sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk"
         if stops:
             places = ", ".join(f"{problem.s[k]:.6g}" for k in stops[:PLACES_NAMED])
@@ -112,44 +113,31 @@ class JerkLimited:
             sentence=sentence,
             solver=repr(self),
             solve_time=0.0,
-            iterations=max(
-                done for piece in pieces for done in (*piece.joined, *(c.iterations for c in piece.chains))
-            ),
+            iterations=max(piece.iterations for piece in pieces),
             jerk_limited=True,
-            effort={
-                "windows": sum(chain.windows for chain in chains)
-                + sum(len(piece.joined) for piece in pieces),
-                "other starts": sum(chain.other_starts for chain in chains),
-                "joined": sum(piece.met for piece in pieces),
-                "held": sum(held.last - held.first for piece in pieces for held in piece.held),
-                "divided": sum(chain.divided for chain in chains),
-                "standstills": len(stops),
-            },
+            effort={name: sum(piece.effort[name] for piece in pieces) for name in pieces[0].effort},
             **_columns_of_solution(profile),
         )
         return _priced(problem, solution, began)
 
     def _solve_pieces(
         self, problem: FeedrateProblem, profile: Profile, progress: Callable[[float], None] | None
-    ) -> tuple[list[Piece], float]:
-        """Solve all pieces into `profile`, on several cores if it is worth it; returns them and by what factor one is slowed down
-        most."""
+    ) -> list[Solved]:
+        """Solve all pieces into `profile`, on several cores if it is worth it. Long ones come first, as many at a time as there are
+        threads for their two ends: each takes a third of a kilobyte a point while it is being solved."""
         columns, counted = columns_of(problem), _Counted(len(problem), progress)
-        pieces = [
-            Piece(
-                Task(
-                    solver=self,
-                    columns=columns,
-                    profile=profile,
-                    first=first,
-                    last=beyond - 1,
-                    tell=counted.add,
-                )
-            )
-            for first, beyond in pairwise(problem.piece.tolist())
-        ]
-        room = _do([task for piece in pieces for task in piece.work], counted)
-        return pieces, max(piece.finish(room) for piece in pieces)
+        task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
+        ends = list(pairwise(problem.piece.tolist()))
+        order = sorted(range(len(ends)), key=lambda g: ends[g][0] - ends[g][1])
+        long = sum(beyond - 1 - first > LONG * self.window for first, beyond in ends)
+        at_once = max(threads() // 2, 1)
+        batches = [order[k : min(k + at_once, long)] for k in range(0, long, at_once)] + [order[long:]]
+        solved: dict[int, Solved] = {}
+        for batch in batches:
+            pieces = [Piece(task(first=ends[g][0], last=ends[g][1] - 1)) for g in batch]
+            room = _do([work for piece in pieces for work in piece.work], counted)
+            solved |= {g: piece.finish(room) for g, piece in zip(batch, pieces, strict=True)}
+        return [solved[g] for g in range(len(ends))]
 
     def again(
         self, before: FeedrateProblem, known: FeedrateSolution, problem: FeedrateProblem

@@ -1,34 +1,30 @@
 """What limits and tolerance cost along the free optimum: the multipliers of the search, sorted by what they price.
 
-At its end the Lagrangian T + sum z g is stationary in everything but the limits, so that dT/d(ln limit) = sum of z dg/d(ln limit). The
-rows (rows.py) are shares of limits, g = y/limit - 1 of one axis and g = (|y|^2/limit^2 - 1)/2 of a ball. Where z > 0 both are 0 and both
-have the slope -1, so that a price is minus a sum of multipliers. Of the feed this takes r, the limit of its inner rows, to go with F.
+At its end the Lagrangian T + sum z g is stationary in everything but the limits, so that dT/d(ln limit) = sum of z dg/d(ln limit).
+The rows (rows.py) are shares of limits, g = y/limit - 1 of one axis and g = (|y|^2/limit^2 - 1)/2 of a ball. Where z > 0 both are
+0 and have the slope -1: a price is minus a sum of multipliers. Of the feed this lets the radii of its inner rows go with F.
 
-All limits together fix the time. In 1/k of it, along the same path, velocities are k times, accelerations k^2 times and jerks k^3
-times as large, whence (Euler)
+All limits together fix the time. In k times it, along the same path, velocities are 1/k, accelerations 1/k^2 and jerks 1/k^3 of what
+they were, whence (Euler)
 
     sum of velocities and feed  +  2 sum of accelerations and of the normal one  +  3 sum of jerks   =   -T
 
-but for the rows that are no limits: `OTHER` holds them, order and the largest length of a step on an arc, which do not depend on time.
+but for the pull on durations (nlp.py) and the rows in `OTHER`, which are no limits: bounds of durations, the order along the leg, the
+largest length of a step on an arc.
 
-The tolerance acts through what eq. (20) leaves of it for the path (run.py), where it prices the room of every leg and vertex.
+The tolerance acts through what eq. (20) leaves of it for the path (run.py): priced is the room of every leg and of every vertex.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.tube import rows
 from planner.tube.problem import Window
-from planner.tube.run import TubeRun
 
 # Columns behind those of the axes (jerk, acceleration, velocity) of the prices of a step.
 FEED, NORMAL, ROOM, VERTEX, OTHER = range(5)
-# Time that rows which hold the durations of steps to those of the guess may cost, as a share of all [-].
-HELD_BACK = 1e-3
 
 
 def columns(axes: int) -> int:

@@ -88,7 +88,7 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
 
     if not searchable(job):
         return fastest_plan(job, settings)
-    on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0)
+    on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
     first = freed(job, fastest_plan(job, on_first), effort.search)
     if first.kept <= effort.kept:
         return first.plan

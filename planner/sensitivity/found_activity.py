@@ -77,11 +77,12 @@ def found_history(
                 _of_start(rows, start, part, begin)
             rows.stand(begin + part.end - part.begin, part.hold)
     t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
-    seen = motion.at(t, SEEN)
+    single, which = np.unique(t, return_inverse=True)
+    seen = motion.at(single, SEEN)
     return GridHistory(
         t=t,
-        s=seen.s,
-        feed=seen.feed,
+        s=seen.s[which],
+        feed=seen.feed[which],
         active=np.concatenate(rows.active),
         active_names=names,
         share=rows.share / rows.share.sum(),

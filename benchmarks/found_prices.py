@@ -18,6 +18,7 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -84,17 +85,17 @@ def changes(
         for ratio in RATIOS if small.least >= WORTH * cycle_time else ():
             told = foretold(plan, machine, Setting(name=key, value=ratio * value), tolerance)
             changed = more_of(machine, name)(ratio - 1.0)
-            yield name, ratio, told, lambda changed=changed: planned(program, changed)
+            yield name, ratio, told, partial(planned, program, changed)
     for ratio in RATIOS if -prices.feed * 0.02 >= WORTH * cycle_time else ():
         told = foretold(plan, machine, Setting(name="feed", value=ratio), tolerance)
         faster = dataclasses.replace(program, feed=program.feed * ratio)
         raised = machine
         if machine.feed_max is not None:
             raised = machine.model_copy(update={"feed_max": machine.feed_max * ratio})
-        yield "feed", ratio, told, lambda faster=faster, raised=raised: planned(faster, raised)
+        yield "feed", ratio, told, partial(planned, faster, raised)
     for ratio in RATIOS:
         told = foretold(plan, machine, Setting(name="tolerance", value=ratio * tolerance), tolerance)
-        yield "tolerance", ratio, told, lambda ratio=ratio: planned(program, machine, ratio * tolerance)
+        yield "tolerance", ratio, told, partial(planned, program, machine, ratio * tolerance)
     yield from corners(plan, program, machine)
 
 
@@ -118,7 +119,7 @@ def corners(
             f"tolerance, line {dear.line[k]}",
             RATIOS[-1],
             told,
-            lambda changed=changed: planned(changed, machine),
+            partial(planned, changed, machine),
         )
 
 

@@ -6,7 +6,7 @@ limit acts at every step through its price there; the tolerance, and acceleratio
     dT  =  sum of room d(ln eps_ap) + vertex d(ln eps_ap) + normal d(ln X)        over legs and vertices, from budgets made again.
 
 **Finite changes.** A corner that jerk j lets through within eps takes a time that goes with (eps/j)^(1/3), one that acceleration lets
-through with (eps/a)^(1/2), a stretch at full speed with 1/v. So a price p = dT/d(ln limit) foretells for r times the limit
+through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(ln limit) foretells for r times the limit
 
     T(r) - T(1)  =  p/n (1 - r^-n),      n = 1/3 for jerk and tolerance, 1/2 for accelerations, 1 for velocities and the feed,
 
@@ -182,9 +182,10 @@ def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], cha
     for run in runs:
         first = run.found.run.first
         before, after = (budgets_of(toolpath, one, first) for one in (machine, changed))
-        total += run.room @ np.log(after.leg / before.leg) + run.normal @ np.log(after.across / before.across)
-        total += run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1])
-    return float(total) / STEP
+        total += float(run.room @ np.log(after.leg / before.leg))
+        total += float(run.normal @ np.log(after.across / before.across))
+        total += float(run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1]))
+    return total / STEP
 
 
 class _OfTolerance:
@@ -206,9 +207,9 @@ class _OfTolerance:
             )
             paid = run.of(price.ROOM) * room[run.leg] + run.of(price.NORMAL) * normal[run.leg]
             at_vertex = run.vertex[1:-1] * np.log(after.vertex[1:-1] / before.vertex[1:-1]) / STEP
-            of_vertex = np.bincount(run.nearer_end(), paid, len(first))
+            of_vertex = np.bincount(run.nearer_end(), paid, len(first)).astype(np.float64)
             of_vertex[1:-1] += at_vertex
-            self.together[first] += of_vertex / toolpath.tolerance[first]
+            np.add.at(self.together, first, of_vertex / toolpath.tolerance[first])
             vertex[first[1:-1]] += at_vertex
             np.add.at(segment, run.segment, paid)
         tolerance = toolpath.tolerance

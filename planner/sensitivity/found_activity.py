@@ -67,7 +67,7 @@ def found_history(
     rows = _Rows(names, np.zeros(len(names)))
     parts = list(zip(motion.runs, motion.begin[:-1].tolist(), strict=True))
     for k, one in enumerate(found):
-        for lo, hi, stays in [(0, 0, True)] if k in kept else one.stretches():
+        for lo, hi, stays in [(0, 0, True)] if k in kept else one.ranges():
             part, begin = parts.pop(0)
             if not stays:
                 _of_steps(rows, toolpath, one, (lo, hi), (part, begin))
@@ -77,11 +77,12 @@ def found_history(
                 _of_start(rows, start, part, begin)
             rows.stand(begin + part.end - part.begin, part.hold)
     t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
-    seen = motion.at(t, SEEN)
+    single, which = np.unique(t, return_inverse=True)
+    seen = motion.at(single, SEEN)
     return GridHistory(
         t=t,
-        s=seen.s,
-        feed=seen.feed,
+        s=seen.s[which],
+        feed=seen.feed[which],
         active=np.concatenate(rows.active),
         active_names=names,
         share=rows.share / rows.share.sum(),
@@ -110,23 +111,23 @@ def _of_steps(
     before = toolpath.dwell[run.first[0]] if lo == 0 else 0.0
     rows.stand(begin, before)
     names = ("h", "position", "velocity", "acceleration", "jerk")
-    stretch = Steps(**{name: getattr(steps, name)[lo:hi] for name in names})
+    own = Steps(**{name: getattr(steps, name)[lo:hi] for name in names})
     leg = run.leg_at((place[lo:hi] + place[lo + 1 : hi + 1]) / 2.0)
-    used = shares(run, stretch, leg, place[lo : hi + 1]) >= 1.0 - HELD
+    used = shares(run, own, leg, place[lo : hi + 1]) >= 1.0 - HELD
     moving, many = len(run.axis), len(toolpath.axes)
     column = np.concatenate([quantity * many + run.axis for quantity in range(3)])
     column = np.append(column, 3 * many + np.arange(3))
     holders = used.sum(axis=1)
-    part_of = np.divide(stretch.h, holders, out=np.zeros(hi - lo), where=holders > 0)
+    part_of = np.divide(own.h, holders, out=np.zeros(hi - lo), where=holders > 0)
     np.add.at(rows.share, column, (used * part_of[:, None]).sum(axis=0))
-    rows.share[-2] += stretch.h[holders == 0].sum()
+    rows.share[-2] += own.h[holders == 0].sum()
     paid = np.zeros(used.shape)
     if found.price is not None:
         of = [*range(3 * moving), *(3 * moving + column for column in PRICE_OF)]
         paid = -found.price[lo:hi, of]
         paid[:, -1] -= found.price[lo:hi, 3 * moving + price.VERTEX]
-    active = column[np.argmax(np.where(used, 1.0 + paid / stretch.h[:, None], 0.0), axis=1)]
+    active = column[np.argmax(np.where(used, 1.0 + paid / own.h[:, None], 0.0), axis=1)]
     active = np.where(holders > 0, active, len(rows.names) - 2)
-    t = begin + before + np.append(0.0, np.cumsum(stretch.h))
+    t = begin + before + np.append(0.0, np.cumsum(own.h))
     rows.add(t[:-1], active)
     rows.stand(t[-1], part.end - part.begin - (t[-1] - begin))

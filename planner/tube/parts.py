@@ -47,7 +47,7 @@ class Found:
             return 0.0
         return float(self.steps.h[self.price.any(axis=1)].sum())
 
-    def stretches(self) -> list[tuple[int, int, bool]]:
+    def ranges(self) -> list[tuple[int, int, bool]]:
         """First step, the one behind the last, and whether the start stays, of what goes out in one part."""
         assert self.steps is not None
         kept = np.zeros(len(self.steps.h), dtype=bool) if self.kept is None else self.kept
@@ -64,7 +64,7 @@ def parts_of(toolpath: Toolpath, found: Found, start: SplicedRun) -> list[Splice
     assert found.times is not None
     steps = len(found.steps.h)
     parts = []
-    for lo, hi, stays in found.stretches():
+    for lo, hi, stays in found.ranges():
         if stays:
             begin = start.begin if lo == 0 else float(found.times[lo])
             end = start.end if hi == steps else float(found.times[hi])

@@ -120,7 +120,7 @@ class TubeRun:
         return np.append(0.0, np.cumsum(self.length))
 
     def leg_at(self, place: FloatArray) -> Array:
-        """(n,) legs at places (n,) along the run [mm]."""
+        """(n,) legs at the places `place` (n,) along the run [mm]."""
         return np.clip(np.searchsorted(self.offset, place, side="right") - 1, 0, len(self) - 1)
 
     def points(self, leg: Array, x: FloatArray) -> FloatArray:

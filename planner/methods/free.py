@@ -46,7 +46,7 @@ class Freed(NamedTuple):
 
 def searchable(job: Job) -> bool:
     """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no limits of one's own, no
-    stretch in step with the spindle."""
+    range in step with the spindle."""
     machine, toolpath = job.real
     return (
         machine.fir is None

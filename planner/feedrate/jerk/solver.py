@@ -53,7 +53,7 @@ from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.part import LONG
-from planner.feedrate.jerk.piece import Piece, Solved, slow_down
+from planner.feedrate.jerk.piece import Piece, Solved, slowed_piece
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.lagrangian import lagrangian
@@ -168,7 +168,7 @@ class JerkLimited:
             columns = columns_of(problem)
         pieces = np.unique(np.searchsorted(problem.piece, [own.first for own in ranges], side="right") - 1)
         slower = max(
-            [slow_down(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in pieces],
+            [slowed_piece(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in pieces],
             default=1.0,
         )
         solution = replace(

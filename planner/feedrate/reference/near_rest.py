@@ -31,7 +31,7 @@ class IntervalShape:
 
     @classmethod
     def of(cls, s: FloatArray) -> IntervalShape:
-        """The shapes on a grid from rest to rest: cube roots near its ends (sequential_convex.py), linear elsewhere."""
+        """The shapes on a grid s (n+1,) [mm] from rest to rest: cube roots near its ends (sequential_convex.py), linear elsewhere."""
         ds = np.diff(s)
         back = s[-1] - s[1:] < s[:-1] - s[0]  # nearer to the last point: the mirror image
         away = np.where(back, s[-1] - s[1:], s[:-1] - s[0]) / ds

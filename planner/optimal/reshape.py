@@ -1,10 +1,10 @@
 """A round of reshaping: splines and the motion along them are improved together, within the tolerance.
 
 Along the time-optimal motion of the present path all limits are linearised in the control points and in the time that every part of it
-takes; smoothing/joint.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem is
-then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of the
-promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
-order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+takes; smoothing/combined.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem
+is then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of
+the promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
+order, shape and feed satisfy the optimality conditions of the combined problem, minimum time inside the tolerance.
 
 What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the parameter of the spline is
 kept as a function of time, a small change of the control points changes the optimal time by
@@ -32,8 +32,8 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE, ORDER
+from planner.smoothing.combined import MotionLimits, improve
 from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
-from planner.smoothing.joint import MotionLimits, improve
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 

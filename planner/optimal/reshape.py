@@ -123,7 +123,10 @@ Bands = tuple[FloatArray, FloatArray]
 
 
 def dear_runs(planned: OnPath, price: FloatArray) -> Array:
-    """(Q,) True for the runs, the dearest first, that together have `DEAR` of the prices (J,) of all sites."""
+    """(Q,) True for the runs, the dearest first, that together have `DEAR` of what the tolerance costs.
+
+    price : (J,) at every site, from `corridor_prices` [s/mm]
+    """
     first = _shape(planned).splines.site_first
     of_run = np.bincount(np.repeat(np.arange(len(first) - 1), np.diff(first)), -price, len(first) - 1)
     order = np.argsort(-of_run, kind="stable")

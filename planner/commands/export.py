@@ -128,6 +128,8 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
     finally:
         shutil.rmtree(new, ignore_errors=True)
     say(f"{output / made.file}: {made.sentence}")
+    if made.note is not None:
+        say(f"note: {made.note}", err=True)
     for name, seconds in made.predicted.items():
         say(f"  {seconds:10.4f} s predicted by a model of {for_.value}'s planner: {name}")
 

@@ -8,6 +8,7 @@ moves; and the planned path as chords, with G64 P for the room that they leave. 
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,9 +84,9 @@ def best(found: list[Candidate]) -> Candidate:
 
 def own_words(program: Program, plan: Plan) -> bytes | None:
     """The program's text, if LinuxCNC reads it as it was read; None otherwise, and for points."""
-    text, file = program.text, Path(program.source)
-    if text is None and file.is_file():
-        text = file.read_bytes()
+    text = program.text
+    if text is None and os.path.isfile(program.source):
+        text = Path(program.source).read_bytes()
     if text is None or program.pen:
         return None
     try:

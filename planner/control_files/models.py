@@ -173,7 +173,7 @@ def stoppable(gain: FloatArray, blocks: int) -> FloatArray:
 def times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
-    """(n,) times of blocks of a length (n,) [mm] from x0 over a peak to x1, squares of speeds (n,), with constant accel (n,) [mm/s2]."""
+    """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
     ramps = (2.0 * v * v - x0 - x1) / (2.0 * accel)
     times: FloatArray = (2.0 * v - v0 - v1) / accel + np.maximum(length - ramps, 0.0) / np.maximum(

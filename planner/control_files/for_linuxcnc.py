@@ -21,6 +21,7 @@ from planner.base.units import MICROMETRE
 from planner.control_files.chords import Polyline, planned_polyline, programmed_polyline
 from planner.control_files.linuxcnc_model import joined, linuxcnc_time
 from planner.job.plan import Plan
+from planner.nc.points import are_points
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import LINUXCNC, Reading
@@ -87,7 +88,7 @@ def own_words(program: Program, plan: Plan) -> bytes | None:
     text = program.text
     if text is None and os.path.isfile(program.source):
         text = Path(program.source).read_bytes()
-    if text is None or program.pen:
+    if text is None or program.pen or are_points(text):
         return None
     try:
         reading = Reading(dialect=LINUXCNC, ignore=program.reading.ignore)

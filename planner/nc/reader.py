@@ -18,6 +18,7 @@ from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import LATHE_NOTE, dialect_of, is_turned
 from planner.nc.leader import without_leader
 from planner.nc.lexer import Words, split_words, text_alone
+from planner.nc.points import are_points, read_points
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, LATHE, SIEMENS, Reading
 
@@ -80,6 +81,8 @@ def interpret(
     Raises InputError for an empty or binary text.
     """
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
+    if are_points(data):
+        return read_points(data, source), ()
     refuse_models(data, source)
     _check_text(data, source)
     if is_plotter_file(data, source):

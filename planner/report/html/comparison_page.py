@@ -63,7 +63,7 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
         "PLOTLY": plotly_script(),
         "ABOUT": json_text(about),
         "COLUMNS": columns_text(columns),
-        "SCRIPT": template("comparison.js"),
+        "SCRIPT": template("view.js") + template("comparison.js"),
     }
     return filled(template("comparison.html"), parts)
 

@@ -68,7 +68,7 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
         "PLOTLY": plotly_script(),
         "ABOUT": json_text(about),
         "COLUMNS": columns_text(columns),
-        "SCRIPT": template("report.js"),
+        "SCRIPT": template("view.js") + template("report.js"),
     }
     return filled(page, parts)
 

@@ -250,6 +250,14 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
 
 def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
     """The motion on the first splines, the grids, and the resolution of the one that it is on."""
+    spans, effort = len(path.spline.spans), settings.effort  # a grid has a point for each span at least
+    if settings.rounds is None and spans > effort.work and effort.grids(spans) is effort.sizes[-1]:
+        grids = effort.sizes[-1]
+        return (
+            dataclasses.replace(settings.order.solve(path, job, grids.final), shape=shape),
+            grids,
+            grids.final,
+        )
     grids, samples = grids_for(path, job, settings)
     reshaped_at_all = settings.effort.work >= len(samples) if settings.rounds is None else settings.rounds > 0
     resolution = grids.rounds if reshaped_at_all else grids.final

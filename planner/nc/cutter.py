@@ -132,12 +132,25 @@ class Cutter:
         self._radius, self._sign = radius, 1 if left else -1
         self.normal = normal
         self._open: _Open | None = None
+        self._placed = False
         state.actual = state.position.copy()
 
     @property
     def started(self) -> bool:
         """Whether the first move has been made."""
         return self._open is not None
+
+    @property
+    def leaving(self) -> complex:
+        """Unit tangent of the last move at its end."""
+        assert self._open is not None
+        return self._open.side.last
+
+    def begin_beside(self, tangent: complex) -> None:
+        """The tool stands beside the programmed place already, normal to the first move, whose unit tangent is given."""
+        state = self._state
+        state.actual = self._at(self._beside(self._plane(state.position), tangent), state.position)
+        self._placed = True
 
     def line(self, target: FloatArray, kind: Kind, line: int) -> None:
         """A straight move to `target` (3,), the programmed end. Raises CutterFault if the tool cannot follow."""
@@ -149,7 +162,9 @@ class Cutter:
             return
         tangent = (end - start) / length
         side = OffsetMove(self._beside(end, tangent), tangent, tangent)
-        if not self.started:
+        if self._placed:
+            self._placed = False
+        elif not self.started:
             if length <= self._radius:
                 raise CutterFault(
                     f"the first move of cutter radius compensation is {length:.6g} mm long; it must be longer than the tool's "
@@ -173,7 +188,9 @@ class Cutter:
             )
         side = OffsetMove(self._beside(end, last), first, last, turning, centre, size - nearer)
         sweep = arc.sweep
-        if not self.started:
+        if self._placed:
+            self._placed = False
+        elif not self.started:
             side, sweep = self._entry_arc(side, start, sweep)
         else:
             inner = self._corner(start, side, Kind.ARC, line)
@@ -291,7 +308,7 @@ class Cutter:
 
     def _stay(self, target: FloatArray, kind: Kind, line: int) -> None:
         """A move along the normal: the place in the plane stays the tool's."""
-        if not self.started:
+        if not (self.started or self._placed):
             raise CutterFault(
                 "the first move of cutter radius compensation does not move in its plane; write G41 or G42 after it"
             )

@@ -18,7 +18,10 @@ from typing import TYPE_CHECKING
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
+from planner.nc.language.making import Making
 from planner.nc.language.rows import AppendedRows, NotFinite
+from planner.nc.language.travel import Travel
+from planner.nc.language.travel_rows import TravelRow, words_of
 from planner.nc.language.tree import Language, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
@@ -77,12 +80,17 @@ class ProgramRun:
         self._messages = 0
         self._lathe: LatheCycles | None = None
         self._at_once = IDLE_AT_ONCE
+        self.travel = Travel(interpreter)
+        asked.travel = self.travel
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
         try:
             self.functions[main](self, {})
             self.flush()
+            left = self.travel.end()
+            if left:
+                self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
         except Ended:
             return None
         except ProgramFault as fault:
@@ -105,12 +113,19 @@ class ProgramRun:
     def flush(self) -> None:
         """Execute what is pending. Raises Ended if the program has ended with it."""
         if self.rows.pending:
-            words = self.rows.take()
-            self.executed += len(words.line)
-            self.tee(words)
-            self.interpreter.execute(words)
+            self._pass_on(self.rows.take())
         if self.interpreter.ended:
             raise Ended
+
+    def _pass_on(self, words: Words) -> None:
+        """Execute rows, in the frame and with the compensation in force."""
+        for rows in self.travel.through(words):
+            self._execute(rows)
+
+    def _execute(self, words: Words) -> None:
+        self.executed += len(words.line)
+        self.tee(words)
+        self.interpreter.execute(words)
 
     def tick(self, turns: int) -> int:
         """Count turns of a loop and look at the limits; returns 0."""
@@ -119,9 +134,9 @@ class ProgramRun:
             raise _Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
         if pending > self._at_once:
-            blocks = self.interpreter.store.blocks
+            blocks = self.interpreter.store.blocks + self.travel.moves
             self.flush()
-            moved = self.interpreter.store.blocks > blocks
+            moved = self.interpreter.store.blocks + self.travel.moves > blocks
             self.idle = 0 if moved else self.idle + pending
             self._at_once = min(2 * self._at_once, ROWS_AT_ONCE) if moved else IDLE_AT_ONCE
             if self.idle > IDLE_MAX:
@@ -244,6 +259,22 @@ class ProgramRun:
 
             self._lathe = LatheCycles(self)
         self._lathe.act(action, letters, place)
+
+    def made(self, maker: str, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
+        """Execute the rows that a maker makes of values; each row a list of letters and numbers."""
+        from planner.nc.language.makers import MAKERS  # for programs of Heidenhain and Siemens
+
+        self.flush()
+        making = Making(self.interpreter, self.travel, self.shared, place[1], place[2], self._frame)
+        made = MAKERS[maker](making, dict(given))
+        rows = [
+            TravelRow([(ord(letter), value, place[2]) for letter, value in row], place[1], self._frame)
+            for row in made
+        ]
+        if rows:
+            self._pass_on(words_of(rows, self.rows.data, tuple(self.rows.files)))
+        self.tick(1)
+        self.flush()
 
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.language.heidenhain import drilling
+from planner.nc.language.heidenhain import contour, drilling
 from planner.nc.language.heidenhain.flow import Flow
-from planner.nc.language.heidenhain.items import items, looked_up, word
+from planner.nc.language.heidenhain.items import looked_up, word
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, of, own, parameter, value
 from planner.nc.language.tree import (
@@ -102,8 +102,10 @@ class Definitions(Flow):
 
     def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
         at = block.place.at
-        if cycle in (7, 9, 32) and part == 0:
+        if cycle in (9, 32, *contour.TITLES) and part == 0:
             return []
+        if cycle in contour.TITLES:
+            return contour.transformed(block, cycle, column)
         if cycle == 32:
             found = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
             if found is None:
@@ -116,15 +118,6 @@ class Definitions(Flow):
             return [Line(block.place, (word("G", at, Number(4.0)), word("P", at, seconds)))]
         if cycle == 1:
             return self._pecking(block, part, column)
-        if cycle == 7:
-            given = items(block, column)
-            words = [word("G", at, Number(52.0))]
-            words += [word(axis, at, end) for axis, (end, relative) in given.axes.items() if not relative]
-            if len(words) == 1 or any(relative for _, relative in given.axes.values()):
-                raise block.fault(
-                    "a datum shift by X, Y or Z is read, not incremental and not from a table", column
-                )
-            return [Line(block.place, tuple(words)), looked_up(block)]
         raise block.fault(
             f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}", column
         )

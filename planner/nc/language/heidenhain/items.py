@@ -32,6 +32,7 @@ class Items:
     radius  : R of CR
     feed    : F with a number;  fast : FMAX;  automatic : F AUTO
     codes   : M codes, each with its column
+    side    : 1 for RL, -1 for RR, 0 for R0, None where none is given
     """
 
     axes: dict[str, tuple[Expression, bool]] = field(default_factory=dict)
@@ -42,6 +43,7 @@ class Items:
     fast: bool = False
     automatic: bool = False
     codes: list[tuple[int, int]] = field(default_factory=list)
+    side: int | None = None
 
 
 def items(block: ConversationalBlock, column: int) -> Items:
@@ -68,11 +70,7 @@ def items(block: ConversationalBlock, column: int) -> Items:
         elif item["turn"]:
             found.turn = 1 if item["turn"] == "+" else -1
         elif item["comp"]:
-            if item["comp"].upper() != "R0":
-                raise block.fault(
-                    "radius compensation of the conversational language is not read; program the centre of the tool and R0",
-                    at,
-                )
+            found.side = {"R0": 0, "RL": 1, "RR": -1}[item["comp"].upper()]
         elif item["radius"]:
             found.radius, column = value(block, column)
         elif item["fast"]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
 from planner.nc.language.heidenhain.definitions import Definitions
 from planner.nc.language.heidenhain.flow import procedure_name
 from planner.nc.language.heidenhain.items import (
@@ -47,7 +48,7 @@ from planner.nc.language.tree import (
 )
 
 _FUNCTION = re.compile(
-    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCLE? DEF|CYCL CALL|LBL|FN|STOP|PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
+    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
@@ -63,11 +64,13 @@ class HeidenhainParser(Definitions):
         self.source = source
         self.faults: list[ProgramFault] = []
         self.skip = False  # the block was read with the one before
+        self.compensates = False  # a block of the program has RL, RR, APPR or DEP
 
     def parse(self) -> list[Procedure]:
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
+        self.compensates = any(compensates(block.text) for block in self.blocks)
         start = SourcePlace(self.source.file, 1, self.source.begin)
         main = self._body(0, len(self.blocks))
         procedures = []
@@ -161,7 +164,7 @@ class HeidenhainParser(Definitions):
         block = self.blocks[k]
         given = items(block, column)
         before, after, machine = self._codes(block, given)
-        lines: list[Statement] = list(before)
+        lines: list[Statement] = [*before, *self._side(block, given)]
         if name == "LP":
             found, ends = self.moves.polar_ends(block, given)
             lines += found
@@ -213,11 +216,23 @@ class HeidenhainParser(Definitions):
         name = block.text[:column].upper()
         given = items(block, column)
         before, after, _ = self._codes(block, given)
+        before += self._side(block, given)
         if name == "CP":
             return [*before, *self.moves.polar_arc(block, given), *after]
         refuse_arc_axes(block, given)
         how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
         return [*before, *how(block, given, self._ends(block, given)), *after]
+
+    def _side(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+        return side_rows(block, given) if self.compensates else []
+
+    def _approach(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        rows, given = approach_rows(block, column, self.moves.automatic)
+        before, after, _ = self._codes(block, given)
+        return [*before, *rows, *after]
+
+    def _datum(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        return datum_rows(block, column)
 
     def _pole(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
@@ -289,6 +304,8 @@ _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Sta
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._nothing),
     **dict.fromkeys(("C", "CR", "CT", "CP"), HeidenhainParser._arc),
+    **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
+    "TRANS DATUM": HeidenhainParser._datum,
     "CC": HeidenhainParser._pole,
     **dict.fromkeys(("RND", "CHF"), HeidenhainParser._lonely_corner),
     "LBL": HeidenhainParser._label_here,

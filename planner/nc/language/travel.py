@@ -1,0 +1,372 @@
+"""Between the rows of a program and the interpreter: the programmed frame, and cutter radius compensation as Heidenhain and Siemens have it.
+
+A point p of the program is at
+
+    q = A p + t,      A (3, 3), t (3,),
+
+in the coordinates of the work system. Arcs stay arcs where A turns, mirrors and scales their plane evenly; where it mirrors the plane,
+their direction and the side of compensation change. Rows come out with absolute coordinates (G90), with centres as I J K, so that the
+expanded program needs neither frames nor compensation. Rows that only switch something pass.
+
+With no frame and no compensation in force rows pass as they are. All lengths here are in mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.nc.arcs import IN_PLANE, Arc, arc_from_centre, arc_from_radius
+from planner.nc.interpreter import Interpreter
+from planner.nc.language.approach import Approach, Departure
+from planner.nc.language.frame_parts import FrameParts
+from planner.nc.language.offset_moves import OffsetMoves
+from planner.nc.language.travel_rows import AXES, CENTRES, TURNS, G, M, Move, TravelRow, words_of
+from planner.nc.language.tree import ProgramFault, SourcePlace
+from planner.nc.lexer import Words
+
+_RADIUS = ord("R")
+_PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
+_ENDS = (2.0, 30.0)
+# G codes behind which the position is asked of the interpreter.
+_PLACING = frozenset((43.0, 43.1, 49.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3))
+# G codes that leave the position and the coordinates as they are.
+_NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0, 96.0, 97.0))
+_EVEN = 1e-9  # relative error of a frame that still counts as even
+
+
+class Travel:
+    """The frame and the compensation in force.
+
+    active : rows are looked at
+    place  : (3,) the programmed position [mm], while active
+    moves  : how many moves have been taken
+    """
+
+    def __init__(self, interpreter: Interpreter):
+        self.interpreter = interpreter
+        self.active = False
+        self.place = np.zeros(3)
+        self.moves = 0
+        self.matrix, self.shift = np.eye(3), np.zeros(3)
+        self.programmed = np.eye(3), np.zeros(3)  # of `frames`; a shift alone is a G52 and not in `matrix` and `shift`
+        self.parts = FrameParts()
+        self._mapped = np.zeros(3)  # `place` in the work system
+        self._beside = False  # the tool is not at `place`: compensation has just ended
+        self._offset: OffsetMoves | None = None
+        self._approach: Approach | None = None
+        self._absolute, self._motion, self._normal = True, 0, 2
+        self._ahead: list[TravelRow] = []  # rows that come before the next ones
+
+    # --- what commands ask and set ------------------------------------------------------------------------------------------
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the frame mirrors the plane."""
+        return self._plane_size() < 0.0
+
+    @property
+    def compensated(self) -> bool:
+        """Whether compensation is on, or waits for its approach."""
+        return self._offset is not None or self._approach is not None
+
+    def position(self) -> FloatArray:
+        """(3,) the programmed position [mm]."""
+        return self.place.copy() if self.active else self.interpreter.state.programmed()
+
+    def radius(self) -> float:
+        """Radius of the loaded tool [mm], 0 where the machine file gives none."""
+        tool = self.interpreter.state.tools.get(self.interpreter.state.tool_loaded)
+        return 0.0 if tool is None else tool.diameter / 2.0
+
+    def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
+        """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
+        if self.compensated:
+            raise ValueError(
+                "the frame changes while cutter radius compensation is on; switch it off before"
+            )
+        self._begin()
+        self.matrix, self.shift = matrix, shift
+        self.place = np.linalg.solve(matrix, self._mapped - shift)
+
+    def compensate(self, side: int) -> None:
+        """Switch compensation on, to the left (1) or right (-1) of the path, or off (0). Raises ValueError."""
+        if side == 0:
+            if self._approach is not None:
+                raise ValueError("compensation ends before the first move behind its approach")
+            if self._offset is not None:
+                self._leave()
+            return
+        side = -side if self.mirrored else side
+        if self._approach is not None:
+            return
+        if self._offset is not None:
+            if self._offset.side != side:
+                raise ValueError(
+                    "the side of compensation changes between two moves; switch it off before (R0, G40)"
+                )
+            return
+        radius = self.radius()
+        if radius == 0.0:
+            number = self.interpreter.state.tool_loaded
+            self.interpreter.note(
+                f"tool {number} has no diameter in the machine file: radius compensation does not move the path",
+                0,
+            )
+            return
+        self._begin()
+        self._offset = OffsetMoves(self._mapped, radius, side, self._normal)
+
+    def approach(self, approach: Approach) -> None:
+        """APPR: the contour begins at a point; the way to it is known with its first move. Raises ValueError."""
+        if self.compensated:
+            raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
+        self._begin()
+        approach.begin(self._mapped, self._map(approach.first), self._motion, self.radius(), self.mirrored)
+        approach.scale = self.scale()
+        self._approach = approach
+        self.place, self._mapped = approach.first.copy(), self._map(approach.first)
+
+    def depart(self, departure: Departure) -> None:
+        """DEP: leave the contour; compensation is off behind it. Raises ValueError."""
+        if self._offset is None or not self._offset.started:
+            raise ValueError("DEP without a contour with radius compensation (RL, RR) before it")
+        offset, self._offset = self._offset, None
+        rows = offset.finish()
+        departure.scale = self.scale()
+        end = None if departure.end is None else self._map(departure.end)
+        out, there = departure.rows(offset, end)
+        self._ahead += [self._in_units(row) for row in (*rows, *out)]
+        self._mapped, self._beside = there, False
+        self.place = np.linalg.solve(self.matrix, there - self.shift)
+        self._motion = 1
+
+    def scale(self) -> float:
+        """By what the frame multiplies lengths in the plane. Raises ValueError where it does so unevenly."""
+        self._check_even()
+        return math.sqrt(abs(self._plane_size()))
+
+    # --- rows -----------------------------------------------------------------------------------------------------------------
+
+    def through(self, words: Words) -> Iterator[Words]:
+        """The rows to execute instead, in pieces; each is executed before the next is asked for. Raises ProgramFault."""
+        self._data, self._files = words.data, words.files
+        if not self.active:
+            yield words
+            return
+        out = self._taken()
+        if self._idle():
+            out += self._restored(words)
+            if out:
+                yield words_of(out, words.data, words.files)
+            self.active = False
+            yield words
+            return
+        for row in range(len(words.line)):
+            span = slice(int(words.first[row]), int(words.first[row + 1]))
+            one = TravelRow(
+                list(zip(words.letter[span].tolist(), words.value[span].tolist(), words.at[span].tolist(), strict=True)),
+                int(words.line[row]),
+                int(words.frame[row]),
+            )  # fmt: skip
+            try:
+                foreign = self._take(one, out)
+            except ProgramFault:
+                raise
+            except ValueError as fault:
+                raise self._fault(one, str(fault)) from fault
+            if foreign:
+                yield words_of(out, words.data, words.files)
+                out = []
+                self._look()
+        if out:
+            yield words_of(out, words.data, words.files)
+
+    def end(self) -> list[TravelRow]:
+        """What is left to execute when the program has ended without M2 or M30. Raises ValueError."""
+        if self._offset is not None:
+            self._leave()
+        return self._taken()
+
+    def _taken(self) -> list[TravelRow]:
+        out, self._ahead = self._ahead, []
+        return out
+
+    def _fault(self, row: TravelRow, message: str) -> ProgramFault:
+        at = row.words[0][2] if row.words else 0
+        return ProgramFault(SourcePlace(sum(begin <= at for begin, _ in self._files), row.line, at), message)
+
+    def _take(self, row: TravelRow, out: list[TravelRow]) -> bool:
+        """Take a row; True if the position is to be asked of the interpreter behind it."""
+        codes = {value for letter, value, _ in row.words if letter == G}
+        own = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
+        for code in codes & {90.0, 91.0}:
+            self._absolute = code == 90.0
+        for code in codes & {0.0, 1.0, 2.0, 3.0}:
+            self._motion = int(code)
+        for code in own & _PLANES.keys():
+            if self.compensated and _PLANES[code] != self._normal:
+                raise ValueError("the plane changes while cutter radius compensation is on")
+            self._normal = _PLANES[code]
+        if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
+            raise ValueError("the unit changes while a frame or compensation is in force")
+        moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
+        kept = [
+            word
+            for word in row.words
+            if not (word[0] == G and word[1] in (90.0, 91.0))
+        ]  # fmt: skip
+        foreign = own - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
+        ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
+        changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
+        if (foreign or changes) and self.compensated:
+            what = "a tool change" if changes else f"G{min(foreign):g}"
+            raise ValueError(f"{what} while cutter radius compensation is on; switch it off before (R0, G40)")
+        if foreign - _PLACING:
+            raise ValueError(f"G{min(foreign - _PLACING):g} while a frame is in force is not read")
+        if foreign:
+            out.append(TravelRow(kept, row.line, row.frame))
+            return True
+        if moved and 4.0 not in own:
+            self._move(TravelRow(kept, row.line, row.frame), out)
+        elif kept:
+            self._pass(TravelRow(kept, row.line, row.frame), out, last=ends)
+            return changes
+        return False
+
+    def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
+        """A row without a move."""
+        if self._offset is None:
+            out.append(row)
+            return
+        if last:
+            self._leave()
+            out += self._taken()
+            out.append(row)
+            return
+        out += [self._in_units(one) for one in self._offset.pass_row(row)]
+
+    def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
+        given = {letter: value * self._unit for letter, value, _ in row.words if letter != G}
+        target = self.place.copy()
+        for axis, letter in enumerate(AXES):
+            if letter in given:
+                target[axis] = given[letter] + (0.0 if self._absolute else self.place[axis])
+        arc = self._arc(given, target) if self._motion in (2, 3) else None
+        mapped = self._map(target)
+        turned = None
+        if arc is not None:
+            self._check_even()
+            turned = Arc(self._map(arc.centre), -arc.sweep if self.mirrored else arc.sweep)
+        axes = [a for a in range(3) if any(AXES[b] in given and self.matrix[a, b] != 0.0 for b in range(3))]
+        if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self._normal])):
+            axes = sorted({*axes, *IN_PLANE[self._normal]})
+        if set(axes) & set(IN_PLANE[self._normal]):
+            self._beside = False
+        rest = [
+            word
+            for word in row.words
+            if not (word[0] == G and word[1] <= 3.0)
+            and word[0] not in (*AXES, *CENTRES, _RADIUS)
+            and not (arc is not None and word[0] == TURNS)
+        ]
+        at = row.words[0][2]
+        move = Move(TravelRow(rest, row.line, row.frame), at, self._motion, self._mapped, mapped, axes, turned)
+        self.place, self._mapped = target, mapped
+        self.moves += 1
+        if self._approach is not None:
+            made, self._offset = self._approach.rows(move)
+            out += [self._in_units(one) for one in made]
+            self._approach = None
+        if self._offset is not None:
+            out += [self._in_units(one) for one in self._offset.move(move)]
+        else:
+            out += [self._in_units(one) for one in move.rows(self._normal)]
+
+    def _arc(self, given: dict[int, float], target: FloatArray) -> Arc:
+        turns = round(given.get(TURNS, self._unit) / self._unit)
+        clockwise = self._motion == 2
+        if _RADIUS in given:
+            return arc_from_radius(
+                self.place, target, given[_RADIUS], normal=self._normal, clockwise=clockwise, turns=turns, unit=self._unit
+            )  # fmt: skip
+        centre = self.place + np.array([given.get(letter, 0.0) for letter in CENTRES])
+        return arc_from_centre(
+            self.place, target, centre, normal=self._normal, clockwise=clockwise, turns=turns, unit=self._unit
+        )
+
+    # --- inside -------------------------------------------------------------------------------------------------------------
+
+    @property
+    def _unit(self) -> float:
+        return self.interpreter.state.unit
+
+    def _map(self, point: FloatArray) -> FloatArray:
+        return self.matrix @ point + self.shift
+
+    def _plane_size(self) -> float:
+        plane = list(IN_PLANE[self._normal])
+        return float(np.linalg.det(self.matrix[np.ix_(plane, plane)]))
+
+    def _check_even(self) -> None:
+        """Arcs stay arcs. Raises ValueError."""
+        plane = list(IN_PLANE[self._normal])
+        inner = self.matrix[np.ix_(plane, plane)]
+        even = inner.T @ inner
+        size = abs(self._plane_size())
+        off = max(abs(even - size * np.eye(2)).max(), abs(self.matrix[self._normal, plane]).max())
+        if max(off, abs(self.matrix[plane, self._normal]).max()) > _EVEN * max(size, 1.0):
+            raise ValueError("an arc whose plane the frame scales unevenly, or turns out of itself, is no arc")
+
+    def _begin(self) -> None:
+        """Look at rows from now on."""
+        if self.active:
+            return
+        state = self.interpreter.state
+        self.active, self._absolute, self._normal = True, state.absolute, state.normal
+        self._motion = max(state.motion, 0) if state.motion <= 3 else 0
+        if state.absolute_centre:
+            raise ValueError("frames and compensation with absolute arc centres are not read")
+        self._look()
+        if not state.absolute:
+            self._ahead.append(TravelRow([(G, 90.0, 0)], 1, 0))
+
+    def _look(self) -> None:
+        """Ask the interpreter for the position."""
+        self._mapped = self.interpreter.state.programmed().copy()
+        self.place = np.linalg.solve(self.matrix, self._mapped - self.shift)
+        self._beside = False
+
+    def _leave(self) -> None:
+        """Compensation ends: its moves come, and the next move in the plane leads to its programmed end."""
+        offset, self._offset = self._offset, None
+        assert offset is not None
+        self._ahead += [self._in_units(row) for row in offset.finish()]
+        self._beside = offset.started
+
+    def _idle(self) -> bool:
+        return not (
+            self.compensated or self._beside or self.shift.any() or (self.matrix != np.eye(3)).any()
+        )
+
+    def _restored(self, words: Words) -> list[TravelRow]:
+        """Rows that bring back G91 and the motion code, where rows behind them count on them."""
+        if not len(words.line):
+            return []
+        at, line, frame = int(words.at[0]), int(words.line[0]), int(words.frame[0])
+        codes = ([] if self._absolute else [91.0]) + (
+            [float(self._motion)] if self._motion != self.interpreter.state.motion else []
+        )
+        return [TravelRow([(G, code, at)], line, frame) for code in codes]
+
+    def _in_units(self, row: TravelRow) -> TravelRow:
+        """A row of lengths in mm in the program's unit."""
+        if self._unit == 1.0:
+            return row
+        lengths = {*AXES, *CENTRES}
+        return TravelRow(
+            [(c, v / self._unit if c in lengths else v, at) for c, v, at in row.words], row.line, row.frame
+        )

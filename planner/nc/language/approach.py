@@ -9,7 +9,8 @@ tool's centre begins the contour at C = A + r n (r: radius of the tool). It come
     LCT   on an arc of radius R      H: where a line from where the tool is touches that circle
 
 Departure is the same, backwards, from the last contour point with the tangent of the last move. All of it in the plane; the coordinate
-along the tool axis changes at H (approach) or at the end (departure), as manuals up to TNC 640 have it; later ones move all axes at once.
+along the tool axis changes at H (approach) or at the end (departure): so manuals up to TNC 640 have it, later ones move all axes at
+once.
 
 R is that of the tool's centre: the manuals' examples approach with R5 and a tool of radius 10.
 """
@@ -72,7 +73,9 @@ class Way:
         words = [(_F, self.feed, self.at)] if feed and self.feed is not None else []
         return TravelRow(words, self.line, self.frame)
 
-    def turned(self, contour: complex, tangent: complex, normal: complex, other: complex) -> tuple[complex, complex, int]:
+    def turned(
+        self, contour: complex, tangent: complex, normal: complex, other: complex
+    ) -> tuple[complex, complex, int]:
         """The far end of the arc at a contour point, its centre, and its direction (1 counter-clockwise).
 
         tangent : at the contour point, along the path

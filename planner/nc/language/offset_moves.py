@@ -83,9 +83,7 @@ class OffsetMoves:
             if move.stands(self.normal):
                 return move.rows(self.normal)
             if move.arc is not None:
-                raise CutterFault(
-                    "radius compensation begins with a straight move; write one before the arc"
-                )
+                raise CutterFault("radius compensation begins with a straight move; write one before the arc")
             self._first = move
             return []
         if move.stands(self.normal):
@@ -146,7 +144,10 @@ class OffsetMoves:
             before, stops = split_words(move.rest)
             for block in range(first, last):
                 end = self._store.block.end[block].copy()
-                axes = [*IN_PLANE[self.normal], *([self.normal] if end[self.normal] != place[self.normal] else [])]
+                axes = [
+                    *IN_PLANE[self.normal],
+                    *([self.normal] if end[self.normal] != place[self.normal] else []),
+                ]
                 words = [(AXES[a], float(end[a]), move.at) for a in sorted(axes)]
                 code = 0 if self._store.block.kind[block] == Kind.RAPID else 1
                 if block in arcs and abs(arcs[block][1]) > 2.0 * FULL_TURN:

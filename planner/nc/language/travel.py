@@ -1,4 +1,4 @@
-"""Between the rows of a program and the interpreter: the programmed frame, and cutter radius compensation as Heidenhain and Siemens have it.
+"""Between the rows of a program and the interpreter: the programmed frame, and radius compensation as Heidenhain and Siemens have it.
 
 A point p of the program is at
 
@@ -22,6 +22,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, Arc, arc_from_centre, arc_from_radius
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.approach import Approach, Departure
+from planner.nc.language.corner_moves import CornerMove
 from planner.nc.language.frame_parts import FrameParts
 from planner.nc.language.offset_moves import OffsetMoves
 from planner.nc.language.travel_rows import AXES, CENTRES, TURNS, G, M, Move, TravelRow, words_of
@@ -44,6 +45,7 @@ class Travel:
     active : rows are looked at
     place  : (3,) the programmed position [mm], while active
     moves  : how many moves have been taken
+    absolute : G90 is in force, while active
     """
 
     def __init__(self, interpreter: Interpreter):
@@ -52,13 +54,19 @@ class Travel:
         self.place = np.zeros(3)
         self.moves = 0
         self.matrix, self.shift = np.eye(3), np.zeros(3)
-        self.programmed = np.eye(3), np.zeros(3)  # of `frames`; a shift alone is a G52 and not in `matrix` and `shift`
+        self.programmed = (
+            np.eye(3),
+            np.zeros(3),
+        )  # of `frames`; a shift alone is a G52 and not in `matrix` and `shift`
         self.parts = FrameParts()
         self._mapped = np.zeros(3)  # `place` in the work system
         self._beside = False  # the tool is not at `place`: compensation has just ended
         self._offset: OffsetMoves | None = None
         self._approach: Approach | None = None
-        self._absolute, self._motion, self._normal = True, 0, 2
+        self._coming: CornerMove | None = None  # of the next move
+        self._corner: CornerMove | None = None  # of the last move, which waits for the next one
+        self._between: list[TravelRow] = []  # rows without a move behind it
+        self.absolute, self._motion, self._normal = True, 0, 2
         self._ahead: list[TravelRow] = []  # rows that come before the next ones
 
     # --- what commands ask and set ------------------------------------------------------------------------------------------
@@ -84,16 +92,16 @@ class Travel:
 
     def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
         """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
+        self._no_corner()
         if self.compensated:
-            raise ValueError(
-                "the frame changes while cutter radius compensation is on; switch it off before"
-            )
+            raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
         self._begin()
         self.matrix, self.shift = matrix, shift
         self.place = np.linalg.solve(matrix, self._mapped - shift)
 
     def compensate(self, side: int) -> None:
         """Switch compensation on, to the left (1) or right (-1) of the path, or off (0). Raises ValueError."""
+        self._no_corner()
         if side == 0:
             if self._approach is not None:
                 raise ValueError("compensation ends before the first move behind its approach")
@@ -122,6 +130,7 @@ class Travel:
 
     def approach(self, approach: Approach) -> None:
         """APPR: the contour begins at a point; the way to it is known with its first move. Raises ValueError."""
+        self._no_corner()
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
         self._begin()
@@ -130,8 +139,16 @@ class Travel:
         self._approach = approach
         self.place, self._mapped = approach.first.copy(), self._map(approach.first)
 
+    def corner(self, kind: str, size: float) -> None:
+        """A rounding or chamfer at the end of the next move, of a size in mm. Raises ValueError."""
+        if self._coming is not None:
+            raise ValueError("a second rounding or chamfer before the next move")
+        self._begin()
+        self._coming = CornerMove(kind, size * self.scale())
+
     def depart(self, departure: Departure) -> None:
         """DEP: leave the contour; compensation is off behind it. Raises ValueError."""
+        self._no_corner()
         if self._offset is None or not self._offset.started:
             raise ValueError("DEP without a contour with radius compensation (RL, RR) before it")
         offset, self._offset = self._offset, None
@@ -187,6 +204,7 @@ class Travel:
 
     def end(self) -> list[TravelRow]:
         """What is left to execute when the program has ended without M2 or M30. Raises ValueError."""
+        self._no_corner()
         if self._offset is not None:
             self._leave()
         return self._taken()
@@ -204,7 +222,7 @@ class Travel:
         codes = {value for letter, value, _ in row.words if letter == G}
         own = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
         for code in codes & {90.0, 91.0}:
-            self._absolute = code == 90.0
+            self.absolute = code == 90.0
         for code in codes & {0.0, 1.0, 2.0, 3.0}:
             self._motion = int(code)
         for code in own & _PLANES.keys():
@@ -222,6 +240,8 @@ class Travel:
         foreign = own - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
         ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
         changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
+        if foreign or changes:
+            self._no_corner()
         if (foreign or changes) and self.compensated:
             what = "a tool change" if changes else f"G{min(foreign):g}"
             raise ValueError(f"{what} while cutter radius compensation is on; switch it off before (R0, G40)")
@@ -239,6 +259,11 @@ class Travel:
 
     def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
         """A row without a move."""
+        if self._corner is not None:
+            if last:
+                self._no_corner()
+            self._between.append(row)
+            return
         if self._offset is None:
             out.append(row)
             return
@@ -254,7 +279,7 @@ class Travel:
         target = self.place.copy()
         for axis, letter in enumerate(AXES):
             if letter in given:
-                target[axis] = given[letter] + (0.0 if self._absolute else self.place[axis])
+                target[axis] = given[letter] + (0.0 if self.absolute else self.place[axis])
         arc = self._arc(given, target) if self._motion in (2, 3) else None
         mapped = self._map(target)
         turned = None
@@ -274,17 +299,33 @@ class Travel:
             and not (arc is not None and word[0] == TURNS)
         ]
         at = row.words[0][2]
-        move = Move(TravelRow(rest, row.line, row.frame), at, self._motion, self._mapped, mapped, axes, turned)
+        move = Move(
+            TravelRow(rest, row.line, row.frame), at, self._motion, self._mapped, mapped, axes, turned
+        )
         self.place, self._mapped = target, mapped
         self.moves += 1
-        if self._approach is not None:
-            made, self._offset = self._approach.rows(move)
-            out += [self._in_units(one) for one in made]
-            self._approach = None
-        if self._offset is not None:
-            out += [self._in_units(one) for one in self._offset.move(move)]
+        if self._corner is not None:
+            (one, *between), move = self._corner.joined(move, self._normal)
+            self._corner, waiting, self._between = None, self._between, []
+            self._go(one, out)
+            for row in waiting:
+                self._pass(row, out, last=False)
+            for one in between:
+                self._go(one, out)
+        if self._coming is not None:
+            self._coming.first = move
+            self._corner, self._coming = self._coming, None
         else:
-            out += [self._in_units(one) for one in move.rows(self._normal)]
+            self._go(move, out)
+
+    def _go(self, move: Move, out: list[TravelRow]) -> None:
+        """A move whose ends are known, on to the compensation."""
+        rows: list[TravelRow] = []
+        if self._approach is not None:
+            rows, self._offset = self._approach.rows(move)
+            self._approach = None
+        rows += move.rows(self._normal) if self._offset is None else self._offset.move(move)
+        out += [self._in_units(one) for one in rows]
 
     def _arc(self, given: dict[int, float], target: FloatArray) -> Arc:
         turns = round(given.get(TURNS, self._unit) / self._unit)
@@ -299,6 +340,10 @@ class Travel:
         )
 
     # --- inside -------------------------------------------------------------------------------------------------------------
+
+    def _no_corner(self) -> None:
+        if self._corner is not None or self._coming is not None:
+            raise ValueError("a rounding or chamfer needs a move behind it")
 
     @property
     def _unit(self) -> float:
@@ -319,14 +364,16 @@ class Travel:
         size = abs(self._plane_size())
         off = max(abs(even - size * np.eye(2)).max(), abs(self.matrix[self._normal, plane]).max())
         if max(off, abs(self.matrix[plane, self._normal]).max()) > _EVEN * max(size, 1.0):
-            raise ValueError("an arc whose plane the frame scales unevenly, or turns out of itself, is no arc")
+            raise ValueError(
+                "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
+            )
 
     def _begin(self) -> None:
         """Look at rows from now on."""
         if self.active:
             return
         state = self.interpreter.state
-        self.active, self._absolute, self._normal = True, state.absolute, state.normal
+        self.active, self.absolute, self._normal = True, state.absolute, state.normal
         self._motion = max(state.motion, 0) if state.motion <= 3 else 0
         if state.absolute_centre:
             raise ValueError("frames and compensation with absolute arc centres are not read")
@@ -349,7 +396,12 @@ class Travel:
 
     def _idle(self) -> bool:
         return not (
-            self.compensated or self._beside or self.shift.any() or (self.matrix != np.eye(3)).any()
+            self.compensated
+            or self._beside
+            or self._coming
+            or self._corner
+            or self.shift.any()
+            or (self.matrix != np.eye(3)).any()
         )
 
     def _restored(self, words: Words) -> list[TravelRow]:
@@ -357,7 +409,7 @@ class Travel:
         if not len(words.line):
             return []
         at, line, frame = int(words.at[0]), int(words.line[0]), int(words.frame[0])
-        codes = ([] if self._absolute else [91.0]) + (
+        codes = ([] if self.absolute else [91.0]) + (
             [float(self._motion)] if self._motion != self.interpreter.state.motion else []
         )
         return [TravelRow([(G, code, at)], line, frame) for code in codes]

@@ -1,9 +1,9 @@
 """Radius compensation, approach to and departure from a contour, and the frame: what `planner.nc.language.travel` does.
 
-    RL RR R0                                    compensation, in any move
-    APPR LT LN CT LCT  X Y Z LEN R CCA RL F     approach, also without compensation (R0)
-    DEP LT LN CT LCT  X Y Z LEN R CCA F         departure
-    CYCL DEF 7 datum shift, 8 mirror image, 10 rotation, 11 scale, 26 scale of single axes; TRANS DATUM AXIS, TRANS DATUM RESET
+RL RR R0                                    compensation, in any move
+APPR LT LN CT LCT  X Y Z LEN R CCA RL F     approach, also without compensation (R0)
+DEP LT LN CT LCT  X Y Z LEN R CCA F         departure
+CYCL DEF 7 datum shift, 8 mirror image, 10 rotation, 11 scale, 26 scale of single axes; TRANS DATUM AXIS, TRANS DATUM RESET
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ def side_rows(block: ConversationalBlock, given: Items) -> list[Statement]:
     return [Made(block.place, "compensate", (("side", Number(float(given.side))),))]
 
 
-def approach_rows(block: ConversationalBlock, column: int, feed: Expression | None) -> tuple[list[Statement], Items]:
+def approach_rows(
+    block: ConversationalBlock, column: int, feed: Expression | None
+) -> tuple[list[Statement], Items]:
     """APPR or DEP, with its M codes among the items. Raises ProgramFault.
 
     feed : what F AUTO means
@@ -50,9 +52,7 @@ def approach_rows(block: ConversationalBlock, column: int, feed: Expression | No
             f"{kind.group().strip()}, with polar coordinates, is not read; write {kind.group(2)} with X and Y",
             column,
         )
-    given: list[tuple[str, Expression]] = [
-        ("kind", Number(float(KINDS.index(kind.group(2).upper()))))
-    ]
+    given: list[tuple[str, Expression]] = [("kind", Number(float(KINDS.index(kind.group(2).upper()))))]
     text = block.text
     for extra in _EXTRA.finditer(block.text, kind.end()):
         number, end = value(block, extra.end())
@@ -78,7 +78,9 @@ def approach_rows(block: ConversationalBlock, column: int, feed: Expression | No
     return rows, found
 
 
-def frame_rows(block: ConversationalBlock, given: list[tuple[str, Expression]], cycle: int) -> list[Statement]:
+def frame_rows(
+    block: ConversationalBlock, given: list[tuple[str, Expression]], cycle: int
+) -> list[Statement]:
     """A part of the frame; the position is asked for behind it, since it has other coordinates then."""  # fmt: skip
     values = (("cycle", Number(float(cycle))), *given)
     return [Made(block.place, "heidenhain frame", values), Made(block.place, "frame in force"), looked_up(block)]  # fmt: skip

@@ -7,11 +7,14 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.arcs import IN_PLANE
 from planner.nc.language import frames
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
+from planner.nc.language.heidenhain import cycles as heidenhain_cycles
 from planner.nc.language.making import Maker, Making, Row
+from planner.nc.language.siemens import cycles as siemens_cycles
 from planner.nc.language.travel_rows import at_place, in_plane
 from planner.nc.program import Kind
 
@@ -154,6 +157,29 @@ def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     return []
 
 
+def keep(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """Before a cycle: keep G90 or G91, the motion code and the feed, and switch to G90."""
+    state, travel, shared = making.interpreter.state, making.travel, making.shared
+    absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
+    shared[_KEPT[0]], shared[_KEPT[1]] = float(absolute), float(motion)
+    shared[_KEPT[2]] = (
+        state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
+    )
+    return [] if absolute else [[("G", 90.0)]]
+
+
+def bring_back(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """Behind a cycle: what `keep` kept; the feed where `feed` is 1."""
+    absolute, motion, feed = (making.shared[name] for name in _KEPT)
+    if not absolute:
+        yield [("G", 91.0)]
+    if 0.0 <= motion <= 3.0 and motion != making.interpreter.state.motion:
+        yield [("G", motion)]
+    if given["feed"] and feed > 0.0:
+        yield [("F", feed)]
+
+
+_KEPT = ("_kept absolute", "_kept motion", "_kept feed")
 _FLAT = 1e-9  # relative, below which three points are on a line
 
 MAKERS: dict[str, Maker] = {
@@ -162,6 +188,10 @@ MAKERS: dict[str, Maker] = {
     "depart": depart,
     "siemens frame": frames.siemens,
     "heidenhain frame": frames.heidenhain,
+    "keep": keep,
+    "bring back": bring_back,
+    **siemens_cycles.MAKERS,
+    **heidenhain_cycles.MAKERS,
     "corner": corner,
     "tangent arc": tangent_arc,
     "arc through": arc_through,

@@ -45,7 +45,7 @@ class Travel:
     active : rows are looked at
     place  : (3,) the programmed position [mm], while active
     moves  : how many moves have been taken
-    absolute : G90 is in force, while active
+    absolute, motion : G90 is in force, and the motion code, while active
     """
 
     def __init__(self, interpreter: Interpreter):
@@ -66,7 +66,7 @@ class Travel:
         self._coming: CornerMove | None = None  # of the next move
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
         self._between: list[TravelRow] = []  # rows without a move behind it
-        self.absolute, self._motion, self._normal = True, 0, 2
+        self.absolute, self.motion, self._normal = True, 0, 2
         self._ahead: list[TravelRow] = []  # rows that come before the next ones
 
     # --- what commands ask and set ------------------------------------------------------------------------------------------
@@ -134,7 +134,7 @@ class Travel:
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
         self._begin()
-        approach.begin(self._mapped, self._map(approach.first), self._motion, self.radius(), self.mirrored)
+        approach.begin(self._mapped, self._map(approach.first), self.motion, self.radius(), self.mirrored)
         approach.scale = self.scale()
         self._approach = approach
         self.place, self._mapped = approach.first.copy(), self._map(approach.first)
@@ -159,7 +159,7 @@ class Travel:
         self._ahead += [self._in_units(row) for row in (*rows, *out)]
         self._mapped, self._beside = there, False
         self.place = np.linalg.solve(self.matrix, there - self.shift)
-        self._motion = 1
+        self.motion = 1
 
     def scale(self) -> float:
         """By what the frame multiplies lengths in the plane. Raises ValueError where it does so unevenly."""
@@ -224,7 +224,7 @@ class Travel:
         for code in codes & {90.0, 91.0}:
             self.absolute = code == 90.0
         for code in codes & {0.0, 1.0, 2.0, 3.0}:
-            self._motion = int(code)
+            self.motion = int(code)
         for code in own & _PLANES.keys():
             if self.compensated and _PLANES[code] != self._normal:
                 raise ValueError("the plane changes while cutter radius compensation is on")
@@ -280,7 +280,7 @@ class Travel:
         for axis, letter in enumerate(AXES):
             if letter in given:
                 target[axis] = given[letter] + (0.0 if self.absolute else self.place[axis])
-        arc = self._arc(given, target) if self._motion in (2, 3) else None
+        arc = self._arc(given, target) if self.motion in (2, 3) else None
         mapped = self._map(target)
         turned = None
         if arc is not None:
@@ -299,9 +299,7 @@ class Travel:
             and not (arc is not None and word[0] == TURNS)
         ]
         at = row.words[0][2]
-        move = Move(
-            TravelRow(rest, row.line, row.frame), at, self._motion, self._mapped, mapped, axes, turned
-        )
+        move = Move(TravelRow(rest, row.line, row.frame), at, self.motion, self._mapped, mapped, axes, turned)
         self.place, self._mapped = target, mapped
         self.moves += 1
         if self._corner is not None:
@@ -329,7 +327,7 @@ class Travel:
 
     def _arc(self, given: dict[int, float], target: FloatArray) -> Arc:
         turns = round(given.get(TURNS, self._unit) / self._unit)
-        clockwise = self._motion == 2
+        clockwise = self.motion == 2
         if _RADIUS in given:
             return arc_from_radius(
                 self.place, target, given[_RADIUS], normal=self._normal, clockwise=clockwise, turns=turns, unit=self._unit
@@ -374,7 +372,7 @@ class Travel:
             return
         state = self.interpreter.state
         self.active, self.absolute, self._normal = True, state.absolute, state.normal
-        self._motion = max(state.motion, 0) if state.motion <= 3 else 0
+        self.motion = max(state.motion, 0) if state.motion <= 3 else 0
         if state.absolute_centre:
             raise ValueError("frames and compensation with absolute arc centres are not read")
         self._look()
@@ -410,7 +408,7 @@ class Travel:
             return []
         at, line, frame = int(words.at[0]), int(words.line[0]), int(words.frame[0])
         codes = ([] if self.absolute else [91.0]) + (
-            [float(self._motion)] if self._motion != self.interpreter.state.motion else []
+            [float(self.motion)] if self.motion != self.interpreter.state.motion else []
         )
         return [TravelRow([(G, code, at)], line, frame) for code in codes]
 

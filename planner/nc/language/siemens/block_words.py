@@ -12,7 +12,7 @@ import re
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.siemens import codes, drilling
+from planner.nc.language.siemens import codes, cycles, drilling
 from planner.nc.language.siemens.calls import Calls
 from planner.nc.language.siemens.commands import as_word
 from planner.nc.language.siemens.text import TokenReader, operation, position
@@ -67,7 +67,7 @@ class BlockWords(Calls):
                 through[f"{axis}1"] = self._absolute(axis, value)
             elif name == "SUPA":
                 words.append(as_word("G", at, Number(53.0)))
-            elif name in drilling.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
+            elif name in drilling.ARGUMENTS or name in cycles.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
                 self._cycle(reader, name)
             elif name == "KONT" and self.compensates:
                 raise reader.fault("KONT, another approach to the contour, is not read; write NORM", token.at)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from planner.nc.language.frames import ADDED, SIEMENS
-from planner.nc.language.siemens import codes, drilling, patterns
+from planner.nc.language.siemens import codes, cycles, drilling, patterns
 from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
 from planner.nc.language.tree import ZERO, Expression, Line, Made, Message, Number, Statement, Word
@@ -46,10 +46,30 @@ class Commands(SiemensControl):
             self.body += self._drilled(reader, name, given)
 
     def _drilled(self, reader: TokenReader, name: str, given: list[Expression | None]) -> list[Statement]:
+        """A cycle, and what it keeps as it was. Raises ProgramFault."""
+        place = reader.place
+        known = (cycles.ARGUMENTS | drilling.ARGUMENTS)[name]
+        for k, more in enumerate(given[len(known) :]):
+            if more not in (None, ZERO, Number(-0.0)):
+                raise reader.fault(
+                    f"argument {len(known) + k + 1} of {name}, of later controls, is not read; leave it out",
+                    0,
+                )
         try:
-            return drilling.drilled_rows(reader.place, name, given, self.unit)
+            rows = (
+                [
+                    Made(
+                        place,
+                        name,
+                        tuple((k, v) for k, v in zip(known, given, strict=False) if v is not None),
+                    )
+                ]
+                if name in cycles.ARGUMENTS
+                else drilling.drilled_rows(place, name, given, self.unit)
+            )
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
+        return [Made(place, "keep"), *rows, Made(place, "bring back", (("feed", ZERO),))]
 
     def _arguments(self, reader: TokenReader) -> list[Expression | None]:
         """What stands in the brackets behind a cycle; None for what is left out or a text."""
@@ -85,8 +105,9 @@ class Commands(SiemensControl):
             return
         name = reader.peek()
         reader.next += 1
-        if name not in drilling.ARGUMENTS:
-            raise reader.fault(f"MCALL {name} is not read; read are {', '.join(drilling.ARGUMENTS)}", 0)
+        known = [one for one in drilling.ARGUMENTS | cycles.ARGUMENTS if one not in cycles.POCKETS]
+        if name not in known:
+            raise reader.fault(f"MCALL {name} is not read; read are {', '.join(known)}", 0)
         self.cycle = self._drilled(reader, name, self._arguments(reader))
 
     def _frame(self, reader: TokenReader) -> None:

@@ -203,7 +203,7 @@ _READING: dict[str, tuple[Any, Any]] = {
 }
 
 
-def _taking(
+def taking(
     command: Callable[..., None],
     argument: str,
     options: dict[str, tuple[Any, Any]],
@@ -244,7 +244,7 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
         return Reading(**given | {"ignore": ignore_list(given["ignore"])})
 
     usual = {name: "" if name == "ignore" else getattr(Reading(), name) for name in _READING}
-    return _taking(command, "reading", _READING, usual, gathered)
+    return taking(command, "reading", _READING, usual, gathered)
 
 
 # How a job is planned, as options: of commands that plan it many times.
@@ -261,7 +261,7 @@ _PLANNING: dict[str, tuple[Any, Any]] = {
 def takes_planning(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the options of planning; it gets those that are given as one argument, `how`, as `planner.plan` takes them."""
     usual = dict.fromkeys(_PLANNING, None) | {"method": names.OPTIMAL}
-    return _taking(
+    return taking(
         command,
         "how",
         _PLANNING,

@@ -5,32 +5,24 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from planner.base.errors import InputError
 from planner.commands.options import (
-    Job,
     JsonOption,
-    MachineOption,
     QuietOption,
     ThreadsOption,
-    ToleranceOption,
-    takes_planning,
-    takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, show
-from planner.commands.what_if import studied_job
-from planner.nc.reading import Reading
+from planner.commands.studied import StudiedJob, end_with, takes_studied_job, title_of
+from planner.commands.terminal import guarded, say, show
 
 
 @guarded
-@takes_reading
-@takes_planning
+@takes_studied_job
 def sweep_command(
-    job: Job,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="where points, table and picture are kept")
     ],
@@ -51,8 +43,6 @@ def sweep_command(
             help="plan on a Dask cluster: its scheduler, such as tcp://host:8786",
         ),
     ] = None,
-    machine: MachineOption = None,
-    tolerance: ToleranceOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="begin anew in a directory that holds something else")
     ] = False,
@@ -60,8 +50,7 @@ def sweep_command(
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
     *,
-    how: dict[str, Any],
-    reading: Reading,
+    studied: StudiedJob,
 ) -> None:
     """Plan a program with every combination of values; what is done is kept, and the same command goes on with it.
 
@@ -69,7 +58,6 @@ def sweep_command(
     """
     if cluster is not None and threads is not None:
         raise InputError("--threads is for processes of this machine; a cluster has the workers that it has")
-    studied = studied_job(job, machine, tolerance, reading, how)
     from planner.study.points import SweepFolder
     from planner.study.ranges import grid_of, parse_varied
     from planner.study.sweep import sweep, write_sweep
@@ -81,8 +69,8 @@ def sweep_command(
     inputs = {
         "program": studied.program.source,
         "machine": studied.machine.name,
-        "tolerance_mm": tolerance,
-        **how,
+        "tolerance_mm": studied.tolerance,
+        **studied.how,
     }
     folder = SweepFolder(output, studied, inputs)
     folder.open(force=force)
@@ -97,9 +85,7 @@ def sweep_command(
             )
         )
     else:
-        title = f"{studied.program.source}: {how['method']}, machine {studied.machine.name}"
-        show(sweep_table(done, title))
+        show(sweep_table(done, title_of(studied)))
         for name in written:
             say(str(output / name))
-    if set(outcomes) != {"passed"}:
-        raise typer.Exit(FAILED if set(outcomes) <= {"passed", "failed"} else NOT_SOLVED)
+    end_with(outcomes)

@@ -3,35 +3,24 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from planner.base.errors import InputError
 from planner.commands.options import (
-    DEFAULT_MACHINE,
-    Job,
     JsonOption,
-    MachineOption,
     QuietOption,
     ThreadsOption,
-    ToleranceOption,
-    takes_planning,
-    takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, show
-from planner.nc.reading import Reading
-
-if TYPE_CHECKING:
-    from planner.study.variant import StudiedJob
+from planner.commands.studied import StudiedJob, end_with, takes_studied_job, title_of
+from planner.commands.terminal import guarded, say, show
 
 
 @guarded
-@takes_reading
-@takes_planning
+@takes_studied_job
 def what_if_command(
-    job: Job,
     changes: Annotated[
         list[str] | None,
         typer.Option(
@@ -40,14 +29,11 @@ def what_if_command(
             help="another value, such as axes.y.jerk=4e5, y.velocity=+10%, tolerance=20um or feed=1.2; repeat it for more",
         ),
     ] = None,
-    machine: MachineOption = None,
-    tolerance: ToleranceOption = None,
     as_json: JsonOption = False,
     threads: ThreadsOption = None,
     quiet: QuietOption = False,
     *,
-    how: dict[str, Any],
-    reading: Reading,
+    studied: StudiedJob,
 ) -> None:
     """Plan a program as it is, with each --set alone, and with all of them; beside it what prices foretell.
 
@@ -55,7 +41,6 @@ def what_if_command(
     """
     if not changes:
         raise InputError("nothing to change: name a setting and its value, such as --set axes.y.jerk=4e5")
-    studied = studied_job(job, machine, tolerance, reading, how)
     from planner.study.settings import parse_setting
     from planner.study.tables import what_if_dict, what_if_table
     from planner.study.what_if import what_if
@@ -66,25 +51,5 @@ def what_if_command(
     if as_json:
         say(json.dumps(what_if_dict(studied, rows), indent=2, allow_nan=False))
     else:
-        title = f"{studied.program.source}: {how['method']}, machine {studied.machine.name}"
-        show(what_if_table(studied, rows, title))
-    outcomes = {it.row.outcome for it in rows}
-    if outcomes != {"passed"}:
-        raise typer.Exit(FAILED if outcomes <= {"passed", "failed"} else NOT_SOLVED)
-
-
-def studied_job(
-    job: Any, machine: str | None, tolerance: float | None, reading: Reading, how: dict[str, Any]
-) -> StudiedJob:
-    """The job of a command line, read. Raises InputError, for settings that the method does not use too."""
-    from planner.machine import load_machine
-    from planner.methods.registry import check_settings
-    from planner.nc.reader import read_program
-    from planner.study.variant import StudiedJob
-
-    check_settings(**how)
-    if tolerance is not None and not 0.0 < tolerance < float("inf"):
-        raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
-    limits = load_machine(machine or DEFAULT_MACHINE)
-    program = read_program(job, limits, reading)
-    return StudiedJob(program=program, machine=limits, tolerance=tolerance, how=how)
+        show(what_if_table(studied, rows, title_of(studied)))
+    end_with({it.row.outcome for it in rows})

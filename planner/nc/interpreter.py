@@ -6,8 +6,8 @@
 Two consequences surprise. F is read in the units in force *before* a G20 or G21 on its line. M3 and M8 act before the line's move
 and M0 after it. G53 holds for its line only; a motion code alone on a line moves nothing.
 
-Rows that are plain straight moves run in `plain`; this file is for the others. A fault is recorded and reading goes on with the
-next line, so that `info` can show them all; `reader` refuses a program that has any.
+Rows that are plain straight moves run in `plain.py`; this file is for the others, and `mover.py` for what they move. A fault is
+recorded and reading goes on with the next line, so that `info` can show them all; `reader.py` refuses a program that has any.
 """
 
 from __future__ import annotations
@@ -16,28 +16,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.machine import Machine
-from planner.nc import auxiliary, codes, compensation, drilling, feeds, homing, moves, offsets, threads
+from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
 from planner.nc.assumed import Assumed
-from planner.nc.block import OFFSET_NUMBER, Block, read_block
-from planner.nc.cutter import Cutter, CutterFault
+from planner.nc.block import Block, read_block
+from planner.nc.cutter import CutterFault
 from planner.nc.faults import FaultList, Findings
 from planner.nc.lexer import Words
+from planner.nc.mover import COVET_AXES, Mover
 from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
-from planner.nc.splines import SplineReader, is_spline_line
-from planner.nc.state import NO_MOTION, REFUSED_MOTION, Setup, set_units, system_name
+from planner.nc.state import REFUSED_MOTION, Setup, set_units, system_name
 from planner.nc.store import Store
-
-# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
-_COVET_AXES = (100, 280, 300, 520, 920)
-_WHY_NO_MOTION = {
-    NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
-    REFUSED_MOTION: "an axis word under a motion code that is not supported",
-}
 
 
 class Interpreter:
@@ -61,13 +53,12 @@ class Interpreter:
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
         self.by_word = 0
-        self._cutter: Cutter | None = None
         self._words: Words | None = None  # of the last chunk
-        self._splines = SplineReader()
         self._begun = False
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
         self.found = Findings()
+        self.mover = Mover(self.state, self.store, self.assumed, self.setup.feed_default, self.note)
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
@@ -77,10 +68,10 @@ class Interpreter:
 
     def _end_compensation(self) -> None:
         """Settle the last move, if the program just ends while compensation is on."""
-        if self._cutter is None or self._words is None:
+        if self.mover.cutter is None or self._words is None:
             return
         try:
-            self._cutter.fix()
+            self.mover.cutter.fix()
         except CutterFault as fault:
             self.found.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
 
@@ -95,7 +86,11 @@ class Interpreter:
         self.store.begin(len(words.letter))
         while row < rows and not self.ended:
             self.store.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
-            after = row if self._splines.open else run_plain(words, row, self.state, self.store, self.assumed)
+            after = (
+                row
+                if self.mover.splines.open
+                else run_plain(words, row, self.state, self.store, self.assumed)
+            )
             self._begun |= after > row
             if after < rows:
                 self.by_word += 1
@@ -109,7 +104,7 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
-        self._splines.keep(words)
+        self.mover.splines.keep(words)
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
         self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
@@ -139,7 +134,7 @@ class Interpreter:
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self.found.faults + self._splines.faults())
+        return FaultList(self.found.faults + self.mover.splines.faults())
 
     def _note_units(self) -> None:
         """Say it if the first move comes before any G20 or G21."""
@@ -157,12 +152,12 @@ class Interpreter:
             return block.m.get("stopping") in (20, 300)
         except CutterFault as fault:
             self.report(min(block.at.values()), str(fault))
-            self._cutter = self.state.actual = None  # what follows is read without compensation
+            self.mover.cutter = self.state.actual = None  # what follows is read without compensation
             return block.m.get("stopping") in (20, 300)
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
-        if self._cutter is not None:
+        if self.mover.cutter is not None:
             compensation.check_unchanged(self.state, block)
         feeds.set_feed(self.state, block, self.note)
         auxiliary.events(self.state, self.store, block, self.note)
@@ -173,10 +168,10 @@ class Interpreter:
             self._check_parked(block)
             homing.go_to_switches(self.state, self.store, block, self.note)
             self._one_shot(block)
-            self._motion(block)
+            self.mover.execute(block)
         stop = block.m.get("stopping")
-        if stop is not None and self._cutter is not None:
-            self._cutter.fix()
+        if stop is not None and self.mover.cutter is not None:
+            self.mover.cutter.fix()
         if stop == 600:
             self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
         if stop in (0, 10, 600):
@@ -200,7 +195,7 @@ class Interpreter:
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
         if "cutter compensation" in g:
-            self._cutter = compensation.switch(state, self.store, block, self._cutter, self.note)
+            self.mover.cutter = compensation.switch(state, self.store, block, self.mover.cutter, self.note)
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.note)
         if "work offset" in g:
@@ -228,7 +223,7 @@ class Interpreter:
             self.note(
                 f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
             )
-        elif code in _COVET_AXES and motion is not None:
+        elif code in COVET_AXES and motion is not None:
             raise WordFault(
                 block.at["one-shot"],
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
@@ -250,134 +245,3 @@ class Interpreter:
             ):
                 self.assumed.moved.add(letter)
                 self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
-
-    def _motion(self, block: Block) -> None:
-        state, one_shot = self.state, block.g.get("one-shot")
-        if "motion" in block.g:
-            code = block.g["motion"]
-            state.motion = code // 10 if code <= 30 else code
-        elif "cycle end" in block.g:
-            state.motion, state.series = NO_MOTION, None
-        if one_shot in _COVET_AXES or self._gives_offsets(block):
-            return
-        if one_shot == 530:
-            moves.check_machine_coordinates(state, block)
-        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
-            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
-        moves.check_words(state, block)
-        if state.motion in codes.SPLINES or (self._splines.open and "motion" in block.g):
-            self._spline(block)
-            return
-        if not moves.is_move(state, block):
-            if "motion" in block.g and state.motion > 3:
-                found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
-                raise WordFault(block.at["motion"], found)
-            return
-        if state.motion < 0:
-            raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
-        if not self.assumed.strict:
-            feeds.take_default(state, self.setup.feed_default, block, self.note)
-        if state.motion not in codes.CYCLES:
-            state.series = None
-        if state.in_thread and state.motion not in codes.THREADS:
-            threads.stop(state, self.store, block.line)
-        if self._cutter is not None:
-            compensation.check_motion(state, block)
-        if state.motion in codes.THREADS:
-            threads.thread(state, self.store, block, self.note)
-        elif state.motion == codes.THREADING:
-            threads.cut_thread(state, self.store, block, self.note)
-        elif state.motion in codes.CYCLES:
-            feeds.check_feed(state, block)
-            drilling.drill(state, self.store, block, self.note)
-        else:
-            self._move(block)
-
-    def _move(self, block: Block) -> None:
-        """G0, G1, G2, G3."""
-        state, cutter = self.state, self._cutter
-        target = moves.target(state, block)
-        kind = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)[state.motion]
-        if kind != Kind.RAPID:
-            feeds.check_feed(state, block)
-        if kind == Kind.ARC:
-            self._arc(block, target)
-            return
-        if kind == Kind.LINE:
-            feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
-        if kind == Kind.LINE and feeds.on_surface(state):
-            radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
-            state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
-            if cutter is None:
-                self._on_surface(block, target, *radii)
-                return
-        if cutter is not None:
-            cutter.line(target, kind, block.line)
-            return
-        state.position[:], state.actual = target, None
-        self.store.add(kind, block.line, state)
-
-    def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
-        """A straight move in parts, each with the feed of its larger radius."""
-        state, start, at = self.state, self.state.place.copy(), begin
-        parts = feeds.surface_parts(state, begin, end)
-        self.store.make_room(len(parts))
-        for part in parts:
-            there = begin + part * (end - begin)
-            state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
-            state.position[:] = target if part == 1.0 else start + part * (target - start)
-            state.actual, at = None, there
-            self.store.add(Kind.LINE, block.line, state)
-
-    def _arc(self, block: Block, target: FloatArray) -> None:
-        state = self.state
-        if self._cutter is None and state.actual is not None:
-            raise WordFault(
-                block.motion_word(),
-                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
-            )
-        try:
-            arc, normal = moves.arc(state, block, target)
-            if feeds.on_surface(state):
-                centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
-                size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
-                state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
-            feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
-            if self._cutter is not None:
-                self._cutter.arc(target, arc, block.line)
-        finally:
-            state.position[:] = target
-        if self._cutter is None:
-            self.store.add_arc(arc, normal, block.line, state)
-
-    def _spline(self, block: Block) -> None:
-        """A line of a spline; the curve is a block of its first line."""
-        state = self.state
-        if not is_spline_line(block):
-            return
-        if self._cutter is not None:
-            raise WordFault(
-                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
-            )
-        if state.actual is not None:
-            raise WordFault(
-                block.motion_word(),
-                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
-            )
-        state.series = None
-        if state.in_thread:
-            threads.stop(state, self.store, block.line)
-        found = self._splines.read(state, block, self.store.blocks)
-        if found is None:
-            return
-        if not self.assumed.strict:
-            feeds.take_default(state, self.setup.feed_default, block, self.note)
-        feeds.check_feed(state, block)
-        (points, weights), line = found
-        state.position[:] = points[-1, -1]
-        self.store.add_spline(points, weights, line, state)
-
-    @staticmethod
-    def _gives_offsets(block: Block) -> bool:
-        """Whether the axis words are those of G43.1 or G43.2."""
-        return block.g.get("tool length") in (431, 432) and "motion" not in block.g

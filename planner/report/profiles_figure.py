@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
-from planner.machine import LINEAR_AXES, RAD_PER_DEG
+from planner.base.units import RAD_PER_DEG
+from planner.machine import LINEAR_AXES
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan

@@ -2,8 +2,8 @@
 
 Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed has degree 4: it is
 looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is
-looked at in the same places. For the tolerance see nlp.py: control points within the budget of places on the leg that never go back,
-and on arcs kappa (s3 - s0)^2/8 for the bending between them.
+looked at in the same places. For the tolerance see nlp.py: control points within the budget of those of the leg's own cubic, along
+places that never go back. On arcs a step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.tube.rows import Legs, nearest_point
+from planner.tube.rows import Legs, along_tangent, nearest_point, place_of
 
 PLACES = 33
 NEWTON_STEPS = 4
+# Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
+PIECES = 4
 
 
 class Keeps(NamedTuple):
@@ -75,46 +77,116 @@ def _of_limits(keeps, r, h, v, a, j):
 
 
 @njit(cache=True, error_model="numpy")
+def _apart(c, point, tangent, far):
+    """Distance of c (A,) from the point (A,) `far` along a tangent (A,) from another."""
+    square = 0.0
+    for k in range(len(c)):
+        square += (c[k] - point[k] - far * tangent[k]) ** 2
+    return np.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def bend_of(curvature, rate, s):
+    """Bound of |d4/dt4 P(x(t))|/384 for the places x of a cubic piece with the ordinates s (4,) on an arc."""
+    first = 3.0 * max(s[1] - s[0], s[2] - s[1], s[3] - s[2])
+    second = 6.0 * max(abs(s[2] - 2.0 * s[1] + s[0]), abs(s[3] - 2.0 * s[2] + s[1]))
+    third = 6.0 * abs(s[3] - 3.0 * s[2] + 3.0 * s[1] - s[0])
+    turned = abs(rate) * first * first
+    fourth = turned * (turned + 6.0 * second)
+    return curvature * (fourth + 3.0 * second * second + 4.0 * first * third) / 384.0
+
+
+@njit(cache=True, error_model="numpy")
+def _split(c, part, piece):
+    """The Bezier ordinates c (4, B) of a cubic: `piece` (4, B) gets those of its first part, c keeps those of the rest."""
+    piece[0] = c[0]
+    for level in range(3):  # de Casteljau
+        for m in range(3 - level):
+            c[m] += part * (c[m + 1] - c[m])
+        piece[level + 1] = c[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _of_arc(keeps, r, c, s0, end, known, budgets, work):
+    """The largest share of the tolerance of a step on an arc with the control points c (4, A), overwritten, from the place s0; budgets
+    (2,) of both ends. It ends at the place `end`, or, if that is not known, at one sought from there. Returns where it ends too."""
+    legs, budget = keeps.legs, keeps.budget[r]
+    point, ahead, tangent, ahead_tangent, bend, piece, s, part_of_s = work
+    worst = 0.0
+    s3 = end if known else max(nearest_point(legs, r, c[3], end, point, tangent), s0)
+    place_of(legs, r, s3, ahead, ahead_tangent, bend)
+    s[2, 0] = s3 + along_tangent(legs.length[r], c[2], s3, False, ahead, ahead_tangent)
+    place_of(legs, r, s0, ahead, ahead_tangent, bend)
+    s[1, 0] = s0 + along_tangent(legs.length[r], c[1], s0, True, ahead, ahead_tangent)
+    s[0, 0], s[1, 0], s[2, 0], s[3, 0] = s0, min(s[1, 0], s3), max(s[2, 0], s0), s3
+    if s[1, 0] > s[2, 0]:
+        s[1, 0] = s[2, 0] = 0.5 * (s[1, 0] + s[2, 0])
+    for n in range(PIECES):
+        part = 1.0 / (PIECES - n)
+        _split(c, part, piece)
+        _split(s, part, part_of_s)
+        x = part_of_s[:, 0]
+        point[:], tangent[:] = ahead, ahead_tangent
+        place_of(legs, r, x[3], ahead, ahead_tangent, bend)
+        inner = max(
+            _apart(piece[1], point, tangent, x[1] - x[0]),
+            _apart(piece[2], ahead, ahead_tangent, x[2] - x[3]),
+        )
+        begin = _apart(piece[0], point, tangent, 0.0) / (budgets[0] if n == 0 else budget)
+        last = _apart(piece[3], ahead, ahead_tangent, 0.0) / (budgets[1] if n == PIECES - 1 else budget)
+        far = max(begin, inner / budget, last)
+        worst = max(worst, far + bend_of(keeps.curvature[r], legs.rate[r], x) / budget)
+    return worst, s3
+
+
+@njit(cache=True, error_model="numpy")
+def _of_line(keeps, r, c, s0, end, known, budgets, work):
+    """The same on a line."""
+    legs, s = keeps.legs, s0
+    point, tangent, bend = work[0], work[2], work[4]
+    place_of(legs, r, s, point, tangent, bend)
+    worst = _apart(c[0], point, tangent, 0.0) / budgets[0]
+    for m in range(1, 4):
+        s = end if m == 3 and known else max(nearest_point(legs, r, c[m], s, point, tangent), s)
+        place_of(legs, r, s, point, tangent, bend)
+        worst = max(worst, _apart(c[m], point, tangent, 0.0) / (budgets[1] if m == 3 else keeps.budget[r]))
+    return worst, s
+
+
+@njit(cache=True, error_model="numpy")
 def worst_shares(keeps, leg, h, state, jerk, place):
     """The largest share of a limit, and of the tolerance, in N steps.
 
-    leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points along the leg: where the
-    search for them begins
+    leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points along the leg: where
+    places on arcs are sought from
     """
     N, axes = jerk.shape
-    limit, tube = 0.0, 0.0
-    c, point, tangent, far = np.empty(axes), np.empty(axes), np.empty(axes), np.empty(4)
-    before = 0.0
+    limit, tube, before = 0.0, 0.0, 0.0
+    c, budgets = np.empty((4, axes)), np.empty(2)
+    work = (
+        *(np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)),
+        *(np.zeros((4, axes)), np.zeros((4, 1)), np.zeros((4, 1))),
+    )
     for i in range(N):
         r = leg[i]
         limit = max(limit, _of_limits(keeps, r, h[i], state[i, 1], state[i, 2], jerk[i]))
         begins, ends = i > 0 and leg[i - 1] != r, i < N - 1 and leg[i + 1] != r
-        s0 = 0.0
-        for m in range(4):
-            for k in range(axes):
-                p, q = state[i, 0, k], state[i + 1, 0, k]
-                third = h[i] / 3.0
-                c[k] = (p, p + third * state[i, 1, k], q - third * state[i + 1, 1, k], q)[m]
-            s = nearest_point(keeps.legs, r, c, place[i, min(m, 2)], point, tangent)
-            budget = keeps.budget[r]
-            if m == 0:
-                s = 0.0 if begins else (s if i == 0 else before)
-                s0 = s
-                if begins:
-                    budget = min(budget, keeps.vertex_budget[r])
-            else:
-                s = max(s, before)
-            if m == 3 and ends:
-                s = keeps.legs.length[r]
-                budget = min(budget, keeps.vertex_budget[r + 1])
-            before = s
-            square = 0.0
-            cos, sin = np.cos(keeps.legs.rate[r] * s), np.sin(keeps.legs.rate[r] * s)
-            for k in range(axes):
-                on = keeps.legs.base[r, k] + keeps.legs.drift[r, k] * s
-                on += keeps.legs.radius[r] * (cos * keeps.legs.e1[r, k] + sin * keeps.legs.e2[r, k])
-                square += (c[k] - on) ** 2
-            far[m] = np.sqrt(square) / budget
-        bend = keeps.curvature[r] * (before - s0) ** 2 / 8.0 / keeps.budget[r]
-        tube = max(tube, far.max() + bend)
+        third = h[i] / 3.0
+        for k in range(axes):
+            p, q = state[i, 0, k], state[i + 1, 0, k]
+            c[0, k], c[1, k] = p, p + third * state[i, 1, k]
+            c[2, k], c[3, k] = q - third * state[i + 1, 1, k], q
+        budgets[:] = keeps.budget[r]
+        if begins:
+            before, budgets[0] = 0.0, min(budgets[0], keeps.vertex_budget[r])
+        elif i == 0:
+            before = nearest_point(keeps.legs, r, c[0], place[i, 0], work[0], work[1])
+        if ends:
+            budgets[1] = min(budgets[1], keeps.vertex_budget[r + 1])
+        end = keeps.legs.length[r] if ends else max(place[i, 2], before)
+        if keeps.legs.radius[r] > 0.0:
+            share, before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
+        else:
+            share, before = _of_line(keeps, r, c, before, end, ends, budgets, work)
+        tube = max(tube, share)
     return limit, tube

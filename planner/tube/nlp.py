@@ -10,19 +10,20 @@ with the control points
     subject to p_{i+1} = p_i + v_i h + a_i h^2/2 + j_i h^3/6,    v_{i+1} = v_i + a_i h + j_i h^2/2,    a_{i+1} = a_i + j_i h
                |v_i|, |v_i + a_i h/2| <= v,    |a_i| <= a,    |j_i| <= j               per axis
                |v_i|, |v_i + a_i h/2| <= F                                             in the norm
-               |c_k - P(s_k)| <= room,    s3 - s0 <= step_max (arcs)                   the tolerance, both sides, in order
+               |c_k - q_k| <= room,    s3 - s0 <= step_max (arcs)                      the tolerance, both sides, in order
                |a - u v| <= a_n                                                        for some u, at places of a step, if limited
                node at a vertex: s = the vertex;     v = a = 0, p = the vertex at both ends.
 
 The smallest |a - u v| over u is the normal acceleration; rows of this kind have good derivatives down to rest, |v x a| <= a_n |v| has
 not. What holds for the control points holds for the whole step: acceleration is linear and velocity a parabola with the Bezier
-ordinates v_i, v_i + a_i h/2, v_{i+1}, so all limits but the normal acceleration hold at every time. With the Bernstein weights B_k the
-motion sum B_k c_k runs along P(sum B_k s_k) with a place that never goes back, and
+ordinates v_i, v_i + a_i h/2, v_{i+1}, so all limits but the normal acceleration hold at every time. The q_k are the control points
+of the leg's own cubic along the places s_k (run.py): P(s_k) on lines, and with the tangents at s0 and s3 on arcs. With the Bernstein
+weights B_k
 
-    |sum B_k c_k - P(sum B_k s_k)| <= max |c_k - P(s_k)| + kappa (s3 - s0)^2/8
+    |sum B_k c_k - P(sum B_k s_k)| <= max |c_k - q_k| + what the leg is off its cubic
 
-(the second term is what the mean of points on an arc is off the arc, half of kappa times the variance of their places): motion and
-path are within the budget in the sense of Frechet, which is what the tolerance asks for: in order, every vertex reached, both sides.
+and the place sum B_k s_k never goes back: motion and path are within the budget in the sense of Frechet, which is what the tolerance
+asks for: in order, every vertex reached, both sides.
 
 Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and ipopt trickling among them: a
 weak pull of every h to its guess makes it one, `PULL`. It is not convex and has no certificate: what is found is the best
@@ -162,16 +163,18 @@ class TubeNLP:
             ca.SX.sym, scalars
         )
 
-        def apart(point: Any, place: Any) -> Any:
-            """Squared distance of a point from the place on its leg."""
-            turned = rate * (place - begin)
-            circle = ca.cos(turned) * e1 + ca.sin(turned) * e2
-            return ca.sumsqr(point - base - drift * (place - begin) - radius * circle)
+        def apart(point: Any, place: Any, ahead: Any = 0.0) -> Any:
+            """Squared distance of a point from the one so far ahead on the tangent at a place of its leg."""
+            x = place - begin
+            cos, sin = ca.cos(rate * x), ca.sin(rate * x)
+            tangent = drift + radius * rate * (cos * e2 - sin * e1)
+            return ca.sumsqr(point - base - drift * x - radius * (cos * e1 + sin * e2) - ahead * tangent)
 
         ordinate = v + a * h / 2
         rows: list[tuple[Any, float, float]] = [
             (gap, 0.0, 0.0),
-            (ca.vertcat(apart(p + h * v / 3, s1), apart(p1 - h * v1 / 3, s2)) / room**2, -np.inf, 1.0),
+            (apart(p + h * v / 3, s0, s1 - s0) / room**2, -np.inf, 1.0),
+            (apart(p1 - h * v1 / 3, s3, s2 - s3) / room**2, -np.inf, 1.0),
             (apart(p1, s3) / room_end**2, -np.inf, 1.0),
             (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_mean, 0.0, np.inf),
         ]

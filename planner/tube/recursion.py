@@ -23,7 +23,16 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.tube.rows import FEED_NODE, FEED_ROWS, NORMAL_MID, NORMAL_NODE, TUBE_NODE, VECTORS, vector_of
+from planner.tube.rows import (
+    FEED_NODE,
+    FEED_ROWS,
+    NORMAL_MID,
+    NORMAL_NODE,
+    TUBE_NODE,
+    VECTOR_OF_NODE,
+    VECTORS,
+    vector_of,
+)
 
 END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 
@@ -57,8 +66,24 @@ def _add_vector(W, axes, alpha, e, G):
 
 
 @njit(cache=True, error_model="numpy")
-def _model(W, G, lin, limits, i, z, ratio, of, axes):
-    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with multipliers z (R,) and z/s (R,); G (13, A, A) is overwritten."""
+def _add_row(W, axes, one, other, by):
+    """W += by g g' for a row that depends on two vectors; of each alpha, e and the row's derivative (A,)."""
+    size = 4 * axes + 1
+    alpha, e, n = one
+    other_alpha, other_e, other_n = other
+    g = np.zeros(size)
+    for k in range(axes):
+        for a in range(4):
+            g[a * axes + k] = alpha[a] * n[k] + other_alpha[a] * other_n[k]
+        g[size - 1] += e[k] * n[k] + other_e[k] * other_n[k]
+    for s in range(size):
+        for t in range(s + 1):
+            W[s, t] += by * g[s] * g[t]
+
+
+@njit(cache=True, error_model="numpy")
+def _model(W, G, legs, lin, limits, i, z, ratio, of, axes):
+    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with multipliers z (R,) and z/s (R,); G (14, A, A) is overwritten."""
     W[:] = 0.0
     G[:] = 0.0
     more = 8 * axes
@@ -73,11 +98,16 @@ def _model(W, G, lin, limits, i, z, ratio, of, axes):
             k = r % axes
             G[m, k, k] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, k]
             continue
-        for k in range(axes):
-            for t in range(axes):
-                G[m, k, t] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, t]
         kind, flat = r - more, 0.0
         c = kind - TUBE_NODE
+        if 1 <= c <= 2 and legs.radius[limits.leg[i]] > 0.0:
+            other = VECTOR_OF_NODE[c - 1]
+            own = lin.alpha[i, m], lin.e[i, m], lin.n[i, r]
+            _add_row(W, axes, own, (lin.alpha[i, other], lin.e[i, other], lin.node[i, c - 1]), ratio[r])
+        else:
+            for k in range(axes):
+                for t in range(axes):
+                    G[m, k, t] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, t]
         if kind == FEED_NODE:
             flat = z[r] / limits.feed_node[i] ** 2
         elif FEED_ROWS <= kind < TUBE_NODE:
@@ -122,7 +152,7 @@ def _times_transposed(M, h, axes, out):
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(x, u, limits, lin, z, ratio, pull, factor):
+def factorise(x, u, legs, limits, lin, z, ratio, pull, factor):
     """The recursion into `factor`, with multipliers z (N, R), z/s (N, R), and `pull`, the weight of (dh/limits.h)^2. False where it
     breaks down."""
     N, axes = len(u), u.shape[1] - 1
@@ -138,7 +168,7 @@ def factorise(x, u, limits, lin, z, ratio, pull, factor):
         P[N, k, k] = END
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
-        _model(W, G, lin, limits, i, z[i], ratio[i], of, axes)
+        _model(W, G, legs, lin, limits, i, z[i], ratio[i], of, axes)
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
         step_of_h(x[i], u[i], axes, by_h)
         # P is symmetric: (P A)' = A'P
@@ -233,6 +263,10 @@ def forces(limits, lin, q, pull, h, w):
                 continue
             for k in range(axes):
                 F[m, k] += q[i, r] * lin.n[i, r, k]
+            c = r - more - TUBE_NODE - 1
+            if 0 <= c <= 1:
+                for k in range(axes):
+                    F[VECTOR_OF_NODE[c], k] += q[i, r] * lin.node[i, c, k]
         for m in range(VECTORS):
             for k in range(axes):
                 own += F[m, k] * lin.e[i, m, k]

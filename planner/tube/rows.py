@@ -17,13 +17,16 @@ so that all rows of one y add up to one small matrix G = sum of z d2g/dy2 + (z/s
     p + h v/3, p + 2 h v/3 + h2 a/6            the tolerance: inner control points of the cubic
     a(h/2) - u v(h/2), a - u v                 normal acceleration, u = v.a/v.v kept: the smallest |a - u v| is what it is about
     h (v + a h/2)                              largest length of a step on an arc
+    p + h v + h2 a/2 + h3 j/6                  the next node's position, for the tolerance on arcs
 
 The square of the feed has degree 4. With the Bezier ordinates w0, w1, w2 of the velocity its own are w0.w0, w0.w1, (2 w1.w1 + w0.w2)/3,
 w1.w2 and w2.w2; none above the square of the limit F is enough for the whole step, and on a circle at constant feed all are equal.
 w0.w1 = |y|^2 - |a h/4|^2 with y = v + a h/4, so that the row is |y| <= r, r^2 = F^2 + |a h/4|^2 kept, and the other two likewise.
 
 The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point of the leg (at a vertex: to the vertex), along which
-n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is convex.
+n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is convex. On an arc the inner control points
+belong to the tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second vector, p or
+the next node's, through `lin.node`.
 """
 
 from __future__ import annotations
@@ -36,8 +39,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 
 # Vectors y, in this order.
-P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG = range(13)
-VECTORS = 13
+P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG, NEXT = range(14)
+VECTORS = 14
+VECTOR_OF_NODE = P, NEXT  # that the tangent of the first and of the second inner control point depends on
 # Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before lower), in this order.
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
 ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC = range(9, 14)
@@ -83,8 +87,9 @@ class Linear(NamedTuple):
 
     g: FloatArray  # (N, R)
     n: FloatArray  # (N, R, A) dg/dy
-    alpha: FloatArray  # (N, 13, 4)
-    e: FloatArray  # (N, 13, A)
+    node: FloatArray  # (N, 2, A) on arcs dg/dy of both inner control points by the nodes of their tangents
+    alpha: FloatArray  # (N, 14, 4)
+    e: FloatArray  # (N, 14, A)
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
     place: FloatArray  # (N, 3) of those along the leg
     radius: FloatArray  # (N, 3) of the rows of the feed
@@ -122,8 +127,56 @@ def nearest_point(legs, r, c, x, point, tangent):
 
 
 @njit(cache=True, error_model="numpy")
+def place_of(legs, r, x, point, tangent, bend):
+    """point (A,) of leg r at the place x, with its tangent and second derivative (A,)."""
+    radius, rate = legs.radius[r], legs.rate[r]
+    cos, sin = np.cos(rate * x), np.sin(rate * x)
+    for k in range(len(point)):
+        circle, across = cos * legs.e1[r, k] + sin * legs.e2[r, k], cos * legs.e2[r, k] - sin * legs.e1[r, k]
+        point[k] = legs.base[r, k] + legs.drift[r, k] * x + radius * circle
+        tangent[k] = legs.drift[r, k] + radius * rate * across
+        bend[k] = -radius * rate * rate * circle
+
+
+@njit(cache=True, error_model="numpy")
+def along_tangent(length, c, x, ahead, point, tangent):
+    """How far along the tangent (A,) at the place x of a leg, from its point (A,), c (A,) is: ahead of it or else behind it, and
+    within the leg."""
+    miss, square = 0.0, 0.0
+    for k in range(len(c)):
+        miss += (c[k] - point[k]) * tangent[k]
+        square += tangent[k] * tangent[k]
+    far = miss / square
+    return min(max(far, 0.0), length - x) if ahead else max(min(far, 0.0), -x)
+
+
+@njit(cache=True, error_model="numpy")
+def _of_tangent(legs, r, c, node, x, fixed, ahead, room, n, n_node, tangent):
+    """The row of an inner control point c (A,) on an arc: its distance from the tangent at the place x of the node (A,) behind or ahead
+    of it. n, n_node (A,) are its derivatives, `tangent` that of the place, 0 where that is an end of the leg. If the place is `fixed`
+    it does not move with the node. Returns the row, and the place."""
+    axes = len(c)
+    point, bend = np.empty(axes), np.empty(axes)
+    place_of(legs, r, x, point, tangent, bend)
+    far = along_tangent(legs.length[r], c, x, ahead, point, tangent)
+    square, slope, long, turned = 0.0, 0.0, 0.0, 0.0
+    inside = far > 0.0 and x + far < legs.length[r] if ahead else far < 0.0 and x + far > 0.0
+    for k in range(axes):
+        off = c[k] - point[k] - far * tangent[k]
+        square += off * off
+        slope += off * (far * bend[k] + (0.0 if inside else tangent[k]))
+        long += tangent[k] * tangent[k]
+        turned += (node[k] - point[k]) * bend[k]
+        n[k] = off / (room * room)
+    by_node = 0.0 if fixed else -slope / ((long - turned) * room * room)
+    for k in range(axes):
+        n_node[k] = by_node * tangent[k]
+    return 0.5 * (square / (room * room) - 1.0), x + far
+
+
+@njit(cache=True, error_model="numpy")
 def vectors_of_step(x, u, axes, y, alpha, e):
-    """y (13, A), alpha (13, 4) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
+    """y (14, A), alpha (14, 4) and e (14, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
     h = u[axes]
     alpha[:] = 0.0
     vv, va, ww, wb = 0.0, 0.0, 0.0, 0.0
@@ -146,6 +199,8 @@ def vectors_of_step(x, u, axes, y, alpha, e):
         e[P, k], e[V, k], e[A, k], e[J, k], e[ACROSS, k] = 0.0, 0.0, 0.0, 0.0, 0.0
         e[ACROSS_MID, k] = 0.5 * j - u1 * (0.5 * a + 0.25 * h * j)
         y[LONG, k], e[LONG, k] = h * (v + 0.5 * h * a), v + h * a
+        y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j / 6.0))
+        e[NEXT, k] = v + h * (a + 0.5 * h * j)
     alpha[P, 0], alpha[V, 1], alpha[A, 2], alpha[J, 3] = 1.0, 1.0, 1.0, 1.0
     alpha[MID, 1], alpha[MID, 2] = 1.0, 0.5 * h
     for m in range(3):
@@ -157,6 +212,7 @@ def vectors_of_step(x, u, axes, y, alpha, e):
     alpha[ACROSS_MID, 1], alpha[ACROSS_MID, 2] = -u1, 1.0 - 0.5 * u1 * h
     alpha[ACROSS_MID, 3] = 0.5 * h - 0.125 * u1 * h * h
     alpha[LONG, 1], alpha[LONG, 2] = h, 0.5 * h * h
+    alpha[NEXT, 0], alpha[NEXT, 1], alpha[NEXT, 2], alpha[NEXT, 3] = 1.0, h, 0.5 * h * h, h**3 / 6.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -211,20 +267,37 @@ def linearise(legs, limits, x, u, lin):
         put_radii(x[i], u[i], axes, limits.feed[i], lin.radius[i])
         for m in range(3):
             _ball(y, FEED_1 + m, lin.radius[i, m], more + FEED_ROWS + m, g, n)
-        for c in range(3):
-            vector = P if c == 0 else (C1 if c == 1 else C2)
-            at_vertex = c == 0 and limits.at_vertex[i]
-            room, r = limits.room_node[i] if c == 0 else limits.room[i], limits.leg[i]
+        r, at_vertex, curved = limits.leg[i], limits.at_vertex[i], legs.radius[limits.leg[i]] > 0.0
+        lin.node[i] = 0.0
+        for c in range(1 if curved else 3):
+            vector, row = (P, C1, C2)[c], more + TUBE_NODE + c
+            room = limits.room_node[i] if c == 0 else limits.room[i]
             place = nearest_point(legs, r, y[vector], lin.place[i, c], point, lin.tangent[i, c])
-            if at_vertex:
+            if c == 0 and at_vertex:
                 for k in range(axes):
                     point[k] = legs.base[r, k] + legs.radius[r] * legs.e1[r, k]
-            lin.place[i, c], row, square = place, more + TUBE_NODE + c, 0.0
+            lin.place[i, c], square = place, 0.0
             for k in range(axes):
                 off = y[vector, k] - point[k]
                 square += off * off
                 n[row, k] = off / (room * room)
             g[row] = 0.5 * (square / (room * room) - 1.0)
+        if curved:
+            ends = i < N - 1 and limits.leg[i + 1] != r
+            for c in range(1, 3):
+                if c == 1:
+                    place, vector, other = 0.0 if at_vertex else lin.place[i, 0], C1, P
+                else:
+                    place, vector, other = legs.length[r], C2, NEXT
+                    if not ends:
+                        place = nearest_point(legs, r, y[NEXT], lin.place[i, 2], point, lin.tangent[i, 2])
+                fixed = (ends if c == 2 else at_vertex) or place <= 0.0 or place >= legs.length[r]
+                row, slopes_of, room = more + TUBE_NODE + c, lin.node[i, c - 1], limits.room[i]
+                tangent = lin.tangent[i, c]
+                found = _of_tangent(
+                    legs, r, y[vector], y[other], place, fixed, c == 1, room, n[row], slopes_of, tangent
+                )
+                g[row], lin.place[i, c] = found
         order_node, order_mid, arc = 0.0, 0.0, 0.0
         for k in range(axes):
             n[more + ORDER_NODE, k] = -lin.tangent[i, 0, k] / limits.pace[i]
@@ -281,4 +354,8 @@ def slopes(limits, lin, dx, du, out):
             total = 0.0
             for k in range(axes):
                 total += lin.n[i, r, k] * dy[of[r], k]
+            c = r - more - TUBE_NODE - 1
+            if 0 <= c <= 1:
+                for k in range(axes):
+                    total += lin.node[i, c, k] * dy[VECTOR_OF_NODE[c], k]
             out[i, r] = total

@@ -7,6 +7,14 @@ A leg consists of collinear lines with one feed and one budget, or is an arc. Ov
 with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what is left is for the
 chord error of the interpolation period and for the filters that follow (corners/allocation.py, eq. (18)-(20)), with the largest
 normal acceleration that the axes can give in any direction.
+
+A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that meets P(x(t)) at both ends
+with its velocity has the control points
+
+    P(s0),   P(s0) + (s1 - s0) P'(s0),   P(s3) - (s3 - s2) P'(s3),   P(s3)
+
+and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx. So these are the points that
+the control points of a step belong to; on a line they are the places themselves.
 """
 
 from __future__ import annotations
@@ -25,8 +33,9 @@ from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
-# Fraction of the budget that a step on an arc may use for bending away from its control points [-]: kappa dx^2/8 for a step over dx.
-ARC_FRACTION = 0.1
+# Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
+# turns by meanwhile [rad], within which tangents tell where a control point belongs.
+ARC_FRACTION, TURN_MAX = 0.005, 0.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,10 +94,11 @@ class TubeRun:
 
     @property
     def step_max(self) -> FloatArray:
-        """(R,) largest length on a leg that one step may cover [mm]: where it bends away by `ARC_FRACTION` of the budget; inf on
-        lines."""
+        """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by `ARC_FRACTION` of the budget (module
+        text); inf on lines."""
         with np.errstate(divide="ignore"):
-            return np.sqrt(8.0 * ARC_FRACTION * self.budget / self.curvature)
+            fourth = 384.0 * ARC_FRACTION * self.budget / (self.curvature * self.rate**2)
+            return np.minimum(fourth**0.25, TURN_MAX / np.abs(self.rate))
 
     @property
     def room(self) -> FloatArray:

@@ -55,7 +55,7 @@ def test_no_program_at_all(tmp_path: Path, content: bytes | None, said: str) -> 
 
 
 def test_a_bad_machine_file_exits_2(job: Path, tmp_path: Path) -> None:
-    """What is said of it: tests/test_machine.py."""
+    """What is said of it: tests/machine/test_machine.py."""
     path = tmp_path / "machine.toml"
     for content in ("", "name = ", "a = " + "[" * 100_000):
         path.write_text(content)

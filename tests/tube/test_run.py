@@ -11,6 +11,7 @@ from benchmarks import problems
 from planner.geometry.build import toolpath_from_program
 from planner.nc.reader import parse_program
 from planner.tube import run as run_module
+from planner.tube.checks import bend_of
 from planner.tube.guess import Guess
 from planner.tube.motion import closed, integrated
 from planner.tube.nlp import TubeNLP
@@ -46,15 +47,26 @@ def test_a_run_is_the_programmed_path():
 
 @given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
 @settings(max_examples=200, deadline=None)
-def test_a_step_on_an_arc_bends_away_by_no_more_than_its_fraction(places, t):
-    """The mean of points on the arc with Bernstein weights is within ARC_FRACTION of the budget of the point at the mean place."""
+def test_a_leg_is_off_its_own_cubic_by_no_more_than_the_bound(places, t):
+    """The cubic that meets the leg at both ends with its velocity, along any places that do not go back."""
+    run = only_run(ARCS)
+    weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
+    for leg in (0, 1, 2):
+        s = np.sort(places) * min(run.step_max[leg], run.length[leg])
+        rows = np.full(4, leg)
+        ends, tangents = run.points(rows[:2], s[[0, 3]]), run.tangents(rows[:2], s[[0, 3]])
+        inner = ends + np.array([[s[1] - s[0]], [s[2] - s[3]]]) * tangents
+        cubic = weights @ np.array([ends[0], inner[0], inner[1], ends[1]])
+        off = np.linalg.norm(cubic - run.points(rows[:1], (weights @ s)[None])[0])
+        assert off <= bend_of(run.curvature[leg], run.rate[leg], s) + 1e-12 * run.length[leg]
+
+
+def test_an_even_step_of_the_largest_length_is_off_by_its_fraction_at_most():
     run = only_run(ARCS)
     for leg in (1, 2):
-        s = np.sort(places) * run.step_max[leg]
-        weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
-        rows = np.full(4, leg)
-        off = weights @ run.points(rows, s) - run.points(rows[:1], (weights @ s)[None])[0]
-        assert np.linalg.norm(off) <= run_module.ARC_FRACTION * run.budget[leg] * (1 + 1e-9)
+        even = run.step_max[leg] * np.arange(4) / 3
+        off = bend_of(run.curvature[leg], run.rate[leg], even)
+        assert off <= run_module.ARC_FRACTION * run.budget[leg] * (1 + 1e-9)
 
 
 def test_the_closing_jerks_are_what_the_motion_runs_too_far():

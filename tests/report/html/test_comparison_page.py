@@ -62,10 +62,10 @@ def test_a_file_that_is_no_page_is_kept(tmp_path: Path, file: Path) -> None:
 
 @pytest.mark.slow
 def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
+    pages = opened(file)
+    browser: Any = next(pages)  # or skipped
     from selenium.webdriver.common.by import By
 
-    pages = opened(file)
-    browser: Any = next(pages)
     assert browser.execute_script("return document.querySelectorAll('#title b').length") == 0
     assert browser.execute_script("return comparison.state().shown") == 3
     browser.find_elements(By.CSS_SELECTOR, "tr.choice")[1].click()

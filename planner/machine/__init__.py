@@ -1,0 +1,32 @@
+"""The machine: limits of the axes, interpolation period, tolerance, filters. Read from TOML, checked, frozen.
+
+    parts.py    records of the tables of a machine file
+    whole.py    `Machine`, the record of all of them
+    faults.py   what is wrong in a record, in words
+    files.py    machine files and built-in machines
+
+Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns rad. `planner machine init FILE` writes a
+template with every key and its unit.
+"""
+
+from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict
+from planner.machine.parts import Axis, DialectData, Fir, Mode, Plotter, Times, ToolData
+from planner.machine.whole import LINEAR_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
+
+__all__ = [
+    "LINEAR_AXES",
+    "ROTARY_AXES",
+    "WORK_OFFSETS",
+    "Axis",
+    "DialectData",
+    "Fir",
+    "Machine",
+    "Mode",
+    "Plotter",
+    "Times",
+    "ToolData",
+    "builtin_machines",
+    "builtin_text",
+    "load_machine",
+    "machine_from_dict",
+]

@@ -1,0 +1,117 @@
+"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees. They do not change once they are made."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+M_DIGITS = 5  # of an M code: no control has more
+TIMED_BY_NAME = {
+    3: "spindle_start",
+    4: "spindle_start",
+    5: "spindle_stop",
+    6: "tool_change",
+}  # keys of [times]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Record(BaseModel):
+    """Frozen, without other keys than its own. To set one raises AttributeError, which says how to make another record."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in type(self).model_fields:
+            raise AttributeError(
+                f"{type(self).__name__}.{name} cannot be set: records do not change; make another one with "
+                f"model_copy(update={{'{name}': {value!r}}})"
+            )
+        super().__setattr__(name, value)
+
+
+class Axis(Record):
+    """Limits of one axis: velocity [mm/s], acceleration [mm/s2], jerk [mm/s3]; in degrees for rotary axes."""
+
+    velocity: Positive
+    acceleration: Positive
+    jerk: Positive
+
+
+class Fir(Record):
+    """Moving averages in series in the drives or in the control, behind the delivered setpoints.
+
+    The motion behind them stays within the tolerance, whatever the method. Filters by which a method makes its setpoints are a setting
+    of that method instead.
+
+    time_constants : their lengths [s], any number, in any order
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept by methods `optimal` and
+                     `second-order` everywhere and by `bezier` at its corners; the other methods do not use it
+    """
+
+    time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
+    phase_lag_max: Positive | None = None
+
+
+class Mode(Record):
+    """A vibration mode of the machine: frequency [Hz], damping ratio [-]."""
+
+    frequency: Positive
+    damping: Annotated[float, Field(ge=0, lt=1)] = 0.0
+
+
+class Plotter(Record):
+    """How plotter files (HPGL) are read: length of a plotter unit [mm], standstills while the pen or knife goes down and up [s]."""
+
+    unit: Positive = 0.025
+    pen_down: NotNegative = 0.0
+    pen_up: NotNegative = 0.0
+
+
+class ToolData(Record):
+    """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42 use [mm]."""
+
+    length: Finite = 0.0
+    x: Finite = 0.0
+    diameter: NotNegative = 0.0
+
+
+class Times(Record):
+    """What takes time while the axes stand still, beside dwells [s]; None where it is not known, and left out of totals.
+
+    tool_change   : M6, with stopping the spindle, and of plotters another pen
+    spindle_start : M3 and M4, until the spindle turns as it should
+    spindle_stop  : M5, and the stop before it turns the other way
+    m_code        : every other M code that `m_codes` does not name
+    m_codes       : of single codes, such as {"M8": 0.5}; M0, M1 and M60 too, which otherwise wait for a person
+    """
+
+    tool_change: NotNegative | None = None
+    spindle_start: NotNegative | None = None
+    spindle_stop: NotNegative | None = None
+    m_code: NotNegative | None = None
+    m_codes: dict[str, NotNegative] = {}
+
+    @field_validator("m_codes")
+    @classmethod
+    def _codes_known(cls, codes: dict[str, float]) -> dict[str, float]:
+        found = {}
+        for code, seconds in codes.items():
+            name = code.strip().upper().removeprefix("M")
+            if not name.isdecimal() or len(name) > M_DIGITS:
+                raise ValueError(f"'{code[:10]}' is not an M code; write e.g. M8 = 0.5")
+            if int(name) in TIMED_BY_NAME:
+                raise ValueError(f"M{int(name)} has a key of its own: {TIMED_BY_NAME[int(name)]}")
+            found[f"M{int(name)}"] = seconds
+        return found
+
+
+class DialectData(Record):
+    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit; `lathe`
+    says whether they are a lathe's, or None: their words tell."""
+
+    least_increment: Positive | None = None
+    lathe: bool | None = None

@@ -1,0 +1,190 @@
+"""What a block moves: G0 to G3, splines, drilling cycles and threads, with or without cutter radius compensation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.nc import codes, compensation, drilling, feeds, moves, threads
+from planner.nc.assumed import Assumed
+from planner.nc.block import OFFSET_NUMBER, Block
+from planner.nc.cutter import Cutter
+from planner.nc.moves import WordFault
+from planner.nc.program import Kind
+from planner.nc.splines import SplineReader, is_spline_line
+from planner.nc.state import NO_MOTION, REFUSED_MOTION, State
+from planner.nc.store import Store
+
+# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
+COVET_AXES = (100, 280, 300, 520, 920)
+_WHY_NO_MOTION = {
+    NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
+    REFUSED_MOTION: "an axis word under a motion code that is not supported",
+}
+
+
+class Mover:
+    """Executes the motion of blocks, one after the other: moves the state, and appends to the store.
+
+    feed_default : of moves before the first F word [mm/s], or None
+    note    : keeps what was assumed on a line
+    cutter  : the cutter radius compensation that is on, or None
+    splines : of lines that are read, and of those that are open
+    """
+
+    def __init__(
+        self,
+        state: State,
+        store: Store,
+        assumed: Assumed,
+        feed_default: float | None,
+        note: Callable[[str, int], None],
+    ):
+        self.state, self.store, self.assumed = state, store, assumed
+        self.feed_default, self.note = feed_default, note
+        self.cutter: Cutter | None = None
+        self.splines = SplineReader()
+
+    def execute(self, block: Block) -> None:
+        """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault under compensation."""
+        state = self.state
+        self._take_code(block)
+        if block.g.get("one-shot") in COVET_AXES or _gives_offsets(block):
+            return
+        if block.g.get("one-shot") == 530:
+            moves.check_machine_coordinates(state, block)
+        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
+        moves.check_words(state, block)
+        if state.motion in codes.SPLINES or (self.splines.open and "motion" in block.g):
+            self._spline(block)
+        elif moves.is_move(state, block):
+            self._move(block)
+        elif "motion" in block.g and state.motion > 3:
+            found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
+            raise WordFault(block.at["motion"], found)
+
+    def _take_code(self, block: Block) -> None:
+        """The motion code of a block stays in force, until another one or G80."""
+        if "motion" in block.g:
+            code = block.g["motion"]
+            self.state.motion = code // 10 if code <= 30 else code
+        elif "cycle end" in block.g:
+            self.state.motion, self.state.series = NO_MOTION, None
+
+    def _take_default_feed(self, block: Block) -> None:
+        if not self.assumed.strict:
+            feeds.take_default(self.state, self.feed_default, block, self.note)
+
+    def _move(self, block: Block) -> None:
+        """A block with a motion code in force, and somewhere to go."""
+        state = self.state
+        if state.motion < 0:
+            raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
+        self._take_default_feed(block)
+        if state.motion not in codes.CYCLES:
+            state.series = None
+        if state.in_thread and state.motion not in codes.THREADS:
+            threads.stop(state, self.store, block.line)
+        if self.cutter is not None:
+            compensation.check_motion(state, block)
+        if state.motion in codes.THREADS:
+            threads.thread(state, self.store, block, self.note)
+        elif state.motion == codes.THREADING:
+            threads.cut_thread(state, self.store, block, self.note)
+        elif state.motion in codes.CYCLES:
+            feeds.check_feed(state, block)
+            drilling.drill(state, self.store, block, self.note)
+        elif state.motion in (2, 3):
+            self._arc(block)
+        else:
+            self._straight(block)
+
+    def _straight(self, block: Block) -> None:
+        """G0, G1."""
+        state, cutter = self.state, self.cutter
+        target = moves.target(state, block)
+        kind = (Kind.RAPID, Kind.LINE)[state.motion]
+        if kind == Kind.LINE:
+            feeds.check_feed(state, block)
+            feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+        if kind == Kind.LINE and feeds.on_surface(state):
+            radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
+            state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
+            if cutter is None:
+                self._on_surface(block, target, *radii)
+                return
+        if cutter is not None:
+            cutter.line(target, kind, block.line)
+            return
+        state.position[:], state.actual = target, None
+        self.store.add(kind, block.line, state)
+
+    def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
+        """A straight move in parts, each with the feed of its larger radius."""
+        state, start, at = self.state, self.state.place.copy(), begin
+        parts = feeds.surface_parts(state, begin, end)
+        self.store.make_room(len(parts))
+        for part in parts:
+            there = begin + part * (end - begin)
+            state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
+            state.position[:] = target if part == 1.0 else start + part * (target - start)
+            state.actual, at = None, there
+            self.store.add(Kind.LINE, block.line, state)
+
+    def _arc(self, block: Block) -> None:
+        """G2, G3."""
+        state = self.state
+        target = moves.target(state, block)
+        feeds.check_feed(state, block)
+        if self.cutter is None and state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
+            )
+        try:
+            arc, normal = moves.arc(state, block, target)
+            if feeds.on_surface(state):
+                centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
+                size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
+                state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
+            feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
+            if self.cutter is not None:
+                self.cutter.arc(target, arc, block.line)
+        finally:
+            state.position[:] = target
+        if self.cutter is None:
+            self.store.add_arc(arc, normal, block.line, state)
+
+    def _spline(self, block: Block) -> None:
+        """A line of a spline; the curve is a block of its first line."""
+        state = self.state
+        if not is_spline_line(block):
+            return
+        if self.cutter is not None:
+            raise WordFault(
+                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
+            )
+        if state.actual is not None:
+            raise WordFault(
+                block.motion_word(),
+                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
+            )
+        state.series = None
+        if state.in_thread:
+            threads.stop(state, self.store, block.line)
+        found = self.splines.read(state, block, self.store.blocks)
+        if found is None:
+            return
+        self._take_default_feed(block)
+        feeds.check_feed(state, block)
+        (points, weights), line = found
+        state.position[:] = points[-1, -1]
+        self.store.add_spline(points, weights, line, state)
+
+
+def _gives_offsets(block: Block) -> bool:
+    """Whether the axis words are those of G43.1 or G43.2."""
+    return block.g.get("tool length") in (431, 432) and "motion" not in block.g

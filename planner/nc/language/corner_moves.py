@@ -28,17 +28,20 @@ class CornerMove:
 
     kind : one of KINDS
     size : R, or the number of the chamfer [mm]
+    line : where it stands
     """
 
     kind: str
     size: float
+    line: int
     first: Move | None = None
 
     def joined(self, second: Move, normal: int) -> tuple[list[Move], Move]:
         """The first move cut short with the corner behind it, and the second move cut short. Raises ValueError."""
         first = self.first
         assert first is not None
-        if first.stands(normal) or second.stands(normal):
+        rises = any(move.begin[normal] != move.end[normal] for move in (first, second))
+        if rises or first.stands(normal) or second.stands(normal):
             raise ValueError("a rounding or chamfer stands between two moves in the plane")
         corner, before, after = in_plane(first.end, normal), _leaving(first, normal), second.tangent(normal)
         turn = cmath.phase(after / before)

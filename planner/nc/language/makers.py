@@ -52,7 +52,7 @@ def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """A rounding or chamfer at the end of the next move: kind (index in corner_moves.KINDS) and size."""
     if given["size"] < 0.0:
         raise ValueError("a rounding or chamfer is not negative")
-    making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit)
+    making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit, making.line)
     return []
 
 
@@ -65,9 +65,9 @@ def direction(making: Making) -> complex:
         )
     store, normal = interpreter.store, interpreter.state.normal
     k = store.blocks - 1
-    if k < 1 or store.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):
+    if k < 0 or store.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):
         raise ValueError("CT goes on in the direction of the move before it, and there is none")
-    end, begin = store.block.end[k], store.block.end[k - 1]
+    end, begin = store.block.end[k], store.block.end[k - 1] if k else np.zeros(3)
     if store.block.kind[k] == Kind.ARC:
         _, centre, about, sweep = store.arcs[-1]
         spoke = in_plane(end, normal) - in_plane(centre, normal)
@@ -173,7 +173,7 @@ def bring_back(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     absolute, motion, feed = (making.shared[name] for name in _KEPT)
     if not absolute:
         yield [("G", 91.0)]
-    if 0.0 <= motion <= 3.0 and motion != making.interpreter.state.motion:
+    if motion in (0.0, 1.0) and motion != making.interpreter.state.motion:
         yield [("G", motion)]
     if given["feed"] and feed > 0.0:
         yield [("F", feed)]

@@ -4,9 +4,9 @@ Roughing divides the depth, less the allowance at the bottom, into equal passes;
 pocket from inside to outside up to the allowance at the walls. Finishing runs along the walls, which it meets and leaves on quarter
 circles, and clears the bottom in one pass.
 
-Manuals tell the dimensions, the passes and that pockets are cut from inside to outside; the single paths are this reader's own. Between
-two paths lie at most sqrt(2) tool radii: in a corner the paths are sqrt(2) times as far apart as along the walls, and what is more than
-two radii apart there would leave stock.
+Manuals tell the dimensions, the passes and that pockets are cut from inside to outside; the single paths are this reader's own. Two
+paths s apart have corners s sqrt(2) apart. A point between them on the diagonal, t inside the outer path, is t from its sides and
+(s - t) sqrt(2) from the inner corner; both are more than the tool's radius r somewhere if s > (1 + 1/sqrt(2)) r. So that is the most.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from planner.nc.language.making import Row, steps
 from planner.nc.pocket_shapes import Path, PocketLeg, PocketShape, loops
 
+CORNERS_CLEAR = 1.0 + math.sqrt(0.5)  # tool radii between two paths at most (module text)
 RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
 
 
@@ -76,7 +77,7 @@ def pocket_rows(shape: PocketShape, plan: PocketPlan, at: complex, angle: float)
     """The rows of a pocket whose zero is at a place, turned by an angle [degrees]. Raises ValueError."""
     plan.check()
     cut = _Cutting(plan, at, cmath.rect(1.0, math.radians(angle)) if angle else 1 + 0j)
-    step = min(plan.step or math.inf, math.sqrt(2.0) * plan.radius)
+    step = min(plan.step or math.inf, CORNERS_CLEAR * plan.radius)
     start, _ = shape.core()
     yield cut.rapid(z=max(plan.clear, plan.retract))
     yield cut.rapid(start)

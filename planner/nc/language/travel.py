@@ -13,17 +13,16 @@ With no frame and no compensation in force rows pass as they are. All lengths he
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import IN_PLANE, Arc, arc_from_centre, arc_from_radius
+from planner.nc.arcs import IN_PLANE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.approach import Approach, Departure
+from planner.nc.language.coordinates import Coordinates
 from planner.nc.language.corner_moves import CornerMove
-from planner.nc.language.frame_parts import FrameParts
 from planner.nc.language.offset_moves import OffsetMoves
 from planner.nc.language.travel_rows import AXES, CENTRES, TURNS, G, M, Move, TravelRow, words_of
 from planner.nc.language.tree import ProgramFault, SourcePlace
@@ -39,7 +38,7 @@ _NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0,
 _EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
-class Travel:
+class Travel(Coordinates):
     """The frame and the compensation in force.
 
     active : rows are looked at
@@ -49,16 +48,11 @@ class Travel:
     """
 
     def __init__(self, interpreter: Interpreter):
+        super().__init__()
         self.interpreter = interpreter
         self.active = False
         self.place = np.zeros(3)
         self.moves = 0
-        self.matrix, self.shift = np.eye(3), np.zeros(3)
-        self.programmed = (
-            np.eye(3),
-            np.zeros(3),
-        )  # of `frames`; a shift alone is a G52 and not in `matrix` and `shift`
-        self.parts = FrameParts()
         self._mapped = np.zeros(3)  # `place` in the work system
         self._beside = False  # the tool is not at `place`: compensation has just ended
         self._offset: OffsetMoves | None = None
@@ -66,15 +60,10 @@ class Travel:
         self._coming: CornerMove | None = None  # of the next move
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
         self._between: list[TravelRow] = []  # rows without a move behind it
-        self.absolute, self.motion, self._normal = True, 0, 2
+        self.absolute, self.motion = True, 0
         self._ahead: list[TravelRow] = []  # rows that come before the next ones
 
     # --- what commands ask and set ------------------------------------------------------------------------------------------
-
-    @property
-    def mirrored(self) -> bool:
-        """Whether the frame mirrors the plane."""
-        return self._plane_size() < 0.0
 
     @property
     def compensated(self) -> bool:
@@ -97,7 +86,7 @@ class Travel:
             raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
         self._begin()
         self.matrix, self.shift = matrix, shift
-        self.place = np.linalg.solve(matrix, self._mapped - shift)
+        self.place = self.unmapped(self._mapped)
 
     def compensate(self, side: int) -> None:
         """Switch compensation on, to the left (1) or right (-1) of the path, or off (0). Raises ValueError."""
@@ -126,7 +115,7 @@ class Travel:
             )
             return
         self._begin()
-        self._offset = OffsetMoves(self._mapped, radius, side, self._normal)
+        self._offset = OffsetMoves(self._mapped, radius, side, self.normal)
 
     def approach(self, approach: Approach) -> None:
         """APPR: the contour begins at a point; the way to it is known with its first move. Raises ValueError."""
@@ -134,17 +123,17 @@ class Travel:
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
         self._begin()
-        approach.begin(self._mapped, self._map(approach.first), self.motion, self.radius(), self.mirrored)
+        approach.begin(self._mapped, self.mapped(approach.first), self.motion, self.radius(), self.mirrored)
         approach.scale = self.scale()
         self._approach = approach
-        self.place, self._mapped = approach.first.copy(), self._map(approach.first)
+        self.place, self._mapped = approach.first.copy(), self.mapped(approach.first)
 
-    def corner(self, kind: str, size: float) -> None:
+    def corner(self, kind: str, size: float, line: int) -> None:
         """A rounding or chamfer at the end of the next move, of a size in mm. Raises ValueError."""
         if self._coming is not None:
             raise ValueError("a second rounding or chamfer before the next move")
         self._begin()
-        self._coming = CornerMove(kind, size * self.scale())
+        self._coming = CornerMove(kind, size * self.scale(), line)
 
     def depart(self, departure: Departure) -> None:
         """DEP: leave the contour; compensation is off behind it. Raises ValueError."""
@@ -154,17 +143,12 @@ class Travel:
         offset, self._offset = self._offset, None
         rows = offset.finish()
         departure.scale = self.scale()
-        end = None if departure.end is None else self._map(departure.end)
+        end = None if departure.end is None else self.mapped(departure.end)
         out, there = departure.rows(offset, end)
         self._ahead += [self._in_units(row) for row in (*rows, *out)]
         self._mapped, self._beside = there, False
-        self.place = np.linalg.solve(self.matrix, there - self.shift)
+        self.place = self.unmapped(there)
         self.motion = 1
-
-    def scale(self) -> float:
-        """By what the frame multiplies lengths in the plane. Raises ValueError where it does so unevenly."""
-        self._check_even()
-        return math.sqrt(abs(self._plane_size()))
 
     # --- rows -----------------------------------------------------------------------------------------------------------------
 
@@ -205,6 +189,8 @@ class Travel:
     def end(self) -> list[TravelRow]:
         """What is left to execute when the program has ended without M2 or M30. Raises ValueError."""
         self._no_corner()
+        if self._approach is not None:
+            raise ValueError("APPR is followed by no contour")
         if self._offset is not None:
             self._leave()
         return self._taken()
@@ -226,9 +212,9 @@ class Travel:
         for code in codes & {0.0, 1.0, 2.0, 3.0}:
             self.motion = int(code)
         for code in own & _PLANES.keys():
-            if self.compensated and _PLANES[code] != self._normal:
+            if self.compensated and _PLANES[code] != self.normal:
                 raise ValueError("the plane changes while cutter radius compensation is on")
-            self._normal = _PLANES[code]
+            self.normal = _PLANES[code]
         if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")
         moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
@@ -259,6 +245,8 @@ class Travel:
 
     def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
         """A row without a move."""
+        if last and self._approach is not None:
+            raise ValueError("APPR is followed by no contour")
         if self._corner is not None:
             if last:
                 self._no_corner()
@@ -275,35 +263,31 @@ class Travel:
         out += [self._in_units(one) for one in self._offset.pass_row(row)]
 
     def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
-        given = {letter: value * self._unit for letter, value, _ in row.words if letter != G}
+        given = {
+            letter: value * (1.0 if letter == TURNS else self._unit)
+            for letter, value, _ in row.words
+            if letter != G
+        }
         target = self.place.copy()
         for axis, letter in enumerate(AXES):
             if letter in given:
                 target[axis] = given[letter] + (0.0 if self.absolute else self.place[axis])
-        arc = self._arc(given, target) if self.motion in (2, 3) else None
-        mapped = self._map(target)
-        turned = None
-        if arc is not None:
-            self._check_even()
-            turned = Arc(self._map(arc.centre), -arc.sweep if self.mirrored else arc.sweep)
+        mapped, arc = self.mapped(target), None
+        if self.motion in (2, 3):
+            arc = self.arc(self.place, target, given, self.motion == 2, self._unit)
         axes = [a for a in range(3) if any(AXES[b] in given and self.matrix[a, b] != 0.0 for b in range(3))]
-        if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self._normal])):
-            axes = sorted({*axes, *IN_PLANE[self._normal]})
-        if set(axes) & set(IN_PLANE[self._normal]):
+        if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self.normal])):
+            axes = sorted({*axes, *IN_PLANE[self.normal]})
+        if set(axes) & set(IN_PLANE[self.normal]):
             self._beside = False
-        rest = [
-            word
-            for word in row.words
-            if not (word[0] == G and word[1] <= 3.0)
-            and word[0] not in (*AXES, *CENTRES, _RADIUS)
-            and not (arc is not None and word[0] == TURNS)
-        ]
+        rest = _other_words(row, arc is not None)
         at = row.words[0][2]
-        move = Move(TravelRow(rest, row.line, row.frame), at, self.motion, self._mapped, mapped, axes, turned)
+        code = self.motion if arc is None else 3 if arc.sweep > 0 else 2
+        move = Move(TravelRow(rest, row.line, row.frame), at, code, self._mapped, mapped, axes, arc)
         self.place, self._mapped = target, mapped
         self.moves += 1
         if self._corner is not None:
-            (one, *between), move = self._corner.joined(move, self._normal)
+            (one, *between), move = self._corner.joined(move, self.normal)
             self._corner, waiting, self._between = None, self._between, []
             self._go(one, out)
             for row in waiting:
@@ -322,56 +306,28 @@ class Travel:
         if self._approach is not None:
             rows, self._offset = self._approach.rows(move)
             self._approach = None
-        rows += move.rows(self._normal) if self._offset is None else self._offset.move(move)
+        rows += move.rows(self.normal) if self._offset is None else self._offset.move(move)
         out += [self._in_units(one) for one in rows]
-
-    def _arc(self, given: dict[int, float], target: FloatArray) -> Arc:
-        turns = round(given.get(TURNS, self._unit) / self._unit)
-        clockwise = self.motion == 2
-        if _RADIUS in given:
-            return arc_from_radius(
-                self.place, target, given[_RADIUS], normal=self._normal, clockwise=clockwise, turns=turns, unit=self._unit
-            )  # fmt: skip
-        centre = self.place + np.array([given.get(letter, 0.0) for letter in CENTRES])
-        return arc_from_centre(
-            self.place, target, centre, normal=self._normal, clockwise=clockwise, turns=turns, unit=self._unit
-        )
 
     # --- inside -------------------------------------------------------------------------------------------------------------
 
     def _no_corner(self) -> None:
-        if self._corner is not None or self._coming is not None:
-            raise ValueError("a rounding or chamfer needs a move behind it")
+        waits = self._corner or self._coming
+        if waits is not None:
+            raise ValueError(
+                f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind it"
+            )
 
     @property
     def _unit(self) -> float:
         return self.interpreter.state.unit
-
-    def _map(self, point: FloatArray) -> FloatArray:
-        return self.matrix @ point + self.shift
-
-    def _plane_size(self) -> float:
-        plane = list(IN_PLANE[self._normal])
-        return float(np.linalg.det(self.matrix[np.ix_(plane, plane)]))
-
-    def _check_even(self) -> None:
-        """Arcs stay arcs. Raises ValueError."""
-        plane = list(IN_PLANE[self._normal])
-        inner = self.matrix[np.ix_(plane, plane)]
-        even = inner.T @ inner
-        size = abs(self._plane_size())
-        off = max(abs(even - size * np.eye(2)).max(), abs(self.matrix[self._normal, plane]).max())
-        if max(off, abs(self.matrix[plane, self._normal]).max()) > _EVEN * max(size, 1.0):
-            raise ValueError(
-                "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
-            )
 
     def _begin(self) -> None:
         """Look at rows from now on."""
         if self.active:
             return
         state = self.interpreter.state
-        self.active, self.absolute, self._normal = True, state.absolute, state.normal
+        self.active, self.absolute, self.normal = True, state.absolute, state.normal
         self.motion = max(state.motion, 0) if state.motion <= 3 else 0
         if state.absolute_centre:
             raise ValueError("frames and compensation with absolute arc centres are not read")
@@ -382,7 +338,7 @@ class Travel:
     def _look(self) -> None:
         """Ask the interpreter for the position."""
         self._mapped = self.interpreter.state.programmed().copy()
-        self.place = np.linalg.solve(self.matrix, self._mapped - self.shift)
+        self.place = self.unmapped(self._mapped)
         self._beside = False
 
     def _leave(self) -> None:
@@ -393,23 +349,19 @@ class Travel:
         self._beside = offset.started
 
     def _idle(self) -> bool:
-        return not (
-            self.compensated
-            or self._beside
-            or self._coming
-            or self._corner
-            or self.shift.any()
-            or (self.matrix != np.eye(3)).any()
-        )
+        """Whether rows may pass as they are; not while a motion code that was turned round (G2, G3) may count behind."""
+        waits = self.compensated or self._beside or self._coming is not None or self._corner is not None
+        turned = self.motion in (2, 3) and self.motion != self.interpreter.state.motion
+        return self.is_plain and not (waits or turned)
 
     def _restored(self, words: Words) -> list[TravelRow]:
         """Rows that bring back G91 and the motion code, where rows behind them count on them."""
         if not len(words.line):
             return []
         at, line, frame = int(words.at[0]), int(words.line[0]), int(words.frame[0])
-        codes = ([] if self.absolute else [91.0]) + (
-            [float(self.motion)] if self.motion != self.interpreter.state.motion else []
-        )
+        codes = [] if self.absolute else [91.0]
+        if self.motion in (0, 1) and self.motion != self.interpreter.state.motion:
+            codes.append(float(self.motion))
         return [TravelRow([(G, code, at)], line, frame) for code in codes]
 
     def _in_units(self, row: TravelRow) -> TravelRow:
@@ -420,3 +372,9 @@ class Travel:
         return TravelRow(
             [(c, v / self._unit if c in lengths else v, at) for c, v, at in row.words], row.line, row.frame
         )
+
+
+def _other_words(row: TravelRow, arc: bool) -> list[tuple[int, float, int]]:
+    """The words of a row beside its motion code, coordinates and centre."""
+    own = (*AXES, *CENTRES, _RADIUS, *((TURNS,) if arc else ()))
+    return [word for word in row.words if not (word[0] == G and word[1] <= 3.0) and word[0] not in own]

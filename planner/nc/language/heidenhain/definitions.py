@@ -20,6 +20,7 @@ from planner.nc.language.tree import (
     Message,
     Number,
     Parameter,
+    Return,
     Statement,
 )
 
@@ -45,9 +46,12 @@ class Definitions(Flow):
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         at = block.place.at
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        return [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+        rows: list[Statement] = [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+        return [*rows, looked_up(block)] if self.file else rows
 
     def _end(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        if self.file:
+            return [Return(block.place)]
         return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
 
     def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:

@@ -19,7 +19,6 @@ POSITION = {"X": X, "Y": Y, "Z": Z}
 POLE = own("cx"), own("cy")
 DIRECTION = own("dx"), own("dy")
 POLAR = own("pr"), own("pa")
-CORNER = own("px"), own("py")  # of a rounding or chamfer
 
 
 @dataclass

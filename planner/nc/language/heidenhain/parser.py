@@ -15,11 +15,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
 from planner.nc.language.heidenhain.definitions import Definitions
-from planner.nc.language.heidenhain.flow import procedure_name
+from planner.nc.language.heidenhain.flow import called_file, procedure_name
 from planner.nc.language.heidenhain.items import (
-    CORNER,
     POLAR,
     POLE,
     Items,
@@ -32,12 +32,14 @@ from planner.nc.language.heidenhain.items import (
     refuse_arc_axes,
     word,
 )
-from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, plus, value
+from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
     ZERO,
+    Call,
     Expression,
     Line,
+    Made,
     Number,
     Parameter,
     Procedure,
@@ -48,12 +50,13 @@ from planner.nc.language.tree import (
 )
 
 _FUNCTION = re.compile(
-    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
+    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
     r"PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
 _TILTED = (128, 129, 144)  # M codes that follow or leave the tilt of the tool
+_MOVES = ("L", "LP", "C", "CR", "CT", "CP")  # that RND and CHF may follow
 _AT_END = (2, 30)  # M codes that end the program
 
 
@@ -62,7 +65,7 @@ class HeidenhainParser(Definitions):
 
     def __init__(self, source: Source):
         super().__init__()
-        self.source = source
+        self.source, self.file = source, source.file
         self.faults: list[ProgramFault] = []
         self.skip = False  # the block was read with the one before
         self.compensates = False  # a block of the program has RL, RR, APPR or DEP
@@ -72,7 +75,8 @@ class HeidenhainParser(Definitions):
         self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
         self.compensates = any(compensates(block.text) for block in self.blocks)
-        start = SourcePlace(self.source.file, 1, self.source.begin)
+        source = self.source
+        start = SourcePlace(source.file, 1, source.begin)
         main = self._body(0, len(self.blocks))
         procedures = []
         done: set[int] = set()
@@ -83,18 +87,19 @@ class HeidenhainParser(Definitions):
                     first = self.known[label]
                     procedures.append(
                         Procedure(
-                            procedure_name(label),
+                            procedure_name(label, source.file),
                             self.blocks[first].place,
                             self._body(first, self._end_of(first), True),
                         )
                     )
         set_up: list[tuple[Parameter, Expression]] = [
-            (one, ZERO) for one in (X, Y, Z, *POLE, *POLAR, *CORNER)
+            (own(f"rep{source.file}_{k}"), ZERO) for k in range(self.repeats)
         ]
-        set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")] + [
-            (own(f"rep{k}"), ZERO) for k in range(self.repeats)
-        ]
-        return [Procedure("", start, [Line(start, (), tuple(set_up)), *main]), *procedures]
+        if not source.file:
+            set_up += [(one, ZERO) for one in (X, Y, Z, *POLE, *POLAR)]
+            set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")]
+        name = "file" if source.file else ""
+        return [Procedure(name, start, [Line(start, (), tuple(set_up)), *main]), *procedures]
 
     # --- labels -----------------------------------------------------------------------------------------------------------------
 
@@ -147,9 +152,20 @@ class HeidenhainParser(Definitions):
             raise block.fault(
                 f"{name or block.text[:20]} of the conversational language is not read; {_REMEDY}"
             )
-        if name in ("L", "LP"):
-            return self._straight(k, last, found.end(), name)
-        return read(self, block, found.end())
+        if name not in _MOVES:
+            return read(self, block, found.end())
+        corner = self._corner(k + 1, last)
+        self.skip = bool(corner)
+        return [*corner, *read(self, block, found.end())]
+
+    def _call_program(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        """CALL PGM name: a file of the program's folder; its units end with it."""
+        name = called_file(block.text[column:])
+        if not name:
+            raise block.fault("CALL PGM is followed by the name of a program", column)
+        units = word("G", block.place.at, Number(21.0 if self.unit == 1.0 else 20.0))
+        called = Call(block.place, name, None, block.text[column:].strip())
+        return [called, Line(block.place, (units,)), looked_up(block)]
 
     def _nothing(self, block: ConversationalBlock, column: int) -> list[Statement]:
         return []
@@ -161,34 +177,25 @@ class HeidenhainParser(Definitions):
             raise block.fault("polar coordinates belong to LP and CP")
         return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
-    def _straight(self, k: int, last: int, column: int, name: str) -> list[Statement]:
-        block = self.blocks[k]
+    def _straight(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
         before, after, machine = self._codes(block, given)
         lines: list[Statement] = [*before, *self._side(block, given)]
-        if name == "LP":
+        if block.text[:column].upper() == "LP":
             found, ends = self.moves.polar_ends(block, given)
             lines += found
         else:
             ends = self._ends(block, given)
-        corner = self._corner(k + 1, last) if name == "L" and not machine else None
-        if corner is not None:
-            lines += self.moves.cut_corner(block, given, ends, corner, self._after(k + 2, last, corner[0]))
-            self.skip = True
-        else:
-            lines += self.moves.straight(block, given, ends, machine)
+        lines += self.moves.straight(block, given, ends, machine)
         return [*lines, *([looked_up(block)] if machine else []), *after]
 
-    def _corner(self, k: int, last: int) -> tuple[ConversationalBlock, Expression, bool] | None:
-        """RND or CHF in block k, with its number."""
-        if k >= last:
-            return None
-        block = self.blocks[k]
-        found = re.match(r"(RND|CHF)\b", block.text, re.IGNORECASE)
+    def _corner(self, k: int, last: int) -> list[Statement]:
+        """RND or CHF in block k, which the move before it ends with."""
+        found = re.match(r"(RND|CHF)\b", self.blocks[k].text, re.IGNORECASE) if k < last else None
         if found is None:
-            return None
+            return []
+        block, column = self.blocks[k], found.end()
         rounded = found.group().upper() == "RND"
-        column = found.end()
         if rounded and (radius := re.match(r"\s*R(?=\s*[-+.\dQ])", block.text[column:], re.IGNORECASE)):
             column += radius.end()
         number, column = value(block, column)
@@ -196,22 +203,11 @@ class HeidenhainParser(Definitions):
             raise block.fault(
                 "nothing may follow the number of RND and CHF; write the feed into the next block", column
             )
-        return block, number, rounded
-
-    def _after(self, k: int, last: int, corner: ConversationalBlock) -> dict[str, Expression]:
-        """Where the straight move behind a corner leads."""
-        block = self.blocks[k] if k < last else corner
-        found = _FUNCTION.match(block.text)
-        if found is None or found.group().upper() != "L":
-            raise corner.fault("RND and CHF stand between two straight moves (L); write other corners out")
-        given = items(block, found.end())
-        place = {"X": CORNER[0], "Y": CORNER[1], "Z": Z}
-        return {
-            axis: plus(place[axis], end) if relative else end for axis, (end, relative) in given.axes.items()
-        }
+        kind = Number(float(CORNERS.index("RND" if rounded else "CHR")))
+        return [Made(block.place, "corner", (("kind", kind), ("size", number)))]
 
     def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        raise block.fault("RND and CHF stand between two straight moves (L); write other corners out")
+        raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
 
     def _arc(self, block: ConversationalBlock, column: int) -> list[Statement]:
         name = block.text[:column].upper()
@@ -266,6 +262,8 @@ class HeidenhainParser(Definitions):
                 )
             elif code in (89, 92, *_TILTED):
                 raise block.fault(f"M{code} is not read: it changes how the axes move; {_REMEDY}", column)
+            elif code in _AT_END and self.file:
+                after.append(Return(block.place))
             elif code in (0, 1, 5, 9, *_AT_END):
                 after.append(row)
             else:
@@ -303,7 +301,7 @@ _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Sta
         ("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing
     ),
     "TOOL CALL": HeidenhainParser._tool,
-    **dict.fromkeys(("L", "LP"), HeidenhainParser._nothing),
+    **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
     **dict.fromkeys(("C", "CR", "CT", "CP"), HeidenhainParser._arc),
     **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
     "TRANS DATUM": HeidenhainParser._datum,
@@ -311,6 +309,7 @@ _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Sta
     **dict.fromkeys(("RND", "CHF"), HeidenhainParser._lonely_corner),
     "LBL": HeidenhainParser._label_here,
     "CALL LBL": HeidenhainParser._call,
+    "CALL PGM": HeidenhainParser._call_program,
     "Q": HeidenhainParser._parameter,
     "FN": HeidenhainParser._fn,
     **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), HeidenhainParser._define),

@@ -31,6 +31,6 @@ IDLE = frozenset((
 IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "SPOS", "LIMS"))
 # Commands that tilt or bend the coordinates.
 REFUSED = (
-    "ROTS", "AROTS", "CROTS", "TRAORI", "TRANSMIT", "TRACYL",
+    "ROTS", "AROTS", "CROTS", "TRAORI", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
 )  # fmt: skip
 REMEDY = "let the CAM system write the moves out"

@@ -35,6 +35,7 @@ from planner.nc.language.tree import (
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _COMPENSATES = re.compile(rb"G4[12]\b")
+_TARGETS = re.compile(rb"(?:GOTO[BFC]?|REPEATB?)\s+N(\d{1,9})\b", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
@@ -78,6 +79,8 @@ class SiemensParser(BlockWords):
         same = np.isin(letter, [ord(c) for c in codes.PLAIN_LETTERS])
         same &= (letter != ord("G")) | np.isin(value, codes.SAME_CODES)
         same &= (letter != ord("M")) | ~np.isin(value, codes.RETURNS if self.source.file else (17,))
+        targets = [int(label) for label in _TARGETS.findall(words.data)]
+        same &= ~((letter == ord("N")) & np.isin(value, targets))
         found = np.unique(np.searchsorted(words.first, np.flatnonzero(~same), side="right") - 1)
         return [int(row) for row in found if letter[words.first[row]] != ord("%")]
 
@@ -129,12 +132,21 @@ class SiemensParser(BlockWords):
         if text.lstrip().startswith("/"):
             at = text.index("/") + 1  # the lexer has left out skipped lines
         number = _NUMBER.match(text, at)
+        labels = []
         if number:
             at = number.end()
-            self._label(f"N{int(number.group(1))}", line.place)
+            labels.append(f"N{int(number.group(1))}")
         while label := _LABEL.match(text, at):
-            self._label(label.group(1).upper(), line.place)
+            labels.append(label.group(1).upper())
             at = label.end()
+        for name in labels:
+            self._label(name, line.place)
+        body, first = self.body, len(self.body)
+        self._statement(text, at, line)
+        if self.body is body:
+            self.lines.update((name, body[first:]) for name in labels)
+
+    def _statement(self, text: str, at: int, line: SourceLine) -> None:
         reader = TokenReader(" " * at + text[at:], line.place, line.start, self.names)
         if reader.ended:
             return
@@ -166,6 +178,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
     "FOR": SiemensParser._for,
     "ENDFOR": SiemensParser._end_for,
     "REPEAT": SiemensParser._repeat,
+    "REPEATB": SiemensParser._repeat_block,
     "UNTIL": SiemensParser._until,
     **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
     **dict.fromkeys((*SIEMENS, *(f"A{name}" for name in SIEMENS)), SiemensParser._frame),

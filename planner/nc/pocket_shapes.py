@@ -47,6 +47,9 @@ class PocketShape(Protocol):
     def core(self) -> Path:
         """What is left at the distance `room`; no legs for a point."""
 
+    def to_wall(self) -> list[PocketLeg]:
+        """From the start of the core to where a straight leg to the start of a loop stays inside."""
+
 
 @dataclass(frozen=True)
 class RoundedRectangle:
@@ -84,6 +87,10 @@ class RoundedRectangle:
         if turning < 0:
             legs = [PocketLeg(leg.end.conjugate(), leg.centre.conjugate(), -leg.turning) for leg in legs]
         return start, legs
+
+    def to_wall(self) -> list[PocketLeg]:
+        """None: every straight leg stays inside."""
+        return []
 
     def core(self) -> Path:
         """From the middle to the one end and to the other."""
@@ -124,7 +131,11 @@ class ArcSlot:
             PocketLeg(outer * far, 0j, way),
             PocketLeg(start, self.radius * far, way),
         ]
-        return (start, legs) if turning == way else (start, _backwards(start, legs))
+        return (start, legs) if turning == way else (start, backwards(start, legs))
+
+    def to_wall(self) -> list[PocketLeg]:
+        """Along the arc to the far end."""
+        return self.core()[1]
 
     def core(self) -> Path:
         """Along the arc."""
@@ -132,7 +143,8 @@ class ArcSlot:
         return near, [PocketLeg(far, 0j, 1 if self.sweep > 0 else -1)]
 
 
-def _backwards(start: complex, legs: list[PocketLeg]) -> list[PocketLeg]:
+def backwards(start: complex, legs: list[PocketLeg]) -> list[PocketLeg]:
+    """The legs from their end to the start."""
     ends = [start, *(leg.end for leg in legs)]
     return [
         PocketLeg(end, leg.centre, -leg.turning)

@@ -76,6 +76,8 @@ class Coordinates:
         Raises ValueError for one that does not close.
         """
         self.check_even()
+        if _RADIUS not in given and not set(CENTRES) & set(given):
+            raise ValueError("an arc needs a centre or a radius")
         how = {"normal": self.normal, "clockwise": clockwise, "turns": round(given.get(TURNS, 1.0))}
         if _RADIUS in given:
             arc = arc_from_radius(start, end, given[_RADIUS], unit=unit, **how)  # type: ignore[arg-type]

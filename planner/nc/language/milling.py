@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner.nc.language.making import Row, steps
-from planner.nc.pocket_shapes import Path, PocketLeg, PocketShape, loops
+from planner.nc.pocket_shapes import Path, PocketLeg, PocketShape, backwards, loops
 
 CORNERS_CLEAR = 1.0 + math.sqrt(0.5)  # tool radii between two paths at most (module text)
 RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
@@ -84,15 +84,13 @@ def pocket_rows(shape: PocketShape, plan: PocketPlan, at: complex, angle: float)
     yield cut.rapid(z=plan.clear)
     if plan.rough:
         paths = loops(shape, plan.radius + plan.side, step, plan.turning)
-        yield from _passes(cut, paths, plan.bottom + plan.floor, plan.infeed, plan.feed)
+        yield from _passes(cut, shape, paths, plan.bottom + plan.floor, plan.infeed, plan.feed)
     if plan.walls:
-        path = _wall(shape, plan)
-        yield from _passes(
-            cut, [(start, []), path], plan.bottom, plan.finish_infeed, plan.finish_feed, between=False
-        )
+        paths = [(start, shape.to_wall()), _wall(shape, plan)]
+        yield from _passes(cut, shape, paths, plan.bottom, plan.finish_infeed, plan.finish_feed)
     if plan.base:
         paths = loops(shape, plan.radius, step, plan.turning)
-        yield from _passes(cut, paths, plan.bottom, 0.0, plan.finish_feed)
+        yield from _passes(cut, shape, paths, plan.bottom, 0.0, plan.finish_feed)
     yield cut.rapid(z=max(plan.clear, plan.retract))
 
 
@@ -168,10 +166,12 @@ class _Cutting:
 
 
 def _passes(
-    cut: _Cutting, paths: list[Path], bottom: float, infeed: float, feed: float, *, between: bool = True
+    cut: _Cutting, shape: PocketShape, paths: list[Path], bottom: float, infeed: float, feed: float
 ) -> Iterator[Row]:
-    """Passes of equal depth down to the bottom, each along all paths; `between`: back to the start at its end, else up as well."""
+    """Passes of equal depth down to the bottom, each along all paths and back to the start, and up at the end."""
     plan, start = cut.plan, paths[0][0]
+    out = shape.to_wall()
+    back = backwards(start, out)
     count = steps(plan.top - bottom, infeed)
     begin = plan.clear
     yield cut.rapid(z=plan.clear)
@@ -183,6 +183,7 @@ def _passes(
             if legs:
                 yield cut.line(feed, first)
             yield from cut.legs(first, legs, feed)
-        yield cut.line(feed, start)
+        yield cut.line(feed, out[-1].end if out else start)
+        yield from cut.legs(out[-1].end if out else start, back, feed)
         begin = z
     yield cut.rapid(z=plan.clear)

@@ -70,7 +70,7 @@ def test_an_inner_corner_is_cut_at_the_intersection() -> None:
 
 
 def test_what_the_tool_cannot_follow_is_refused_with_its_line() -> None:
-    with pytest.raises(InputError, match="<text>:7:1: .*gouge"):
+    with pytest.raises(InputError, match=r"<text>:7:1: .*gouge"):
         read("L X-20 Y+0 FMAX\nL X+0 Y+0 RL F500\nL X+5\nL Y+5\nL X+0\nL Y+20\nL Y+40 R0")
     for body, said in (
         ("L X+5 Y+5 RL F500\nL X+9 RR", "the side of compensation changes"),
@@ -81,7 +81,7 @@ def test_what_the_tool_cannot_follow_is_refused_with_its_line() -> None:
         ("DEP LT LEN5", "DEP without a contour"),
         ("APPR CT X+1 Y+1 R5 RL", "APPR CT needs its angle"),
         ("APPR PLT PR+1 PA+1 LEN5 RL", "with polar coordinates, is not read"),
-        ("L X+5 Y+5 FMAX\nAPPR LCT X+4 Y+5 R50 RL F100\nL X+9", "inside the arc"),
+        ("L X+4 Y+20 FMAX\nAPPR LCT X+4 Y+5 R50 RL F100\nL X+9", "inside the arc"),
         ("APPR LT X+1 Y+1 LEN5 RL F100", "APPR is followed by no contour"),
     ):
         with pytest.raises(InputError, match=said):
@@ -157,7 +157,8 @@ def test_without_a_tool_in_the_machine_file_nothing_is_compensated_and_it_is_sai
 def test_roundings_beside_arcs_are_tangent_to_both(compensated: bool) -> None:
     side = "RL" if compensated else "R0"
     program = read(
-        f"L X-30 Y+0 FMAX\nL X+0 Y+0 {side} F500\nL Y+20\nRND R6\nCC X+20 Y+25\nC X+20 Y+45.615528128 DR-\nRND R7\nL X+60 Y+10\nL X+90 R0"
+        f"L X-30 Y+0 FMAX\nL X+0 Y+0 {side} F500\nL Y+20\nRND R6\nCC X+20 Y+25\n"
+        "C X+20 Y+45.615528128 DR-\nRND R7\nL X+60 Y+10\nL X+90 R0"
     )
     points, block = sampled(program, 0.01)
     way = np.diff(points[block > 1, :2], axis=0)

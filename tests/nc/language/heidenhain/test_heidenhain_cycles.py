@@ -160,7 +160,7 @@ def test_cycles_that_make_no_sense_are_refused(cycle: str, said: str) -> None:
 
 def test_a_pocket_needs_the_diameter_of_its_tool() -> None:
     text = f"0 BEGIN PGM T MM\nTOOL CALL 7 Z S1000\nCYCL DEF {RECTANGLE}\n{START}\nCYCL CALL\nEND PGM T MM\n"
-    with pytest.raises(InputError, match="<text>:6:1: .*the diameter of tool 7"):
+    with pytest.raises(InputError, match=r"<text>:6:1: .*the diameter of tool 7"):
         read_twice(text, MILL, HEIDENHAIN)
 
 
@@ -193,7 +193,8 @@ def test_called_programs(tmp_path: Path) -> None:
     (tmp_path / "PART.H").write_text(
         "0 BEGIN PGM PART INCH\n1 L X+1 F+100\n2 CALL LBL 1\n3 Q5 = Q5 + 1\n4 M2\n5 LBL 1\n6 L IY+1\n7 LBL 0\n8 END PGM PART INCH\n"
     )
-    main = "0 BEGIN PGM M MM\nL X+0 Y+0 FMAX\nCALL PGM TNC:\\\\nc\\\\Part.h\nCALL LBL 1\nCALL PGM part\nL X+Q5\nM30\nLBL 1\nL IX+3\nLBL 0\nEND PGM M MM\n"
+    main = "0 BEGIN PGM M MM\nL X+0 Y+0 FMAX\nCALL PGM TNC:\\\\nc\\\\Part.h\nCALL LBL 1\n"
+    main += "CALL PGM part\nL X+Q5\nM30\nLBL 1\nL IX+3\nLBL 0\nEND PGM M MM\n"
     (tmp_path / "main.h").write_text(main)
     found = read_program(tmp_path / "main.h")
     np.testing.assert_allclose(

@@ -130,16 +130,18 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
 
 def plan_on_path(job: Job, settings: Settings) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered."""
-    best, made, prices = time_optimal(job, settings), None, None
-    if best.solution.solved:
-        with job.stage("solve"):
-            best, motion = within_limits(best, settings.order, job.toolpath, job.machine, job.tell)
+    found, made, prices = [time_optimal(job, settings)], None, None
+    if found[0].solution.solved:
+        with job.stage("solve"):  # which lets go of what is found: a third of a kilobyte a point
+            best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
         made = _delivered(job, motion, () if settings.order.jerk_limited else ("jerk",))
         if settings.order.jerk_limited:
             with job.stage("report"):
                 prices = prices_of(best, job.machine)
+    else:
+        best = found.pop()
     return plan_of_solution(job, best, made, method=settings.method, corner=settings.corner, prices=prices)
 
 

@@ -124,7 +124,8 @@ class Approach(Way):
     compensated: bool = True
 
     def begin(self, start: FloatArray, first: FloatArray, motion: int, radius: float, mirrored: bool) -> None:
-        """Where the tool is (3,), the first point (3,) in the work system, the motion code in force, the tool's radius."""
+        """What is in force: where the tool is, `start` (3,), and the `first` point (3,) in the work system, the `motion` code, the
+        `radius` of the tool [mm], and whether the frame is `mirrored`."""
         self._start, self._first = start.copy(), first.copy()
         self._motion = min(motion, 1)
         self._radius = radius if self.compensated else 0.0

@@ -10,9 +10,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, Arc, arc_from_centre, arc_from_radius
 from planner.nc.language.frame_parts import FrameParts
-from planner.nc.language.travel_rows import CENTRES, TURNS
+from planner.nc.language.travel_rows import CENTRES, RADIUS, TURNS
 
-_RADIUS = ord("R")
 _EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
@@ -76,11 +75,11 @@ class Coordinates:
         Raises ValueError for one that does not close.
         """
         self.check_even()
-        if _RADIUS not in given and not set(CENTRES) & set(given):
+        if RADIUS not in given and not set(CENTRES) & set(given):
             raise ValueError("an arc needs a centre or a radius")
         how = {"normal": self.normal, "clockwise": clockwise, "turns": round(given.get(TURNS, 1.0))}
-        if _RADIUS in given:
-            arc = arc_from_radius(start, end, given[_RADIUS], unit=unit, **how)  # type: ignore[arg-type]
+        if RADIUS in given:
+            arc = arc_from_radius(start, end, given[RADIUS], unit=unit, **how)  # type: ignore[arg-type]
         else:
             centre = start + np.array([given.get(letter, 0.0) for letter in CENTRES])
             arc = arc_from_centre(start, end, centre, unit=unit, **how)  # type: ignore[arg-type]

@@ -1,7 +1,8 @@
 """A rounding or chamfer between two moves of a contour.
 
 The rounding of radius R touches both moves: its centre lies on both, moved by R to the side to which the contour turns
-(`cutter.meeting`), and each move ends or begins at the foot of the centre on it. A chamfer is cut between straight moves only; it lies
+(`offset_lines.meeting`), and each move ends or begins at the foot of the centre on it. A chamfer is cut between straight moves only; it
+lies
 
     CHR    the given distance from the corner on both moves
     CHF    such that it is itself as long as given: length / (2 cos(turn / 2)) from the corner on both
@@ -15,8 +16,8 @@ from dataclasses import dataclass, replace
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, Arc
-from planner.nc.cutter import OffsetMove, meeting
 from planner.nc.language.travel_rows import STANDS, Move, TravelRow, at_place, in_plane
+from planner.nc.offset_lines import OffsetMove, meeting
 
 KINDS = ("RND", "CHR", "CHF")
 _STRAIGHT_ON = 1e-6  # turn below which there is no corner [rad]

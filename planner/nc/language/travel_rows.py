@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from planner.nc.lexer import Words
 
 G, M = ord("G"), ord("M")
 AXES, CENTRES = (ord("X"), ord("Y"), ord("Z")), (ord("I"), ord("J"), ord("K"))
-TURNS = ord("P")
+TURNS, RADIUS = ord("P"), ord("R")
 STANDS = 1e-9  # a move that is shorter stays where it is [mm]
 _STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
 
@@ -111,3 +111,19 @@ def at_place(place: complex, others: FloatArray, normal: int) -> FloatArray:
     a, b = IN_PLANE[normal]
     point[a], point[b] = place.real, place.imag
     return point
+
+
+def rows_of(words: Words) -> Iterator[TravelRow]:
+    """The rows of words that the interpreter would take."""
+    letter, value, at, first = (
+        column.tolist() for column in (words.letter, words.value, words.at, words.first)
+    )
+    for row, (line, frame) in enumerate(zip(words.line.tolist(), words.frame.tolist(), strict=True)):
+        span = slice(first[row], first[row + 1])
+        yield TravelRow(list(zip(letter[span], value[span], at[span], strict=True)), line, frame)
+
+
+def other_words(row: TravelRow, *, arc: bool) -> list[tuple[int, float, int]]:
+    """The words of a row beside its motion code, coordinates and centre."""
+    own = (*AXES, *CENTRES, RADIUS, *((TURNS,) if arc else ()))
+    return [word for word in row.words if not (word[0] == G and word[1] <= 3.0) and word[0] not in own]

@@ -6,6 +6,8 @@ variables of the running program, since coordinates may be computed and incremen
 CT's centre lies on the normal n of the direction at the start, at
 
     radius = |v|^2 / (2 n v),      v from start to end; positive to the left, where the arc turns counter-clockwise.
+
+Behind CR, whose centre is not computed here, the direction is that of the moves that were executed (`makers.tangent_arc`).
 """
 
 from __future__ import annotations
@@ -36,7 +38,9 @@ from planner.nc.language.tree import (
     TWO,
     ZERO,
     Expression,
+    If,
     Line,
+    Made,
     Number,
     Parameter,
     Statement,
@@ -151,7 +155,15 @@ class Moves:
         left = of("GT", radius, ZERO)
         turn = own("turn")
         third = Line(block.place, (), ((turn, minus(times(TWO, left), ONE)),))
-        return [first, second, third, self._arc(block, given, ends, plus(TWO, left), centre, turn)]
+        known: list[Statement] = [
+            first, second, third, self._arc(block, given, ends, plus(TWO, left), centre, turn)
+        ]  # fmt: skip
+        words = [(chr(one.letter), one.value) for one in self.feed_words(block, given)]
+        assigned: list[tuple[Parameter, Expression]] = [(POSITION[axis], end) for axis, end in ends.items()]
+        looked: list[Statement] = [
+            Made(block.place, "tangent arc", (*ends.items(), *words)), Line(block.place, (), tuple(assigned))
+        ]  # fmt: skip
+        return [If(block.place, ((of("EQ", length, ZERO), looked),), known)]
 
     def polar_ends(
         self, block: ConversationalBlock, given: Items

@@ -71,6 +71,9 @@ def test_tangent_arcs_go_on_in_the_direction_before() -> None:
     found = read("L X+0 Y+0 FMAX\nL X+10 F500\nCT X+20 Y+10\nCT X+30 Y+20\nL Y+30")
     np.testing.assert_allclose(found.arc_center[:, :2], [[10, 10], [30, 10]], atol=1e-9)
     np.testing.assert_allclose(found.arc_sweep, [np.pi / 2, -np.pi / 2], atol=1e-9)
+    found = read("L X+0 Y+0 FMAX\nCR X+10 Y+10 R+10 DR+ F500\nCT X+0 Y+20\nCT X-10 Y+10")
+    np.testing.assert_allclose(found.arc_center[:, :2], [[0, 10]] * 3, atol=1e-9)
+    np.testing.assert_allclose(found.arc_sweep, np.pi / 2, atol=1e-9)
 
 
 @pytest.mark.parametrize("turn", [30.0, 90.0, 150.0, -60.0])

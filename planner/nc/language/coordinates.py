@@ -51,7 +51,8 @@ class Coordinates:
 
     def unmapped(self, point: FloatArray) -> FloatArray:
         """(3,) the point of the program that is there."""
-        return np.linalg.solve(self.matrix, point - self.shift)
+        found: FloatArray = np.linalg.solve(self.matrix, point - self.shift).astype(np.float64)
+        return found
 
     def check_even(self) -> None:
         """Arcs stay arcs. Raises ValueError."""

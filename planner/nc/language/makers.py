@@ -74,7 +74,7 @@ def direction(making: Making) -> complex:
         way = spoke * (1j if sweep > 0 else -1j) * (1.0 if about == normal else 0.0)
     else:
         way = in_plane(end, normal) - in_plane(begin, normal)
-    back = np.linalg.solve(travel.matrix, at_place(way, np.zeros(3), normal))
+    back = travel.unmapped(at_place(way, np.zeros(3), normal) + travel.shift)
     found = in_plane(back, normal)
     if abs(found) == 0.0:
         raise ValueError("CT goes on in the direction of the move before it, which is not in the plane")

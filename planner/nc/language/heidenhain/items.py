@@ -11,7 +11,8 @@ from planner.nc.language.tree import Expression, Line, Number, Numbered, Word
 
 _ITEM = re.compile(
     r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
-    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+))",
+    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
+    r"(?P<ahead>LA)(?=\s*\d))",
     re.IGNORECASE,
 )
 X, Y, Z = own("x"), own("y"), own("z")
@@ -74,6 +75,8 @@ def items(block: ConversationalBlock, column: int) -> Items:
             found.radius, column = value(block, column)
         elif item["fast"]:
             found.fast, found.automatic = item["fast"].upper() == "MAX", item["fast"].upper() == "AUTO"
+        elif item["ahead"]:  # of M120, blocks that the control looks ahead
+            _, column = value(block, column)
         elif item["unit"]:
             raise block.fault(
                 f"{item['unit'].upper()}, a feed per tooth, turn or time, is not read; write F in mm/min", at

@@ -1,13 +1,14 @@
 """A conversational program as statements.
 
-    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP RND CHF    LBL, CALL LBL [REP]    Q1 = formula, FN 0-14
-    CYCL DEF 1 200 201 203 240 7 (datum shift) 9 (dwell) 32 (tolerance)    CYCL CALL [POS], M99    STOP, M codes
+    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP RND CHF    LBL, CALL LBL [REP], CALL PGM    Q1 = formula, FN 0-14
+    RL RR R0, APPR, DEP (`contour`)    CYCL DEF 7 8 10 11 26, TRANS DATUM (`contour`)    9 (dwell) 32 (tolerance)
+    CYCL DEF 1 200 201 240 (`drilling`) 202 to 209, 251 to 254 (`cycles`) 220 221 (`patterns`)    CYCL CALL [POS], M99    STOP, M codes
 
 LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
 LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.
 
-Refused with their block: radius compensation, PLANE and M128 (tilted axes), tapping, milling and measuring cycles, M89, polar
-coordinates without a pole, texts and QS parameters.
+Refused with their block: PLANE and M128 (tilted axes), LN, free contours (FK), APPR and DEP with polar coordinates, other cycles, M89
+and other M codes that change moves, polar coordinates without a pole, texts and QS parameters.
 """
 
 from __future__ import annotations
@@ -51,11 +52,13 @@ from planner.nc.language.tree import (
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
-    r"PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
+    r"PLANE RESET|RND|CHF|LN|LP|CP|CC|CR|CT|C|L|"
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
-_TILTED = (128, 129, 144)  # M codes that follow or leave the tilt of the tool
+# M codes that follow or leave the tilt of the tool; small steps and open corners of contours; feeds of plunging and per turn; M140
+# retracts the tool.
+_REFUSED = (89, 92, 97, 98, 103, 114, 115, 128, 129, 136, 140, 144)
 _MOVES = ("L", "LP", "C", "CR", "CT", "CP")  # that RND and CHF may follow
 _AT_END = (2, 30)  # M codes that end the program
 
@@ -149,8 +152,9 @@ class HeidenhainParser(Definitions):
         name = " ".join(found.group().upper().split()) if found else ""
         read = _READ.get(name)
         if found is None or read is None:
+            why = f" ({_WHY[name]})" if name in _WHY else ""
             raise block.fault(
-                f"{name or block.text[:20]} of the conversational language is not read; {_REMEDY}"
+                f"{name or block.text[:20]} of the conversational language is not read{why}; {_REMEDY}"
             )
         if name not in _MOVES:
             return read(self, block, found.end())
@@ -260,7 +264,7 @@ class HeidenhainParser(Definitions):
                         (word("M", block.byte(column), spindle), word("M", block.byte(column), Number(8.0))),
                     )
                 )
-            elif code in (89, 92, *_TILTED):
+            elif code in _REFUSED:
                 raise block.fault(f"M{code} is not read: it changes how the axes move; {_REMEDY}", column)
             elif code in _AT_END and self.file:
                 after.append(Return(block.place))
@@ -294,6 +298,13 @@ class HeidenhainParser(Definitions):
 
 
 _REMEDY = "let the CAM system write the moves out as L, C and CC"
+_WHY = {
+    "LN": "moves with a normal of the surface need compensation in space, or axes that turn",
+    **dict.fromkeys(
+        ("FL", "FLT", "FC", "FCT", "FPOL", "FSELECT"), "free contours (FK) are completed by the control"
+    ),
+    **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
+}
 _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Statement]]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,

@@ -19,7 +19,7 @@ from planner.nc.language.heidenhain.text import (
     quotient,
     times,
 )
-from planner.nc.language.tree import ONE, TWO, ZERO, Expression, If, Line, Loop, Number, Statement
+from planner.nc.language.tree import ONE, TWO, ZERO, Expression, If, Line, Loop, Named, Number, Statement
 
 PATTERNS = (220, 221)
 _TURN, _WHOLE = Number(360.0), Number(1e-9)
@@ -53,7 +53,7 @@ def pattern(block: ConversationalBlock, cycle: int, called: list[Statement]) -> 
     ]
 
 
-def _circle(n: Expression) -> tuple[list[tuple], tuple[Expression, Expression]]:  # type: ignore[type-arg]
+def _circle(n: Expression) -> tuple[list[tuple[Named, Expression]], tuple[Expression, Expression]]:
     step, angle = own("step"), own("angle")
     opening, more = minus(parameter(246), parameter(245)), minus(parameter(241), ONE)
     whole = of("GE", of("ABS", opening), _TURN)
@@ -70,7 +70,7 @@ def _circle(n: Expression) -> tuple[list[tuple], tuple[Expression, Expression]]:
     )
 
 
-def _lines(n: Expression) -> tuple[list[tuple], tuple[Expression, Expression]]:  # type: ignore[type-arg]
+def _lines(n: Expression) -> tuple[list[tuple[Named, Expression]], tuple[Expression, Expression]]:
     line, column, odd = own("line"), own("column"), own("odd")
     before = [
         (line, of("INT", plus(quotient(n, parameter(242)), _WHOLE))),

@@ -194,6 +194,12 @@ def test_tolerance_datum_shift_and_inches() -> None:
         ("L X+1 F100 M128", "<text>:2:12: .*M128 is not read"),
         ("CYCL DEF 256 STUD", "<text>:2:.*cycle 256 is not read"),
         ("APPR LT X+1", "<text>:2:1: .*APPR LT needs its length"),
+        (
+            "LN X+1 NX+0 NY+0 NZ+1 F100",
+            "<text>:2:1: .*LN of the conversational language is not read .*normal",
+        ),
+        ("FL X+1 AN+30", "FL of the conversational .*free contours"),
+        ("L X+1 F100 M103 F20", "M103 is not read"),
         ("C X+1 Y+1", "direction: DR"),
         ("RND R3", "stand behind a move"),
         ("L X+1 F100\nRND R3\nCC X+1 Y+1", "rounding or chamfer of line 3 needs"),

@@ -5,7 +5,7 @@
     language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
                REPEATB label P=n
     commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 82 83 (`drilling`), CYCLE84 to 89, 840,
-               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that do not move anything (`codes.IDLE`)
+               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`codes.IDLE`)
 
 Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line, for AC and IC.
 

@@ -68,7 +68,7 @@ from planner.smoothing.spline_path import SplineShape, with_spline
 # A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
 # than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
 QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
-# Of a round, at first and at least (smoothing/joint.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
+# Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
 # same time within 1e-4.
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
 # Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of it [-].
@@ -250,6 +250,14 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
 
 def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
     """The motion on the first splines, the grids, and the resolution of the one that it is on."""
+    spans, effort = len(path.spline.spans), settings.effort  # a grid has a point for each span at least
+    if settings.rounds is None and spans > effort.work and effort.grids(spans) is effort.sizes[-1]:
+        grids = effort.sizes[-1]
+        return (
+            dataclasses.replace(settings.order.solve(path, job, grids.final), shape=shape),
+            grids,
+            grids.final,
+        )
     grids, samples = grids_for(path, job, settings)
     reshaped_at_all = settings.effort.work >= len(samples) if settings.rounds is None else settings.rounds > 0
     resolution = grids.rounds if reshaped_at_all else grids.final

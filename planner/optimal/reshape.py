@@ -1,10 +1,10 @@
 """A round of reshaping: splines and the motion along them are improved together, within the tolerance.
 
 Along the time-optimal motion of the present path all limits are linearised in the control points and in the time that every part of it
-takes; smoothing/joint.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem is
-then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of the
-promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
-order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+takes; smoothing/combined.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem
+is then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of
+the promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
+order, shape and feed satisfy the optimality conditions of the combined problem, minimum time inside the tolerance.
 
 What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the parameter of the spline is
 kept as a function of time, a small change of the control points changes the optimal time by
@@ -32,11 +32,12 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE, ORDER
+from planner.smoothing.combined import MotionLimits, improve
 from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
-from planner.smoothing.joint import MotionLimits, improve
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
+DEAR = 0.95  # of what the tolerance costs: the runs on which a wider one is solved for [-]
 PRICED = 100_000  # points of the grid whose prices are made at a time: half a kilobyte each
 FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
@@ -121,10 +122,27 @@ def _bounds(planned: OnPath, on: Array) -> FloatArray:
 Bands = tuple[FloatArray, FloatArray]
 
 
-def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0) -> FloatArray:
+def dear_runs(planned: OnPath, price: FloatArray) -> Array:
+    """(Q,) True for the runs, the dearest first, that together have `DEAR` of what the tolerance costs.
+
+    price : (J,) at every site, from `corridor_prices` [s/mm]
+    """
+    first = _shape(planned).splines.site_first
+    of_run = np.bincount(np.repeat(np.arange(len(first) - 1), np.diff(first)), -price, len(first) - 1)
+    order = np.argsort(-of_run, kind="stable")
+    before = np.cumsum(of_run[order]) - of_run[order]
+    dear = np.zeros(len(of_run), dtype=bool)
+    dear[order[before < DEAR * of_run.sum()]] = True
+    return dear
+
+
+def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0, on: Array | None = None) -> FloatArray:
     """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a corridor wider by `more` [mm], in a round from the present
-    shape, with its `price_bands`."""
+    shape, with its `price_bands`; only on some of the runs (Q,), where `on` says which, and 0 on the others."""
     shape, (H, Q) = _shape(planned), bands
+    if on is not None:
+        fits = shape.splines.fits & on
+        shape = dataclasses.replace(shape, splines=shape.splines._replace(fits=fits))
     corridor = shape.corridor
     corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
     goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))

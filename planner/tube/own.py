@@ -22,6 +22,7 @@ from planner.tube.interior_point import Tuning, solve
 from planner.tube.motion import Steps, closed, integrated
 from planner.tube.nlp import PULL
 from planner.tube.outcome import TubeSolution
+from planner.tube.price import columns, step_prices
 from planner.tube.problem import Window, window_of
 from planner.tube.rows import Legs
 from planner.tube.run import TubeRun
@@ -71,6 +72,7 @@ class TubeOwn:
             steps=search.steps(),
             place=search.places(),
             kept=search.kept,
+            price=search.price,
         )
 
 
@@ -81,6 +83,7 @@ class _Search:
         self.settings, self.run, self.guess = settings, run, guess
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
+        self.price = np.zeros((len(guess), columns(len(run.axis))))
         self.iterations = 0
         self._keeps = keeps_of(run)
         self._strain = _strain(run, guess)
@@ -129,9 +132,10 @@ class _Search:
             window = window_of(self.run, self.guess, lo, hi)
             x, u, place = window.x, window.u, window.place
             tuning = Tuning(PULL, prox, self.settings.gap)
-            done, iterations = solve(window.legs, window.limits, x, u, place, tuning)
+            done, iterations, z = solve(window.legs, window.limits, x, u, place, tuning)
             self.iterations += iterations
             if done and self._taken(lo, hi, window):
+                self.price[lo:hi] = step_prices(window, z)
                 return True
         return False
 

@@ -28,7 +28,7 @@ from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
-from planner.nc.state import REFUSED_MOTION, Setup, set_units, system_name
+from planner.nc.state import REFUSED_MOTION, Setup, State, set_units, system_name
 from planner.nc.store import Store
 
 
@@ -65,6 +65,11 @@ class Interpreter:
         self._note_units()
         self._end_compensation()
         return self.store.finish(self.source, self.notes, frames, self.reading)
+
+    def go_on_with(self, state: State, store: Store) -> None:
+        """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
+        self.state = self.mover.state = state
+        self.store = self.mover.store = store
 
     def _end_compensation(self) -> None:
         """Settle the last move, if the program just ends while compensation is on."""

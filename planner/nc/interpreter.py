@@ -82,6 +82,11 @@ class Interpreter:
         self._end_compensation()
         return self.store.finish(self.source, self.notes, frames, self.reading)
 
+    def go_on_with(self, state: State, store: Store) -> None:
+        """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
+        self.state = self.mover.state = state
+        self.store = self.mover.store = store
+
     def _end_compensation(self) -> None:
         """Settle the last move, if the program just ends while compensation is on."""
         if self.mover.cutter is None or self._words is None:

@@ -20,6 +20,7 @@ from planner.nc.language.fanuc.lathe import LatheParser
 from planner.nc.language.fanuc.lathe_words import LatheAsked
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
+from planner.nc.language.heidenhain.flow import files as heidenhain_files
 from planner.nc.language.heidenhain.parser import HeidenhainParser
 from planner.nc.language.linuxcnc import text as linuxcnc_text
 from planner.nc.language.linuxcnc.parser import LinuxcncParser
@@ -93,7 +94,7 @@ _FRONTS = {
     ),
     FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
     LATHE: _Front(fanuc_text.LANGUAGE, LatheAsked, LatheParser, fanuc_files),
-    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
+    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, heidenhain_files),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, siemens_files),
 }
 

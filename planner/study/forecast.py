@@ -5,8 +5,8 @@ over a limit, so that a straight line there foretells a change to r L as
 
     T(r L) - T(L)  =  p (1 - 1/r),
 
-for r < 1 at least that much. For r > 1 what 10 % more saves is known, and more of it saves ever less where another limit takes over, for
-which the simplest curve through both is taken: with x = 1 - 1/r and d = 1 - 1/1.1
+for r < 1 at least that much. For r > 1 what 10 % more saves is known, and more of it saves ever less where another limit takes over,
+for which the simplest curve through both is taken: with x = 1 - 1/r and d = 1 - 1/1.1
 
     saved(x)  =  x saved(d)/d (1 + c d) / (1 + c x),      c >= 0 such that its slope at 0 is -p where that is the larger one.
 

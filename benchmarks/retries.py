@@ -37,7 +37,7 @@ from planner.job.trace import Trace
 from planner.machine import Fir, Machine, Mode
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
-from planner.optimal import behind_filters, geometry, loop, shaped
+from planner.optimal import behind_filters, geometry, loop, reshape, shaped
 from planner.smoothing import initial, relax
 
 JOBS, FILTERED, FILTERED_JOBS = 300, 3, 60
@@ -116,6 +116,11 @@ SWITCHES: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
     "sites tightened more than twice": (
         ("first shape: runs tightened more", "reshaped: runs tightened more"),
         _set(relax, "ROUNDS", 3),
+    ),
+    "windows around tightened sites in a round": (("reshaped: runs relaxed",), _set(reshape, "AGAIN", 0)),
+    "windows around tightened sites for a second time": (
+        ("reshaped: runs relaxed",),
+        _set(reshape, "AGAIN", 1),
     ),
     "second start of a window": (("windows: start",), _first_starts(1)),
     "third start of a window": (("windows: start 3",), _first_starts(2)),

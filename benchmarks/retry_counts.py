@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from planner.feedrate.jerk import chain, piece, window
+from planner.feedrate.jerk import chain, part, window
 from planner.optimal import reshape
 from planner.smoothing import initial, relax, spline_path
 
@@ -57,7 +57,7 @@ def watch() -> None:
     _around(window.ScaledWindow, "_from", _tried)
     _around(window.ScaledWindow, "_tracked", _tracked)
     _around(chain.Chain, "_unfelt", _unfelt)
-    _around(piece.Piece, "_join", _joined)
+    _around(part.Part, "_join", _joined)
 
 
 def _around(owner: Any, name: str, wrapper: Callable[..., Any]) -> None:

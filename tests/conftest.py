@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         weight[item.path] += SLOW if item.get_closest_marker("slow") else 1
     items.sort(key=lambda item: -weight[item.path])  # stable: the tests of a file stay together and in order
+
+
+@pytest.fixture
+def threads_as_before() -> Iterator[None]:
+    """What a test says of threads ends with it."""
+    from planner.base.threads import use_threads
+
+    yield
+    use_threads(None)
 
 
 @pytest.fixture(scope="session")

@@ -1,14 +1,17 @@
-"""Curves: those of the papers, exact circles, and random waves."""
+"""Curves: those of the papers, exact circles, and random waves; and a machine that hardly limits what moves along them."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.geometry.nurbs import Nurbs
+from planner.machine import Machine
 
 CURVES = json.loads((Path(__file__).parents[1] / "benchmarks" / "curves.json").read_text(encoding="utf-8"))
 
@@ -44,3 +47,8 @@ def wave(seed: int, axes: int = 2, points: int = 12, step: float = 4.0, sway: fl
     where[:, 0] += step * np.arange(points)
     knots = np.concatenate([np.zeros(3), np.linspace(0, 1, points - 2), np.ones(3)])
     return Nurbs(degree=3, points=where, knots=knots, weights=rng.uniform(0.5, 2.0, points))
+
+
+def strong(**more: Any) -> Machine:
+    """A machine whose limits are above what filters ask for."""
+    return problems.machine(velocity=1e3, acceleration=1e5, jerk=1e8, **more)

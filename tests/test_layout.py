@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import defaultdict
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
@@ -39,8 +40,11 @@ def test_files_are_short_and_use_public_names() -> None:
 
 def test_file_names_are_used_once() -> None:
     """pytest imports test files by their name alone."""
-    names = [file.name for file in FILES if file.name != "conftest.py"]
-    assert sorted(names) == sorted(set(names))
+    places = defaultdict(list)
+    for file in FILES:
+        if file.name != "conftest.py":
+            places[file.name].append(str(file.relative_to(TESTS)))
+    assert not [where for where in places.values() if len(where) > 1]
 
 
 def private_names(tree: ast.Module) -> set[str]:

@@ -22,7 +22,7 @@ PARTS = {
 # Words beside them, which are no parts of a path.
 BESIDE = {
     "block": "one command of the NC program that moves the machine or lets it wait; it has a line number",
-    "joint": "where two segments meet: a full stop, a smooth passage or a corner",
+    "joint": "where two segments meet: a full stop, a smooth passage or a corner; those of `JointLimit` are a machine's",
     "corner": "a joint at which the direction changes and the motion does not stop; also the curve that rounds it",
     "vertex": "the programmed point of a corner",
     "chain": "legs, or links, one after the other, with the joints or vertices between them",
@@ -30,7 +30,7 @@ BESIDE = {
     "guide": "what FIR filters are led along: the legs of the program, or the fine chords of a smooth path (`fir/guide.py`)",
     "chord": "the straight line between two points of a curve: what the machine runs between two samples, or "
     "a line that stands for part of an arc",
-    "joint step": "a step of path and feed together, with all limits linearised (`smoothing/joint.py`); no joint of the path",
+    "combined step": "a step of path and feed together, with all limits linearised (`smoothing/combined.py`)",
     "piece": "a part of a motion, in time: each axis has constant jerk in it; of a feedrate problem, the grid points of one run; "
     "of a programmed curve, one rational cubic (`nc/bezier.py`)",
     "velocity pulse": "a leg of a guide, or some of it, that is commanded at one speed (`fir/command.py`); "

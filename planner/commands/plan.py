@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,6 +35,11 @@ from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import Reading
 
+if TYPE_CHECKING:
+    from planner.job.plan import Plan
+
+INTO_OUTPUT = "into the output directory: name one with -o DIR"
+IN_OUTPUT = "in the output directory: name one with -o DIR"
 NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 
 
@@ -94,38 +99,36 @@ def plan_command(
     reading: Reading,
 ) -> None:
     """Plan the motion of a program, sample it and verify it; of several ones side by side, each into DIR/NAME."""
-    if plot and output is None:
-        raise InputError("--plot writes its pictures into the output directory: name one with -o DIR")
-    if report and output is None:
-        raise InputError("--report writes its page into the output directory: name one with -o DIR")
-    if file_format is not None and output is None:
-        raise InputError(
-            "--format is the format of the trajectory in the output directory: name one with -o DIR"
-        )
-    for why, ignored in (
-        ("--corners adds to the table, and --json prints none", corners and as_json),
-        ("--verbose tells what --quiet keeps quiet", verbose and quiet),
-        ("--force is for files, and without -o or --trace there are none", force and not (output or trace)),
+    nowhere = output is None
+    for wrong, why in (
+        (plot and nowhere, f"--plot writes its pictures {INTO_OUTPUT}"),
+        (report and nowhere, f"--report writes its page {INTO_OUTPUT}"),
+        (file_format is not None and nowhere, f"--format is the format of the trajectory {IN_OUTPUT}"),
+        (corners and as_json, "--corners adds to the table, and --json prints none; leave one out"),
+        (verbose and quiet, "--verbose tells what --quiet keeps quiet; leave one out"),
+        (
+            force and nowhere and trace is None,
+            "--force is for files, and without -o or --trace there are none; leave one out",
+        ),
     ):
-        if ignored:
-            raise InputError(f"{why}; leave one out")
+        if wrong:
+            raise InputError(why)
+    how: dict[str, Any] = {
+        "geometry": geometry,
+        "corner": corner,
+        "effort": effort,
+        "rounds": rounds,
+        "solver": solver,
+        "shaped": shaped,
+    }
     if len(jobs) > 1:
-        one_by_one = {"--trace": trace, "--verbose": verbose, "--corners": corners}
-        for name, value in one_by_one.items():
+        for name, value in {"--trace": trace, "--verbose": verbose, "--corners": corners}.items():
             if value:
                 raise InputError(f"{name} is for one program; {len(jobs)} are given")
         from planner.commands.many import plan_many
         from planner.methods.registry import check_settings
 
-        check_settings(
-            method,
-            geometry=geometry,
-            corner=corner,
-            effort=effort,
-            rounds=rounds,
-            solver=solver,
-            shaped=shaped,
-        )
+        check_settings(method, **how)
         handed_on = given_options(context, ("output", "threads", "quiet", "as_json"))
         code = plan_many(jobs, handed_on, output, threads=threads, quiet=quiet, as_json=as_json)
         if code:
@@ -162,16 +165,11 @@ def plan_command(
             job,
             machine or DEFAULT_MACHINE,
             method=method,
-            geometry=geometry,
-            corner=corner,
-            effort=effort,
-            rounds=rounds,
-            solver=solver,
-            shaped=shaped,
             tolerance=tolerance,
             reading=reading,
             progress=progress,
             log=log,
+            **how,
         )
         written: list[str] = []
         if output is not None and result.trajectory is not None:
@@ -188,11 +186,7 @@ def plan_command(
     if as_json:
         say(json.dumps(said, indent=2, allow_nan=False))
     else:
-        from planner.report.tables import corners_table, plan_table
-
-        show(plan_table(result, said["notes"]))
-        if corners:
-            show("", (corners_table(result.corners) if result.corners is not None else None) or NO_CORNERS)
+        _show(result, said["notes"], corners=corners)
         for name in written:
             say(str(output / name) if output else name)
     if result.trajectory is None:
@@ -200,3 +194,11 @@ def plan_command(
         raise NotSolvedError(f"{result.sentence}{kept}")
     if result.verdict is None or not result.verdict.passed:
         raise typer.Exit(FAILED)
+
+
+def _show(result: Plan, notes: list[str], *, corners: bool) -> None:
+    from planner.report.tables import corners_table, plan_table
+
+    show(plan_table(result, notes))
+    if corners:
+        show("", (corners_table(result.corners) if result.corners is not None else None) or NO_CORNERS)

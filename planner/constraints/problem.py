@@ -25,7 +25,6 @@ and machine stay what they are. (`margin` cannot say it: it is of the accelerati
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -66,7 +65,8 @@ class FeedrateProblem:
     own_least             : (3, own) their least bounds of velocity, acceleration and jerk on the path, in units of their own; inf
                             where they bound nothing
 
-    Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in them.
+    Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in them and are made when they
+    are asked for: of a long job there are several problems, and these take 7 bytes in 10 of what one has of its own.
     """
 
     piece: Array
@@ -132,17 +132,17 @@ class FeedrateProblem:
     def __len__(self) -> int:
         return len(self.s)
 
-    @cached_property
+    @property
     def feed_sq_limit(self) -> FloatArray:
         """(P,) largest x at each point [mm2/s2]."""
         return self.feed_sq_max / self.limit_scale**2
 
-    @cached_property
+    @property
     def acceleration_limit(self) -> FloatArray:
         """(P, A) axis accelerations at each point, without the margin [mm/s2]."""
         return self._here(0, self.acceleration / self.limit_scale[:, None] ** 2)
 
-    @cached_property
+    @property
     def jerk_limit(self) -> FloatArray:
         """(P, A) axis jerks at each point [mm/s3]."""
         return self._here(1, self.jerk / self.limit_scale[:, None] ** 3)

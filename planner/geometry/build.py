@@ -11,6 +11,7 @@ the motion goes on as at smooth joints, in exact stop mode too; where the spline
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,8 +53,6 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         raise InputError("the program has no move", source=program.source)
     _check_coordinates(program)
     position = np.vstack([program.start, program.end])
-    arc_of_block = np.full(len(program), -1, dtype=np.int64)
-    arc_of_block[program.arc_block] = np.arange(len(program.arc_block))
     chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
     moves = np.isin(program.kind, MOVES)
     of_block = np.full(len(program), tolerance) if tolerance is not None else program.tolerance
@@ -68,45 +67,27 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     if not len(block):
         raise InputError("the program moves nowhere: every move ends where it starts", source=program.source)
 
-    start, end = position[block], position[block + 1]
-    is_curve = program.kind[block] == Kind.SPLINE
-    start[is_curve], end[is_curve] = splines.ends[:, 0, 0], splines.ends[:, 1, 0]
-    arc_row = arc_of_block[block]
-    is_arc = arc_row >= 0
-    rows = arc_row[is_arc]
-    arcs, arc_length = _arcs(program, start[is_arc], end[is_arc], rows)
-    arc = np.full(len(block), -1, dtype=np.int64)
-    arc[is_arc] = np.arange(len(rows))
-    length = chord[block].copy()
-    length[is_arc], length[is_curve] = arc_length, splines.length
-    tangent_start, tangent_end = _tangents(start, end, length, arc, arcs)
-    tangent_start[is_curve], tangent_end[is_curve] = splines.ends[:, 0, 1], splines.ends[:, 1, 1]
-    curvature = np.zeros(len(block))
-    curvature[is_arc] = _curvature_bound(arcs)
-    curvature[is_curve] = np.where(splines.chord, 0.0, splines.curvature)
-    curve = np.full(len(block), -1, dtype=np.int64)
-    curve[is_curve] = np.where(splines.chord, -1, np.arange(len(splines.length)))
-
+    laid = _laid(program, splines, block)
     theta = np.zeros(len(block) + 1)
-    theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
+    theta[1:-1] = turning_angle(laid.tangent_end[:-1], laid.tangent_start[1:])
     joint, dwell = _joints(program, machine, block, theta)
     toolpath = Toolpath(
         source=program.source,
         axes=axes,
-        start=start[:, axis],
-        end=end[:, axis],
-        length=length,
+        start=laid.start[:, axis],
+        end=laid.end[:, axis],
+        length=laid.length,
         feed=_feeds(program, machine, block),
         rapid=program.kind[block] == Kind.RAPID,
         block=block,
         line=program.line[block],
-        arc=arc,
-        arcs=_of_axes(arcs, axis),
-        curve=curve,
+        arc=laid.arc,
+        arcs=_of_axes(laid.arcs, axis),
+        curve=laid.curve,
         curves=dataclasses.replace(splines.curves, points=splines.curves.points[:, :, axis]),
-        tangent_start=tangent_start[:, axis],
-        tangent_end=tangent_end[:, axis],
-        curvature=curvature,
+        tangent_start=laid.tangent_start[:, axis],
+        tangent_end=laid.tangent_end[:, axis],
+        curvature=laid.curvature,
         joint=joint,
         theta=theta,
         tolerance=of_block[np.append(block[:1], block)],
@@ -116,6 +97,46 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     )
     require_room(toolpath, machine)
     return toolpath
+
+
+class _Laid(NamedTuple):
+    """Lines, arcs and curves of N segments, in all A axes of the program."""
+
+    start: FloatArray  # (N, A) [mm]
+    end: FloatArray  # (N, A) [mm]
+    length: FloatArray  # (N,) [mm]
+    tangent_start: FloatArray  # (N, A)
+    tangent_end: FloatArray  # (N, A)
+    curvature: FloatArray  # (N,) at most [1/mm]
+    arc: Array  # (N,) row of `arcs`, -1 of others
+    arcs: Arcs
+    curve: Array  # (N,) row of the curves, -1 of others
+
+
+def _laid(program: Program, splines: CurveSegments, block: Array) -> _Laid:
+    """The segments of the blocks (N,)."""
+    position = np.vstack([program.start, program.end])
+    arc_of_block = np.full(len(program), -1, dtype=np.int64)
+    arc_of_block[program.arc_block] = np.arange(len(program.arc_block))
+    start, end = position[block], position[block + 1]
+    is_curve = program.kind[block] == Kind.SPLINE
+    start[is_curve], end[is_curve] = splines.ends[:, 0, 0], splines.ends[:, 1, 0]
+    arc_row = arc_of_block[block]
+    is_arc = arc_row >= 0
+    rows = arc_row[is_arc]
+    arcs, arc_length = _arcs(program, start[is_arc], end[is_arc], rows)
+    arc = np.full(len(block), -1, dtype=np.int64)
+    arc[is_arc] = np.arange(len(rows))
+    length = np.linalg.norm(position[block + 1] - position[block], axis=1)
+    length[is_arc], length[is_curve] = arc_length, splines.length
+    tangent_start, tangent_end = _tangents(start, end, length, arc, arcs)
+    tangent_start[is_curve], tangent_end[is_curve] = splines.ends[:, 0, 1], splines.ends[:, 1, 1]
+    curvature = np.zeros(len(block))
+    curvature[is_arc] = _curvature_bound(arcs)
+    curvature[is_curve] = np.where(splines.chord, 0.0, splines.curvature)
+    curve = np.full(len(block), -1, dtype=np.int64)
+    curve[is_curve] = np.where(splines.chord, -1, np.arange(len(splines.length)))
+    return _Laid(start, end, length, tangent_start, tangent_end, curvature, arc, arcs, curve)
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:

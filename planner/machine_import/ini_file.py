@@ -7,7 +7,6 @@ include others, keys that stand twice (the first counts in LinuxCNC, the last in
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,14 +64,14 @@ def read_ini(
     first_counts: bool,
     saved_mark: str,
     indented_goes_on: bool,
-    included: Callable[[str], str | None],
+    included: re.Pattern[str],
 ) -> IniFile:
     """Read settings, and those of the files that they include, which are looked for beside the file that names them.
 
     first_counts : whether the first of two equal keys counts, or the last
     saved_mark   : what stands before lines that the control wrote itself, such as "#*#"; "" for none
     indented_goes_on : whether an indented line belongs to the value above it
-    included     : the file that a line includes, a name or a pattern; None for other lines
+    included     : of lines that include a file; its first group is a name or a pattern
 
     Raises InputError for a file that is not there, and for more than `INCLUDES_MAX` files.
     """
@@ -85,9 +84,9 @@ def read_ini(
             line = raw
             if saved_mark and line.startswith(saved_mark):
                 line = line[len(saved_mark) :].lstrip(" ")
-            name = included(line)
-            if name is not None:
-                found = _files(name, source, number)
+            includes = included.match(line)
+            if includes:
+                found = _files(includes.group(1), source, number)
                 files += len(found)
                 if files > INCLUDES_MAX:
                     raise InputError(

@@ -27,7 +27,7 @@ def settings(text: str, source: str) -> ControlSettings:
     """The settings of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y and z, and for numbers that
     cannot be read."""
     config = read_ini(
-        text, source, first_counts=False, saved_mark="#*#", indented_goes_on=True, included=_included
+        text, source, first_counts=False, saved_mark="#*#", indented_goes_on=True, included=_INCLUDE
     )
     kinematics = config.text("printer", "kinematics")
     if kinematics is not None and kinematics.lower() not in _PER_AXIS:
@@ -60,8 +60,3 @@ def settings(text: str, source: str) -> ControlSettings:
         modes=tuple(modes),
         notes=tuple(notes),
     )
-
-
-def _included(line: str) -> str | None:
-    found = _INCLUDE.match(line)
-    return found.group(1) if found else None

@@ -29,7 +29,7 @@ def recognised(text: str) -> bool:
 
 def settings(text: str, source: str) -> ControlSettings:
     """The settings of an INI file. Raises InputError for units and numbers that cannot be read."""
-    ini = read_ini(text, source, first_counts=True, saved_mark="", indented_goes_on=False, included=_included)
+    ini = read_ini(text, source, first_counts=True, saved_mark="", indented_goes_on=False, included=_INCLUDE)
     unit = _unit(ini, source)
     letters = _letters(ini)
     trivial = re.match(r"\s*trivkins", ini.text("KINS", "KINEMATICS") or "trivkins") is not None
@@ -70,11 +70,6 @@ def _limits(
         if found:
             limits[letter] = found
     return limits
-
-
-def _included(line: str) -> str | None:
-    found = _INCLUDE.match(line)
-    return found.group(1) if found else None
 
 
 def _unit(ini: IniFile, source: str) -> float:

@@ -68,7 +68,7 @@ from planner.smoothing.spline_path import SplineShape, with_spline
 # A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
 # than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
 QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
-# Of a round, at first and at least (smoothing/joint.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
+# Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
 # same time within 1e-4.
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
 # Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of it [-].
@@ -130,16 +130,18 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
 
 def plan_on_path(job: Job, settings: Settings) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered."""
-    best, made, prices = time_optimal(job, settings), None, None
-    if best.solution.solved:
-        with job.stage("solve"):
-            best, motion = within_limits(best, settings.order, job.toolpath, job.machine, job.tell)
+    found, made, prices = [time_optimal(job, settings)], None, None
+    if found[0].solution.solved:
+        with job.stage("solve"):  # which lets go of what is found: a third of a kilobyte a point
+            best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
         made = _delivered(job, motion, () if settings.order.jerk_limited else ("jerk",))
         if settings.order.jerk_limited:
             with job.stage("report"):
                 prices = prices_of(best, job.machine)
+    else:
+        best = found.pop()
     return plan_of_solution(job, best, made, method=settings.method, corner=settings.corner, prices=prices)
 
 

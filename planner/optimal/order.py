@@ -20,6 +20,7 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.changed import Known, solve_changed
 from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.grid import add_switching_points, refine_for_jerk
+from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import ThirdOrderSolver
 from planner.job.job import Job
@@ -118,9 +119,19 @@ class SecondOrder:
 
 
 def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:
-    """The motion of another problem on the same grid."""
+    """The motion of another problem on the same grid: where only few of its limits are tighter, solved again around them only."""
+    if isinstance(solver, JerkLimited) and _tighter_only(planned.problem, problem):
+        found = solver.again(planned.problem, planned.solution, problem)
+        if found is not None:
+            return dataclasses.replace(planned, problem=found[0], solution=found[1])
     solution = solve_changed(problem, _known([planned]), solver.solve)
     return dataclasses.replace(planned, problem=problem, solution=solution)
+
+
+def _tighter_only(problem: FeedrateProblem, other: FeedrateProblem) -> bool:
+    """Whether two problems are the same but for the scale of their limits."""
+    names = [field.name for field in dataclasses.fields(problem) if field.name != "limit_scale"]
+    return all(getattr(problem, name) is getattr(other, name) for name in names)
 
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:

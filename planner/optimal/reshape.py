@@ -1,10 +1,10 @@
 """A round of reshaping: splines and the motion along them are improved together, within the tolerance.
 
 Along the time-optimal motion of the present path all limits are linearised in the control points and in the time that every part of it
-takes; smoothing/joint.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem is
-then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of the
-promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
-order, shape and feed satisfy the optimality conditions of the joint problem, minimum time inside the tolerance.
+takes; smoothing/combined.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem
+is then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of
+the promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
+order, shape and feed satisfy the optimality conditions of the combined problem, minimum time inside the tolerance.
 
 What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the parameter of the spline is
 kept as a function of time, a small change of the control points changes the optimal time by
@@ -31,12 +31,13 @@ from planner.constraints.limits import FEED, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
-from planner.smoothing.basis import DEGREE
-from planner.smoothing.forms import SplineMotion, motion_bands
-from planner.smoothing.joint import MotionLimits, improve
+from planner.smoothing.basis import DEGREE, ORDER
+from planner.smoothing.combined import MotionLimits, improve
+from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
+PRICED = 100_000  # points of the grid whose prices are made at a time: half a kilobyte each
 FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]
@@ -134,24 +135,28 @@ def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0) -> FloatAr
 def price_bands(planned: OnPath) -> Bands:
     """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives at the present shape
     (module text) [s/mm2], and Q, of the integral of the squared jerks over their limits."""
-    problem = planned.problem
+    problem, splines = planned.problem, _shape(planned).splines
     axes = problem.machine_axes
-    motion, on = _motion(planned, _inside)
-    motion = motion._replace(price=_inside(*np.moveaxis(_prices(problem, planned.solution, on), 1, 0)))
     limits = np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]])
-    H, Q = motion_bands(_shape(planned).splines, motion, limits)
+    H, Q = np.zeros((2, axes, len(splines.control), ORDER))
+    for first in range(0, len(problem), PRICED):
+        part = slice(first, first + PRICED)
+        motion, on = _motion(planned, _inside, part)
+        motion = motion._replace(price=_inside(*np.moveaxis(_prices(problem, planned.solution, on), 1, 0)))
+        add_motion_bands(splines, motion, limits, H, Q)
     return H, Q
 
 
 def _motion(
-    planned: OnPath, places: Callable[[FloatArray, FloatArray], FloatArray]
+    planned: OnPath, places: Callable[[FloatArray, FloatArray], FloatArray], part: slice = slice(None)
 ) -> tuple[SplineMotion, Array]:
     """The motion on the splines, which pays nothing, at `places` of each interval, and the intervals of the grid (I,) that are on
-    them."""
+    them; of the intervals `part` only."""
     samples, problem, solution = planned.samples, planned.problem, planned.solution
     splines = _shape(planned).splines
     span = samples.element - len(samples.table.legs)
-    on = np.flatnonzero((span >= 0) & problem.interval)
+    on = np.arange(len(span))[part]
+    on = on[(span[on] >= 0) & problem.interval[on]]
     kept = np.flatnonzero(splines.fits)
     row = np.searchsorted(planned.path.spline.first, span[on], side="right") - 1
     duration, jerk = solution.duration[on], solution.jerk_s[on]

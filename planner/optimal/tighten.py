@@ -32,9 +32,11 @@ from planner.verify import Verdict
 PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 3e-3 of the
 # time, the second 7e-5, a third gained 1e-6 (means over 345 plans, benchmarks/retries.py). For jobs of more grid points, where the
-# time it takes counts, it is done while slowing down costs more than the last [share of the time].
+# time it takes counts, it is done while slowing down costs more than the last [share of the time], and in places where the excess is
+# more than `WORTH` [-].
 TIGHTENED_EXCESS = 1e-5
-TIGHTENING_ROUNDS, TIGHTENED_POINTS, TIGHTENED_LOSS = 2, 50_000, 2e-4
+TIGHTENING_ROUNDS, TIGHTENED_POINTS, TIGHTENED_LOSS = 2, 50_000, 5e-5
+LONG_ROUNDS, WORTH = 4, 2e-5
 # What is slowed down is slowed down by this much more [-]: of 928 motions none needed it twice (benchmarks/retries.py). Less is
 # rounding.
 SLOWING_MORE = 1e-5
@@ -156,27 +158,30 @@ def within_limits(
     if not order.jerk_limited:
         return planned, motion
     factor = excess(motion, toolpath, machine)
-    best, least = (planned, motion, factor), slowed(motion, toolpath, machine, factor).end
+    best, least = (planned, factor), slowed(motion, toolpath, machine, factor).end
     tell("between points", found=least, excess=float(factor.max() - 1.0))
-    room = np.ones(len(planned.problem))
-    large = len(room) > TIGHTENED_POINTS
+    large = len(planned.samples) > TIGHTENED_POINTS
     unslowed = motion.end
-    for _ in range(TIGHTENING_ROUNDS):
+    tighter = planned
+    del planned, motion  # half a kilobyte a point, which long jobs need for the next one
+    least_excess = 1.0 + (WORTH if large else TIGHTENED_EXCESS)
+    for _ in range(LONG_ROUNDS if large else TIGHTENING_ROUNDS):
         if factor.max() <= 1.0 + TIGHTENED_EXCESS or (large and least < (1.0 + TIGHTENED_LOSS) * unslowed):
             break
-        room *= np.maximum(factor, 1.0)
-        problem = tightened(planned.problem, room)
-        tighter = solve_again(planned, problem, order.solver)
+        problem = tightened(tighter.problem, np.where(factor > least_excess, factor, 1.0))
+        tighter = solve_again(tighter, problem, order.solver)
         if not tighter.solution.solved:
             break
         motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
         end = slowed(motion, toolpath, machine, factor).end
-        tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0))
+        facts = {name: count for name, count in tighter.solution.effort.items() if name.endswith("again")}
+        tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0), **facts)
         if end < least:
-            best, least = (tighter, motion, factor), end
-    planned, motion, factor = best
-    motion = slowed(motion, toolpath, machine, factor)
+            best, least = (tighter, factor), end
+        del motion
+    planned, factor = best
+    motion = slowed(planned.motion(), toolpath, machine, factor)
     return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
 
 

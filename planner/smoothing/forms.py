@@ -153,8 +153,15 @@ def motion_bands(splines, motion, limits):
     """
     axes, n = splines.control.shape[1], len(splines.control)
     H, Q = np.zeros((axes, n, ORDER)), np.zeros((axes, n, ORDER))
+    add_motion_bands(splines, motion, limits, H, Q)
+    return H, Q
+
+
+@njit(cache=True, error_model="numpy")
+def add_motion_bands(splines, motion, limits, H, Q):
+    """Add the bands of a part of a motion, some of its intervals, to H and Q (`motion_bands`)."""
     for q in range(len(splines.fits)):
-        if not splines.fits[q]:
+        if not splines.fits[q] or motion.interval[q] == motion.interval[q + 1]:
             continue
         knots, control = run_knots(splines, q), run_control(splines, q)
         begin, end = control_first(splines, q), control_first(splines, q + 1)
@@ -163,4 +170,3 @@ def motion_bands(splines, motion, limits):
                 _add_prices(
                     knots, control, motion, (interval, side), limits, H[:, begin:end], Q[:, begin:end]
                 )
-    return H, Q

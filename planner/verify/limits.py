@@ -115,12 +115,12 @@ def scan(
 
     -> path length run at the last sample [mm]
     """
-    t, position, velocity, acceleration, jerk = columns
-    limits, linear, normal_max, judged, digits = allowed
+    t, position, velocity, acceleration, _ = columns
+    limits, linear, normal_max, judged, _ = allowed
     n, axes = position.shape
     alone = GROUPS * axes
-    difference, error, before, error_before = work[0, 0], work[1, 0], work[2], work[3]
-    ulp, resolution = ROUNDING_ULPS * 2.0**-52, RATIO_ROUNDING
+    before, error_before = work[2], work[3]
+    ulp = ROUNDING_ULPS * 2.0**-52
     first = max(skip - 3, 0)
     most_sq = 0.0
     for axis in range(axes):
@@ -135,57 +135,12 @@ def scan(
         step = math.sqrt(step_sq)
         if k >= max(skip, 1):
             travelled += step
-        orders = min(3, k - first)
-        over1 = 1.0 / (t[k] - t[k - 1]) if orders >= 1 else 0.0
-        over2 = 2.0 / (t[k] - t[k - 2]) if orders >= 2 else 0.0
-        over3 = 3.0 / (t[k] - t[k - 3]) if orders >= 3 else 0.0
         for axis in range(axes):
-            difference[0] = position[k, axis]
-            error[0] = ulp * (abs(position[k, axis]) + travelled + limits[0, axis] * t[k]) + digits[axis]
-            if digits[axes] > 0.0 and n > first + 1:
-                to = max(k, first + 1)
-                lasting = t[to] - t[to - 1]
-                speed = abs(position[to, axis] - position[to - 1, axis]) / lasting + limits[1, axis] * lasting
-                error[0] += digits[axes] * speed
-            for order in range(1, orders + 1):
-                over = over1 if order == 1 else (over2 if order == 2 else over3)
-                difference[order] = over * (difference[order - 1] - before[axis, order - 1])
-                error[order] = over * (error[order - 1] + error_before[axis, order - 1])
-                if k >= skip:
-                    value = max(abs(difference[order]) - error[order], 0.0)
-                    _keep(
-                        worst,
-                        (order - 1) * axes + axis,
-                        value,
-                        limits[order - 1, axis],
-                        k,
-                        DIFFERENCE,
-                    )
-            for order in range(3):
-                before[axis, order], error_before[axis, order] = difference[order], error[order]
-            if k < skip:
-                continue
-            if judged[0]:
-                value = abs(velocity[k, axis])
-                _keep(worst, VELOCITY * axes + axis, value, limits[0, axis], k, COLUMN)
-            if judged[1]:
-                value = abs(acceleration[k, axis])
-                _keep(worst, ACCELERATION * axes + axis, value, limits[1, axis], k, COLUMN)
-            if judged[2]:
-                _keep(worst, JERK * axes + axis, abs(jerk[k, axis]), limits[2, axis], k, COLUMN)
-            if k == first or not judged[0]:
-                continue
-            mean = 0.5 * (velocity[k, axis] + velocity[k - 1, axis])
-            gap = max(abs(difference[1] - mean) - error[1] - resolution * limits[0, axis], 0.0) * over1
-            _keep(worst, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
-            _keep(worst, GAP_BY_JERK * axes + axis, gap * over1, limits[2, axis] / 12.0, k, COLUMN)
-            if not judged[1]:
-                continue
-            mean = 0.5 * (acceleration[k, axis] + acceleration[k - 1, axis])
-            change = (velocity[k, axis] - velocity[k - 1, axis]) * over1
-            noise = resolution * (limits[0, axis] * over1 + limits[1, axis])
-            gap = max(abs(change - mean) - noise, 0.0) * over1
-            _keep(worst, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
+            rounding = ulp * (abs(position[k, axis]) + travelled + limits[0, axis] * t[k])
+            work[1, 0, 0] = rounding + _of_digits(columns, allowed, first, k, axis)
+            _differences(columns, allowed, worst, work, first, skip, k, axis)
+            if k >= skip:
+                _of_columns(columns, allowed, worst, work, first, k, axis)
         if k < skip:
             continue
         how = COLUMN if judged[0] and judged[1] else DIFFERENCE
@@ -209,6 +164,76 @@ def scan(
             _keep(worst, alone + FEED, value, most_feed, k, DIFFERENCE)
             _keep(worst, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
     return travelled
+
+
+@kernel()
+def _of_digits(columns: SampleColumns, allowed: Allowed, first: int, k: int, axis: int) -> float:
+    """Error of a position by the digits of it and of its time, at the speed the motion can have there [mm]."""
+    t, position = columns.t, columns.position
+    n, axes = position.shape
+    error = allowed.digits[axis]
+    if allowed.digits[axes] > 0.0 and n > first + 1:
+        to = max(k, first + 1)
+        lasting = t[to] - t[to - 1]
+        speed = abs(position[to, axis] - position[to - 1, axis]) / lasting
+        error += allowed.digits[axes] * (speed + allowed.limits[1, axis] * lasting)
+    return float(error)
+
+
+@kernel()
+def _differences(
+    columns: SampleColumns,
+    allowed: Allowed,
+    worst: Worst,
+    work: FloatArray,
+    first: int,
+    skip: int,
+    k: int,
+    axis: int,
+) -> None:
+    """Differences d0 .. d3 of an axis at sample k and their rounding, into `work`, where they replace those of the sample before."""
+    t, axes = columns.t, columns.position.shape[1]
+    difference, error, before, error_before = work[0, 0], work[1, 0], work[2], work[3]
+    difference[0] = columns.position[k, axis]
+    for order in range(1, min(3, k - first) + 1):
+        over = order / (t[k] - t[k - order])
+        difference[order] = over * (difference[order - 1] - before[axis, order - 1])
+        error[order] = over * (error[order - 1] + error_before[axis, order - 1])
+        if k >= skip:
+            value = max(abs(difference[order]) - error[order], 0.0)
+            _keep(worst, (order - 1) * axes + axis, value, allowed.limits[order - 1, axis], k, DIFFERENCE)
+    for order in range(3):
+        before[axis, order], error_before[axis, order] = difference[order], error[order]
+
+
+@kernel()
+def _of_columns(
+    columns: SampleColumns, allowed: Allowed, worst: Worst, work: FloatArray, first: int, k: int, axis: int
+) -> None:
+    """Judge the columns of an axis at sample k, and by how much they miss the differences in `work` (module text)."""
+    t, _, velocity, acceleration, jerk = columns
+    limits, judged = allowed.limits, allowed.judged
+    axes, resolution = velocity.shape[1], RATIO_ROUNDING
+    if judged[0]:
+        _keep(worst, VELOCITY * axes + axis, abs(velocity[k, axis]), limits[0, axis], k, COLUMN)
+    if judged[1]:
+        _keep(worst, ACCELERATION * axes + axis, abs(acceleration[k, axis]), limits[1, axis], k, COLUMN)
+    if judged[2]:
+        _keep(worst, JERK * axes + axis, abs(jerk[k, axis]), limits[2, axis], k, COLUMN)
+    if k == first or not judged[0]:
+        return
+    over = 1.0 / (t[k] - t[k - 1])
+    mean = 0.5 * (velocity[k, axis] + velocity[k - 1, axis])
+    gap = max(abs(work[0, 0, 1] - mean) - work[1, 0, 1] - resolution * limits[0, axis], 0.0) * over
+    _keep(worst, GAP_BY_ACCELERATION * axes + axis, gap, limits[1, axis] / 4.0, k, COLUMN)
+    _keep(worst, GAP_BY_JERK * axes + axis, gap * over, limits[2, axis] / 12.0, k, COLUMN)
+    if not judged[1]:
+        return
+    mean = 0.5 * (acceleration[k, axis] + acceleration[k - 1, axis])
+    change = (velocity[k, axis] - velocity[k - 1, axis]) * over
+    noise = resolution * (limits[0, axis] * over + limits[1, axis])
+    gap = max(abs(change - mean) - noise, 0.0) * over
+    _keep(worst, GAP_OF_ACCELERATION * axes + axis, gap, limits[2, axis] / 4.0, k, COLUMN)
 
 
 @kernel()

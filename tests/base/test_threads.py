@@ -8,11 +8,7 @@ import pytest
 
 from planner.base.threads import side_by_side, threads, use_threads
 
-
-@pytest.fixture(autouse=True)
-def _threads_as_before():
-    yield
-    use_threads(None)
+pytestmark = pytest.mark.usefixtures("threads_as_before")
 
 
 def test_one_per_core_unless_said():

@@ -25,10 +25,7 @@ SLOW = (
 )  # points with a bound of the feed of their own
 
 
-@pytest.fixture(autouse=True)
-def _threads_as_before():
-    yield
-    use_threads(None)
+pytestmark = pytest.mark.usefixtures("threads_as_before")
 
 
 @pytest.fixture(scope="module")

@@ -22,10 +22,7 @@ from planner.feedrate.solution import FeedrateSolution, Multipliers
 SEEDS = [0, 2, 4]
 
 
-@pytest.fixture(autouse=True)
-def _threads_as_before():
-    yield
-    use_threads(None)
+pytestmark = pytest.mark.usefixtures("threads_as_before")
 
 
 def window_of(problem: FeedrateProblem) -> int:

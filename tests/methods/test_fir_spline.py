@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from curves import circle, curve_named, wave
+from curves import circle, curve_named, strong, wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -165,10 +165,6 @@ def test_the_filters_are_the_shortest_that_an_isolated_step_allows(V, a, j, dire
 
 
 # --- motions ----------------------------------------------------------------------------------------------------------------
-
-
-def strong(**more) -> Machine:
-    return problems.machine(velocity=1e3, acceleration=1e5, jerk=1e8, **more)
 
 
 GIVEN = FirSplineMethod(plain=True, profile_filters=(T1, T2), phase_lag=np.deg2rad(170.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from curves import circle, curve_named, wave
+from curves import circle, curve_named, strong, wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,7 +12,7 @@ from benchmarks import problems
 from planner.base.errors import InputError
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint
-from planner.machine import Axis, Machine
+from planner.machine import Axis
 from planner.methods.fir_spline import FirSplineMethod
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
@@ -20,10 +20,6 @@ from planner.verify.pieces import RATIO_ROUNDING
 
 MACHINE = problems.machine()
 T1, T2 = 0.05, 0.03  # the papers' filters
-
-
-def strong(**more) -> Machine:
-    return problems.machine(velocity=1e3, acceleration=1e5, jerk=1e8, **more)
 
 
 @pytest.mark.slow

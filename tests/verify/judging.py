@@ -2,8 +2,10 @@
 
 import numpy as np
 from motions import Asked, Moves, along, helix, machine, rest_to_rest, sample
+from numba import njit
 
 from planner.verify import verify
+from planner.verify.pieces import reach_piece
 
 M = machine()
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
@@ -18,6 +20,7 @@ def square(**more):
 
 
 def judge(motion, toolpath, machine=M, **more):
+    """The verdict on delivered samples, and on the motion between them."""
     asked = Asked(motion, machine.dt)
     return verify(sample(motion, machine.dt), toolpath, machine, motion=asked, **more)
 
@@ -28,6 +31,12 @@ def fault(verdict, begins):
     found = [text for text in verdict.faults if text.startswith(begins)]
     assert found, verdict.faults
     return found[0]
+
+
+@njit
+def distance_from(pieces, i, q):
+    """How far a point q (3,) is from piece i [mm]."""
+    return reach_piece(pieces, i, q, 0.0)[2]
 
 
 def full_circle(start=(10.0, 0, 0), center=(0, 0), sweep=2 * np.pi, feed=50.0):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from judging import judge
 from motions import (
     JERK_FREE,
-    Asked,
     Moves,
     along,
     chain,
@@ -23,12 +23,6 @@ from motions import (
 from planner.verify import verify
 
 M = machine()
-
-
-def judge(motion, toolpath, machine=M, **more):
-    """Delivered samples, and the motion between them."""
-    asked = Asked(motion, machine.dt)
-    return verify(sample(motion, machine.dt), toolpath, machine, motion=asked, **more)
 
 
 def test_line_at_the_limits_has_ratio_one():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from judging import M, fault, judge
+from judging import M, distance_from, fault, judge
 from motions import along, rest_to_rest
 from numba import njit
 from scipy.optimize import brentq, minimize_scalar
@@ -58,11 +58,6 @@ def run_along(first=0.0, last=1.0, aside=0.0):
         return r + rise[0], r1 * scale + rise[1], r2 * scale**2 + rise[2], r3 * scale**3 + rise[3]
 
     return along(1.0, beside, rest_to_rest(1.0, 1.0, 2.0, 4.0))
-
-
-@njit
-def distance_from(pieces, i, q):
-    return reach_piece(pieces, i, q, 0.0)[2]
 
 
 def test_the_distance_from_a_curve_is_the_searched_one() -> None:

@@ -2,18 +2,13 @@
 
 import numpy as np
 import pytest
+from judging import distance_from
 from motions import Moves, helix, machine
-from numba import njit
 from scipy.optimize import minimize_scalar
 
-from planner.verify.pieces import PIECE_ANGLE, program_pieces, reach_piece
+from planner.verify.pieces import PIECE_ANGLE, program_pieces
 
 M = machine()
-
-
-@njit
-def distance_from(pieces, i, q):
-    return reach_piece(pieces, i, q, 0.0)[2]
 
 
 @pytest.mark.parametrize("rise", [0.0, 3.0, -30.0])

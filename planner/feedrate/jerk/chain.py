@@ -74,15 +74,19 @@ class Chain:
     at      : up to which point there is a profile
     rest    : what the last window knows of the way ahead, down to its stop
     stops   : points where the profile rests because nothing better was found
-    failed  : whether there is no solution between given feeds; from rest to rest there always is one
+    failed  : whether there is no solution between given states; from rest to rest there always is one
     """
 
-    def __init__(self, task: Task):
+    def __init__(self, task: Task, ahead: Way | None = None, back: Way | None = None):
+        """The task, or one with other states at its ends: ways to rest from the first point on, and from the last point on, backward,
+        None from rest; the profile has these states already."""
         self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
         self.at, self.first, self.last = task.first, task.first, task.last
         self.rest: Window | None = None
         self.failed = False
         self._start, self._end = task.start, task.end
+        self._ahead, self._back = ahead, back
+        self._given = task.start > 0.0 or task.end > 0.0 or ahead is not None or back is not None
         self.stops: list[int] = []
         self.iterations = 0
         # windows solved; how often not from the first start, and divided into smaller ones
@@ -98,7 +102,7 @@ class Chain:
             begin = self.at
             end = self._smaller_end(begin, size) if divided else self._window_end(begin, size)
             found = self._solve_window(begin, end)
-            if found is None and (self._start > 0.0 or self._end > 0.0):
+            if found is None and self._given:
                 self.failed = True
                 continue
             if found is None:
@@ -175,13 +179,17 @@ class Chain:
         """Solve the points begin..end, from the state at `begin` to rest at `end`, or to the end of the task; None if that does not
         converge."""
         behind, scaled = None, self._scaled(begin, end)
-        if begin == self.first and self._start > 0.0:
+        if begin == self.first and self._ahead is not None:
+            behind = self._ahead
+        elif begin == self.first and self._start > 0.0:
             behind = way_to_rest(self.columns, begin, end, self._start)
         elif self.profile.x[begin] > 0.0 and self.rest is not None:
             behind = Way(self.rest.x, self.rest.u)
         tol, iterations = self.solver.tol, self.solver.iterations
+        turned = self._back if end == self.last else None
         if end == self.last and self._end > 0.0:
             turned = way_to_rest(backward(self.columns, begin, end), 0, end - begin, self._end)
+        if turned is not None:
             found, done, starts = scaled.between(behind, turned, tol, iterations)
         else:
             found, done, starts = scaled.solve(behind, tol, iterations)

@@ -9,6 +9,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.window import Window
+from planner.feedrate.solution import FeedrateSolution
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,6 +30,21 @@ class Profile:
         x, u, jerk, duration, dynamics = np.zeros((5, points))
         rows, feed = np.zeros((points, axes, 4)), np.zeros((points, 2))
         return cls(x=x, u=u, jerk=jerk, duration=duration, rows=rows, feed=feed, dynamics=dynamics)
+
+    @classmethod
+    def of_solution(cls, solution: FeedrateSolution) -> Profile:
+        """A copy of a solution that has multipliers."""
+        found = solution.multipliers
+        assert found is not None
+        return cls(
+            x=solution.feed_sq.copy(),
+            u=solution.acc_s.copy(),
+            jerk=solution.jerk_s.copy(),
+            duration=solution.duration.copy(),
+            rows=found.rows.copy(),
+            feed=found.feed.copy(),
+            dynamics=found.dynamics.copy(),
+        )
 
     def put(self, begin: int, found: Window, count: int) -> None:
         """Take over the first intervals of a window that begins at a point, and the state at their end."""

@@ -40,22 +40,29 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from planner.base.threads import side_by_side, threads
 from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.jerk.again import RangeAgain, ranges_of
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
-from planner.feedrate.jerk.piece import Piece
+from planner.feedrate.jerk.part import LONG
+from planner.feedrate.jerk.piece import Piece, Solved, slow_down
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 PLACES_NAMED = 3  # in a sentence
+# Where more than this share of what was solved for has to be solved again, all of it is [-].
+SHARE_MAX = 0.8
+CHANGE_MAX = 0.05  # ... and where limits of speed change by more than this [-]: it is felt beyond the ranges
 POINTS_SHARED = 3_000  # fewer are solved by one thread: threads take 1 ms to begin, a point some us
 
 
@@ -90,9 +97,9 @@ class JerkLimited:
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
         profile = Profile.at_rest(*problem.d1.shape)
-        pieces, slower = self._solve_pieces(problem, profile, progress)
+        pieces = self._solve_pieces(problem, profile, progress)
         stops = [stop for piece in pieces for stop in piece.stops]
-        chains = [chain for piece in pieces for chain in piece.chains]
+        slower = max(piece.slower for piece in pieces)
         sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk"
         if stops:
             places = ", ".join(f"{problem.s[k]:.6g}" for k in stops[:PLACES_NAMED])
@@ -105,69 +112,115 @@ class JerkLimited:
             status=Status.ACCEPTABLE if stops else Status.OPTIMAL,
             sentence=sentence,
             solver=repr(self),
-            feed_sq=profile.x,
-            acc_s=profile.u,
-            jerk_s=profile.jerk,
-            duration=profile.duration,
             solve_time=0.0,
-            iterations=max(
-                done for piece in pieces for done in (*piece.joined, *(c.iterations for c in piece.chains))
-            ),
+            iterations=max(piece.iterations for piece in pieces),
             jerk_limited=True,
-            multipliers=Multipliers(rows=profile.rows, feed=profile.feed, dynamics=profile.dynamics),
-            effort={
-                "windows": sum(chain.windows for chain in chains)
-                + sum(len(piece.joined) for piece in pieces),
-                "other starts": sum(chain.other_starts for chain in chains),
-                "joined": sum(piece.met for piece in pieces),
-                "held": sum(held.last - held.first for piece in pieces for held in piece.held),
-                "divided": sum(chain.divided for chain in chains),
-                "standstills": len(stops),
-            },
+            effort={name: sum(piece.effort[name] for piece in pieces) for name in pieces[0].effort},
+            **_columns_of_solution(profile),
         )
-        found = lagrangian(problem, solution)
-        prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
-        return replace(solution, prices=prices, solve_time=time.perf_counter() - began)
+        return _priced(problem, solution, began)
 
     def _solve_pieces(
         self, problem: FeedrateProblem, profile: Profile, progress: Callable[[float], None] | None
-    ) -> tuple[list[Piece], float]:
-        """Solve all pieces into `profile`, on several cores if it is worth it; returns them and by what factor one is slowed down
-        most."""
+    ) -> list[Solved]:
+        """Solve all pieces into `profile`, on several cores if it is worth it. Long ones come first, as many at a time as there are
+        threads for their two ends: each takes a third of a kilobyte a point while it is being solved."""
         columns, counted = columns_of(problem), _Counted(len(problem), progress)
-        pieces = [
-            Piece(
-                Task(
-                    solver=self,
-                    columns=columns,
-                    profile=profile,
-                    first=first,
-                    last=beyond - 1,
-                    tell=counted.add,
-                )
-            )
-            for first, beyond in pairwise(problem.piece.tolist())
-        ]
-        # The longest first, so that none is left to one core at the end.
-        sized = [task for piece in pieces for task in piece.work]
-        work = [task for _, task in sorted(sized, key=lambda one: -one[0])]
-        if threads() == 1 or len(work) == 1 or len(problem) < POINTS_SHARED:
-            room = Room()
-            for task in work:
-                task(room)
-            return pieces, max(piece.finish(room) for piece in pieces)
-        rooms = threading.local()
+        task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
+        ends = list(pairwise(problem.piece.tolist()))
+        order = sorted(range(len(ends)), key=lambda g: ends[g][0] - ends[g][1])
+        long = sum(beyond - 1 - first > LONG * self.window for first, beyond in ends)
+        at_once = max(threads() // 2, 1)
+        batches = [order[k : min(k + at_once, long)] for k in range(0, long, at_once)] + [order[long:]]
+        solved: dict[int, Solved] = {}
+        for batch in batches:
+            pieces = [Piece(task(first=ends[g][0], last=ends[g][1] - 1)) for g in batch]
+            room = _do([work for piece in pieces for work in piece.work], counted)
+            solved |= {g: piece.finish(room) for g, piece in zip(batch, pieces, strict=True)}
+        return [solved[g] for g in range(len(ends))]
 
-        def room_here() -> Room:
+    def again(
+        self, before: FeedrateProblem, known: FeedrateSolution, problem: FeedrateProblem
+    ) -> tuple[FeedrateProblem, FeedrateSolution] | None:
+        """The solution of a problem that differs from the one `before` in the scales of its limits, a little and at few points, from
+        that one's solution `known` (again.py): with the problem itself, whose scales are those of before where no solution was found;
+        None where so much changed that all has to be solved."""
+        began = time.perf_counter()
+        change = problem.limit_scale / before.limit_scale
+        if known.multipliers is None or np.abs(change - 1.0).max() > CHANGE_MAX:
+            return None
+        ranges = ranges_of(before, known, change != 1.0)
+        size = sum(own.last - own.first for own in ranges)
+        if size > SHARE_MAX * (len(problem) - known.effort.get("held", 0)):
+            return None
+        profile, columns = Profile.of_solution(known), columns_of(problem)
+        counted = _Counted(len(problem), None)
+        task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
+        work = [RangeAgain(task(first=own.first, last=own.last)) for own in ranges]
+        _do([(one.last - one.first, one) for one in work], counted)
+        if not all(one.solved for one in work):
+            scale = problem.limit_scale.copy()
+            for one in work:
+                if not one.solved:
+                    own = slice(one.first, one.last + 1)
+                    scale[own] = before.limit_scale[own]
+            problem = replace(problem, limit_scale=scale)
+            columns = columns_of(problem)
+        pieces = np.unique(np.searchsorted(problem.piece, [own.first for own in ranges], side="right") - 1)
+        slower = max(
+            [slow_down(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in pieces],
+            default=1.0,
+        )
+        solution = replace(
+            known,
+            sentence=f"{known.sentence}; {len(ranges)} ranges solved again, slowed by {slower - 1.0:.1e}",
+            iterations=max([known.iterations, *(one.chain.iterations for one in work)]),
+            effort=known.effort
+            | {"again": len(ranges), "not again": sum(not one.solved for one in work), "again points": size},
+            **_columns_of_solution(profile),
+        )
+        return problem, _priced(problem, solution, began)
+
+
+def _columns_of_solution(profile: Profile) -> dict[str, Any]:
+    """The fields of a solution that a profile has."""
+    return {
+        "feed_sq": profile.x,
+        "acc_s": profile.u,
+        "jerk_s": profile.jerk,
+        "duration": profile.duration,
+        "multipliers": Multipliers(rows=profile.rows, feed=profile.feed, dynamics=profile.dynamics),
+    }
+
+
+def _priced(problem: FeedrateProblem, solution: FeedrateSolution, began: float) -> FeedrateSolution:
+    """The solution with its prices and the time that it took."""
+    found = lagrangian(problem, solution)
+    prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
+    return replace(solution, prices=prices, solve_time=time.perf_counter() - began)
+
+
+def _do(sized: list[tuple[int, Callable[[Room], None]]], counted: _Counted) -> Room:
+    """Do work of so many intervals each, on several cores if it is worth it; returns room for more of it."""
+    # The longest first, so that none is left to one core at the end.
+    work = [task for _, task in sorted(sized, key=lambda one: -one[0])]
+    room = Room()
+    if threads() == 1 or len(work) <= 1 or sum(size for size, _ in sized) < POINTS_SHARED:
+        for task in work:
+            task(room)
+        return room
+    rooms = threading.local()
+
+    def run(task: Callable[[Room], None]) -> Callable[[], None]:
+        def here() -> None:
             if not hasattr(rooms, "room"):
                 rooms.room = Room()
-            return rooms.room
+            task(rooms.room)
 
-        def run(task: Callable[[Room], None]) -> Callable[[], None]:
-            return lambda: task(room_here())
+        return here
 
-        side_by_side([run(task) for task in work], counted.stop, counted.show)
-        return pieces, max(piece.finish(room_here()) for piece in pieces)
+    side_by_side([run(task) for task in work], counted.stop, counted.show)
+    return room
 
 
 class _Stopped(Exception):

@@ -209,32 +209,13 @@ def _solve_piece(
     }
     program = {"x": ca.vertcat(x, u), "f": ca.sum1(times), "g": ca.vertcat(gap, *rows), "p": last}
     solver = ca.nlpsol("solver", "ipopt", program, _options(settings))
-    status, sentence = STOPPED
-    iterations, fastest = 0, np.inf
-    for done in range(settings.max_passes):
-        touching = np.where(profile[: n + 1] > 0.0, profile[: n + 1], 1.0)  # not used where the profile rests
-        result = {name: np.array(v).ravel() for name, v in solver(x0=profile, p=touching, **bounds).items()}
-        stats = solver.stats()
-        iterations += int(stats["iter_count"])
-        kept = _violation(result, bounds) <= VIOLATION_MAX
-        if not (stats["return_status"] in ("Solve_Succeeded", "Solved_To_Acceptable_Level") and kept):
-            too_long = stats["return_status"] == "Maximum_Iterations_Exceeded"
-            status, sentence = TOO_LONG if too_long else BROKE_DOWN
-            if done == 0:
-                return Found(status=status, sentence=sentence, iterations=iterations)
-            status, sentence = (
-                STOPPED[0],
-                f"the result of {done} passes, which keeps all limits; then {sentence}",
-            )
-            break
-        profile, gained, fastest = result["x"], fastest - result["f"][0], result["f"][0]
-        lam = {"x": result["lam_x"], "g": result["lam_g"]}
-        if gained <= settings.tol * fastest:
-            status, sentence = CONVERGED
-            break
+    passed = _passes(solver, profile, bounds, settings)
+    if passed.result is None:
+        return Found(status=passed.status, sentence=passed.sentence, iterations=passed.iterations)
 
     # ---- unpack ---------------------------------------------------------------------------------------------------------------
-    profile = np.clip(profile, lower, upper)
+    lam_x, lam_g = passed.result["lam_x"], passed.result["lam_g"]
+    profile = np.clip(passed.result["x"], lower, upper)
     x_found, u_found = profile[: n + 1] * speed**2, profile[n + 1 :] * acc
     h = np.array(ca.Function("times", [x, u], [times])(profile[: n + 1], profile[n + 1 :])).ravel() * second
     profile_columns = np.zeros((n + 1, 4))
@@ -243,9 +224,9 @@ def _solve_piece(
 
     # ---- multipliers of the last pass, in time [s]: where the tangents touch, their rows have the gradients of the true ones --------
     of_gap, of_feed, *of_axes = np.split(
-        second * lam["g"], np.cumsum([n, n - 2, *[n, n - 2, n - 2] * 2 * axes])[:-1]
+        second * lam_g, np.cumsum([n, n - 2, *[n, n - 2, n - 2] * 2 * axes])[:-1]
     )
-    of_x = second * np.maximum(lam["x"][: n + 1], 0.0)
+    of_x = second * np.maximum(lam_x[: n + 1], 0.0)
     multipliers = np.zeros((n + 1, 3 + 4 * axes))
     multipliers[1:n, 0] = of_x[1:n] * cap[1:n]
     multipliers[inner, 1] = of_feed
@@ -260,11 +241,49 @@ def _solve_piece(
             of_rows[i - 1 if i == 1 else i, k, row], multipliers[i, 0] = of_x[i] * upper[i] / 1.5, 0.0
     multipliers[:, 3:] = of_rows.reshape(n + 1, -1)
     return Found(
-        status=status,
-        sentence=sentence,
-        iterations=iterations,
+        status=passed.status,
+        sentence=passed.sentence,
+        iterations=passed.iterations,
         columns=np.column_stack([profile_columns, multipliers]),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Passed:
+    """How the passes ended: the last result of ipopt that keeps all limits, None if there is none."""
+
+    status: Status
+    sentence: str
+    iterations: int
+    result: dict[str, FloatArray] | None
+
+
+def _passes(
+    solver: Any, profile: FloatArray, bounds: dict[str, FloatArray], settings: SequentialConvex
+) -> _Passed:
+    """Solve pass by pass from a profile (2 n + 2,) of x and u, until one gains little."""
+    n = len(profile) // 2 - 1
+    (status, sentence), result = STOPPED, None
+    iterations, fastest = 0, np.inf
+    for done in range(settings.max_passes):
+        touching = np.where(profile[: n + 1] > 0.0, profile[: n + 1], 1.0)  # not used where the profile rests
+        found = {name: np.array(v).ravel() for name, v in solver(x0=profile, p=touching, **bounds).items()}
+        stats = solver.stats()
+        iterations += int(stats["iter_count"])
+        kept = _violation(found, bounds) <= VIOLATION_MAX
+        if not (stats["return_status"] in ("Solve_Succeeded", "Solved_To_Acceptable_Level") and kept):
+            too_long = stats["return_status"] == "Maximum_Iterations_Exceeded"
+            status, sentence = TOO_LONG if too_long else BROKE_DOWN
+            if done > 0:
+                status = STOPPED[0]
+                sentence = f"the result of {done} passes, which keeps all limits; then {sentence}"
+            break
+        gained, fastest = fastest - found["f"][0], found["f"][0]
+        result, profile = found, found["x"]
+        if gained <= settings.tol * fastest:
+            status, sentence = CONVERGED
+            break
+    return _Passed(status=status, sentence=sentence, iterations=iterations, result=result)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,26 +1,6 @@
-"use strict";
 // Methods side by side: columns of method k are c.mK_t, c.mK_feed ... (comparison_page.py).
 (async () => {
-  const about = JSON.parse(document.getElementById("about").textContent), rows = about.rows, c = {};
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
-  const ink = dark ? "#e6e9ef" : "#1d2430", dim = dark ? "#97a1b2" : "#667085", rule = dark ? "#2e3744" : "#d9dee7";
-  const ARRAYS = { f4: Float32Array, i4: Int32Array };
-  const BUCKETS = 1500, POINTS_OF_PATH = 8000;
-  const element = (id) => document.getElementById(id);
-  const make = (tag, text, className) => {
-    const made = document.createElement(tag);
-    if (text !== undefined) made.textContent = text;
-    if (className) made.className = className;
-    return made;
-  };
-  const digits = (value, n = 4) => (value === null || value === undefined || !Number.isFinite(value) ? "–" : Number(value.toPrecision(n)).toString());
-  async function unpack(name, type) {
-    const held = element("column-" + name), raw = atob(held.textContent), bytes = new Uint8Array(raw.length);
-    for (let k = 0; k < bytes.length; k++) bytes[k] = raw.charCodeAt(k);
-    held.remove();
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    c[name] = new ARRAYS[type](await new Response(stream).arrayBuffer());
-  }
+  const rows = about.rows, BUCKETS = 1500, POINTS_OF_PATH = 8000;
   await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
   const hidden = new Set();
   let against = "t";

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from planner.report.colours import COLOURS
 from planner.report.compare import Row, best_of
 from planner.report.export import json_ready
 from planner.report.html.page import is_report
-from planner.report.html.parts import columns_text, filled, json_text, plotly_script, template
+from planner.report.html.parts import page_of
 from planner.report.replace import check_file, replacing_file
 
 if TYPE_CHECKING:
@@ -54,18 +53,9 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
         "blocks": len(program),
         "best": None if best is None else best.method,
         "colours": [COLOURS[k % len(COLOURS)] for k in range(len(rows))],
-        "columns": {name: column.dtype.str.lstrip("<|") for name, column in columns.items()},
         "rows": json_ready([_said(row, best) for row in rows]),
     }
-    parts = {
-        "TITLE": html.escape(Path(source).name),
-        "STYLE": template("report.css"),
-        "PLOTLY": plotly_script(),
-        "ABOUT": json_text(about),
-        "COLUMNS": columns_text(columns),
-        "SCRIPT": template("comparison.js"),
-    }
-    return filled(template("comparison.html"), parts)
+    return page_of("comparison", "methods side by side", source, about, columns)
 
 
 def _said(row: Row, best: Row | None) -> dict[str, Any]:

@@ -9,7 +9,6 @@ megabytes, is run and the columns are unpacked.
 
 from __future__ import annotations
 
-import html
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.report.colours import limit_colours
 from planner.report.export import json_ready, summary
 from planner.report.html.data import in_degrees, lines_of, programmed_path, samples_of
-from planner.report.html.parts import columns_text, filled, json_text, plotly_script, template
+from planner.report.html.parts import page_of
 from planner.report.html.picture import path_picture
 from planner.report.replace import check_file
 
@@ -59,18 +58,9 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
     columns, about = _columns(plan)
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
     about["summary"] = said or summary(plan)
-    about["columns"] = {name: column.dtype.str.lstrip("<|") for name, column in columns.items()}
-    page = template("report.html")
-    parts = {
-        "TITLE": html.escape(Path(plan.program.source).name),
-        "STYLE": template("report.css"),
-        "PICTURE": path_picture(plan, PICTURE),
-        "PLOTLY": plotly_script(),
-        "ABOUT": json_text(about),
-        "COLUMNS": columns_text(columns),
-        "SCRIPT": template("report.js"),
-    }
-    return filled(page, parts)
+    return page_of(
+        "report", "planned", plan.program.source, about, columns, PICTURE=path_picture(plan, PICTURE)
+    )
 
 
 def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import base64
 import gzip
+import html
 import json
 from collections.abc import Mapping
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,32 @@ from planner.base.arrays import Array
 from planner.base.errors import InputError
 
 LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
+
+
+def page_of(
+    name: str, kind: str, source: str, about: dict[str, Any], columns: Mapping[str, Array], **places: str
+) -> str:
+    """A page for a browser: the body NAME.html in the frame of all pages, with shared.js and NAME.js.
+
+    kind    : what the page is, behind the file's name in its title
+    source  : the program's file
+    about   : what the script is told
+    columns : numbers by name, each (n,)
+    places  : what is filled in at @@NAME@@ of the body
+
+    Raises InputError if plotly is not installed.
+    """
+    kinds = {column_name: column.dtype.str.lstrip("<|") for column_name, column in columns.items()}
+    parts = {
+        "TITLE": html.escape(Path(source).name),
+        "KIND": kind,
+        "STYLE": template("report.css"),
+        "BODY": filled(template(f"{name}.html"), {**places, "PLOTLY": plotly_script()}),
+        "ABOUT": json_text({**about, "columns": kinds}),
+        "COLUMNS": columns_text(columns),
+        "SCRIPT": template("shared.js") + template(f"{name}.js"),
+    }
+    return filled(template("frame.html"), parts)
 
 
 def filled(page: str, parts: Mapping[str, str]) -> str:

@@ -1,38 +1,10 @@
-"use strict";
 // Everything of the page works on columns of numbers (see page.py): c.t, c.feed, c.x ... of the samples, c.line_... of the NC lines.
 (async () => {
-  const about = JSON.parse(document.getElementById("about").textContent);
   const summary = about.summary;
-  const c = {};
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
-  const ink = dark ? "#e6e9ef" : "#1d2430", dim = dark ? "#97a1b2" : "#667085", rule = dark ? "#2e3744" : "#d9dee7";
-  const ARRAYS = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
   // Okabe and Ito's colours, told apart with red-green blindness too; axes take them in order, limits have theirs from colours.py.
   const COLOURS = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
   const POINTS_OF_PATH = 20000, BUCKETS = 1200;
-
-  const element = (id) => document.getElementById(id);
-  const make = (tag, text, className) => {
-    const made = document.createElement(tag);
-    if (text !== undefined) made.textContent = text;
-    if (className) made.className = className;
-    return made;
-  };
   const mark = (name) => performance.mark(name);
-  function bytesOf(text) {
-    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-    const raw = atob(text), bytes = new Uint8Array(raw.length);
-    for (let k = 0; k < bytes.length; k++) bytes[k] = raw.charCodeAt(k);
-    return bytes;
-  }
-  async function unpack(name, type) {
-    const held = element("column-" + name), bytes = bytesOf(held.textContent);
-    held.remove();
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const buffer = await new Response(stream).arrayBuffer();
-    c[name] = new ARRAYS[type](buffer);
-  }
-  const digits = (value, n = 4) => (value === null || !Number.isFinite(value) ? "–" : Number(value.toPrecision(n)).toString());
 
   // Header, verdict, prices, notes
   {

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import re
 from pathlib import Path
@@ -14,6 +12,7 @@ import pytest
 
 import planner
 from tests.commands.command_line import run
+from tests.report.html.columns import column
 from tests.report.html.in_browser import opened
 
 JOB = "G21 F3000\nG1 X40 Y3\nX45 Y30\nX0\n"
@@ -30,12 +29,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.exit_code == 0, done.output
     assert str(page) in done.output.replace("\n", "")
     return page
-
-
-def column(page: str, name: str, kind: str) -> np.ndarray:
-    found = re.search(rf'id="column-{name}">([^<]*)<', page)
-    assert found
-    return np.frombuffer(gzip.decompress(base64.b64decode(found.group(1))), kind)
 
 
 def test_columns_are_the_motions_of_the_methods(file: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import re
 from collections.abc import Iterator
@@ -25,6 +23,7 @@ from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.page import report_page
 from planner.report.html.saved import saved_plan
 from tests.commands.command_line import run
+from tests.report.html.columns import column
 from tests.report.html.in_browser import opened, wait_for
 
 JOB = "G21 F3000 (</script><script>document.title='ran'</script>)\nG1 X40 Y3\nG3 X40 Y33 J15\nG1 X0 Z-2\nG0 X0 Y0 Z0\n"
@@ -46,12 +45,6 @@ def plan(job: Path) -> Plan:
 @pytest.fixture(scope="module")
 def page(plan: Plan) -> str:
     return report_page(plan, JOB.encode())
-
-
-def column(page: str, name: str, kind: str) -> np.ndarray:
-    found = re.search(rf'id="column-{name}">([^<]*)<', page)
-    assert found
-    return np.frombuffer(gzip.decompress(base64.b64decode(found.group(1))), kind)
 
 
 def test_columns_are_those_of_the_plan(page: str, plan: Plan) -> None:

@@ -1,4 +1,4 @@
-"""The Newton matrix of joint_solver.py, put together span by span.
+"""The Newton matrix of combined_solver.py, put together span by span.
 
 What a span adds couples its six control points: blocks (k, m) of 6 x 6 for every two columns k <= m of the step y (n, A+1), of which
 those with k = m are only kept above their diagonal. They are summed for a whole span before they go into the banded matrix.

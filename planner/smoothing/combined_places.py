@@ -1,4 +1,4 @@
-"""Places on a run at which the limits of its motion are kept (joint.py), and what the motion does there."""
+"""Places on a run at which the limits of its motion are kept (combined.py), and what the motion does there."""
 
 from __future__ import annotations
 

@@ -18,11 +18,11 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.reshape import reshape, run_times
 from planner.path.samples import sample_path
 from planner.smoothing.basis import knots_at
+from planner.smoothing.combined_places import places_of_run
+from planner.smoothing.combined_rows import first_state, predict, rows_of_window, weigh
+from planner.smoothing.combined_sites import balls_of
+from planner.smoothing.combined_solver import CombinedProblem, improve_window
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.joint_places import places_of_run
-from planner.smoothing.joint_rows import first_state, predict, rows_of_window, weigh
-from planner.smoothing.joint_sites import balls_of
-from planner.smoothing.joint_solver import JointProblem, improve_window
 from planner.smoothing.sites import Sites
 from planner.smoothing.spline_path import spline_shape, with_spline
 
@@ -76,7 +76,7 @@ def some_places(seed=1):
 
 
 def dense(rows, n):
-    """(R, n, A+1) the rows as they are defined (joint.py), from their places, kinds and factors."""
+    """(R, n, A+1) the rows as they are defined (combined.py), from their places, kinds and factors."""
     out = np.zeros((len(rows.kind), n, AXES + 1))
     for p in range(len(rows.span)):
         basis = rows.basis[p].reshape(4, 6)
@@ -172,7 +172,7 @@ def test_a_window_ends_at_the_optimum_of_its_problem():
     free = np.ones((n, columns), bool)
     free[0, :AXES] = free[-1, :AXES] = False
     y, _ = improve_window(
-        JointProblem(band, linear, free, rows, control, no_sites()), np.zeros((n, columns)), 1.0, 1e-7, 60
+        CombinedProblem(band, linear, free, rows, control, no_sites()), np.zeros((n, columns)), 1.0, 1e-7, 60
     )
     every = dense(rows, n).reshape(len(rows.kind), -1)[:, free.ravel()]
     lower, upper = rows.factor[:, 4:].T

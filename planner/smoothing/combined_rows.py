@@ -1,4 +1,4 @@
-"""Limits of a motion along a spline, linear in its control points and in its time (joint.py): the rows of joint_solver.py.
+"""Limits of a motion along a spline, linear in its control points and in its time (combined.py): the rows of combined_solver.py.
 
 A row is a number times what one axis does at a place, or what happens along or across the path there (a kind), plus three
 numbers times theta and its derivatives. `weigh`, `predict` and `move` are the three passes of an iteration over all rows. With both
@@ -16,7 +16,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER
-from planner.smoothing.joint_matrix import (
+from planner.smoothing.combined_matrix import (
     CONTRACT,
     SQUARE,
     add_balls,
@@ -90,7 +90,7 @@ def rows_of_window(places, first, last, lo):
 
 @njit(cache=True, error_model="numpy")
 def _put_row(places, p, kind, factor):
-    """Row `kind` of a place into the first four of factor (6,) (joint.py)."""
+    """Row `kind` of a place into the first four of factor (6,) (combined.py)."""
     axes = places.jet.shape[2]
     jet, limit = places.jet[p], places.limit[p, kind]
     m, k = kind // axes, kind % axes
@@ -180,7 +180,7 @@ def first_state(rows, y, product):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def weigh(rows, state, lengths, balls, band, residual, push):
-    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls` (joint_sites.py) to the
+    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls` (combined_sites.py) to the
     matrix `band`, and the rows to `residual` (n, A+1), what multipliers pull, and to `push`, what drives a step without a barrier.
     Returns sum(s z) and the most that is missing."""
     first, span, basis, along, kinds_of, factor, theta, products = rows

@@ -1,4 +1,4 @@
-"""The sites of joint_solver.py: a spline stays inside their balls (sites.py). The passes are those of joint_rows.py over the rows."""
+"""The sites of combined_solver.py: a spline stays inside their balls (sites.py). The passes are those of combined_rows.py."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER
-from planner.smoothing.joint_matrix import CONTRACT, SQUARE, STRIDE, Balls
-from planner.smoothing.joint_rows import LEAST_SLACK
+from planner.smoothing.combined_matrix import CONTRACT, SQUARE, STRIDE, Balls
+from planner.smoothing.combined_rows import LEAST_SLACK
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,7 +86,7 @@ def _put_slopes(span, weights, normal, y, out):
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def weigh_sites(balls, y, lengths, residual, push):
     """Take the last step, to y (n, A+1), of `lengths` of slacks and of multipliers; then add the sites to `residual` and to `push`
-    (n, A+1) (joint_rows.py). Returns sum(s z) and the most that is missing."""
+    (n, A+1) (combined_rows.py). Returns sum(s z) and the most that is missing."""
     along, dual = lengths
     s, z, q = balls.s, balls.z, balls.q
     see_sites(balls, y)
@@ -105,7 +105,7 @@ def weigh_sites(balls, y, lengths, residual, push):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def predict_sites(balls, step, barrier, bent, seen):
-    """`predict` of joint_rows.py for the sites."""
+    """`predict` of combined_rows.py for the sites."""
     s, z, q, second = balls.s, balls.z, balls.q, balls.second
     _put_slopes(balls.span, balls.weights, balls.normal, step, q)
     for j in range(len(s)):
@@ -122,7 +122,7 @@ def predict_sites(balls, step, barrier, bent, seen):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def move_sites(balls, step, aim):
-    """`move` of joint_rows.py for the sites."""
+    """`move` of combined_rows.py for the sites."""
     s, z, q = balls.s, balls.z, balls.q
     _put_slopes(balls.span, balls.weights, balls.normal, step, q)
     most, most_dual = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The convex problem of joint.py in one window, by a primal-dual interior-point method with slacks (Mehrotra 1992).
+"""The convex problem of combined.py in one window, by a primal-dual interior-point method with slacks (Mehrotra 1992).
 
 Over the step y (n, A+1) of control points and theta,
 
@@ -23,8 +23,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.banded import factorise, solve
-from planner.smoothing.joint_rows import Rows, first_state, move, predict, weigh
-from planner.smoothing.joint_sites import balls_of, move_sites, predict_sites, weigh_sites
+from planner.smoothing.combined_rows import Rows, first_state, move, predict, weigh
+from planner.smoothing.combined_sites import balls_of, move_sites, predict_sites, weigh_sites
 from planner.smoothing.sites import Sites
 
 FIRST_GAP = 0.3  # complementarity of the start, share of the window's time [-]
@@ -37,7 +37,7 @@ ROUNDING = 1e-12  # share of the diagonal that is added to it [-]
 THETA = 0.1  # what theta may be from its optimum, about [-], for the gap that the residual makes
 
 
-class JointProblem(NamedTuple):
+class CombinedProblem(NamedTuple):
     """A window's problem over n control points (module text)."""
 
     H: FloatArray  # (n (A+1), 6 (A+1)) banded (banded.py)
@@ -106,7 +106,7 @@ def _left_over(problem, residual, reach):
 
 @njit(cache=True, error_model="numpy")
 def improve_window(problem, start, time, gap, iterations):
-    """The optimum y (n, A+1) of a `JointProblem` from `start`, to a gap [s], or what is reached after so many iterations; `time` of the
+    """The optimum y (n, A+1) of a `CombinedProblem` from `start`, to a gap [s], or what so many iterations reach; `time` of the
     motion in the window [s]. Also the iterations."""
     rows, free = problem.rows, problem.free
     m = 2 * len(rows.kind) + len(problem.sites.span)  # upper bounds of the rows, lower bounds, sites

@@ -1,4 +1,4 @@
-"""What a step of path and feed together minimises (joint.py), and what it gains."""
+"""What a step of path and feed together minimises (combined.py), and what it gains."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER
-from planner.smoothing.joint_matrix import add_objective, blocks_of, scatter
+from planner.smoothing.combined_matrix import add_objective, blocks_of, scatter
 
 SLOWER = 10.0  # how much theta counts beside jerks in the pull [-]
 HELD = 0.8  # of the programmed feed: from there on the feed is held [-]
@@ -14,7 +14,7 @@ HELD = 0.8  # of the programmed feed: from there on the feed is held [-]
 
 @njit(cache=True, error_model="numpy")
 def sideways(places, p):
-    """What a square of the velocity across the path costs at a place [s3/mm2] (joint.py): where the feed is held."""
+    """What a square of the velocity across the path costs at a place [s3/mm2] (combined.py): where the feed is held."""
     axes = places.jet.shape[2]
     share = places.share[p, 3 * axes]
     return places.weight[p] / (share * places.limit[p, 3 * axes]) ** 2 if share > HELD else 0.0
@@ -22,7 +22,7 @@ def sideways(places, p):
 
 @njit(cache=True, error_model="numpy")
 def objective_of_window(places, window, pull, pulled, band, linear):
-    """Add to the matrix `band` and to linear (n, A+1) the objective of joint.py.
+    """Add to the matrix `band` and to linear (n, A+1) the objective of combined.py.
 
     window       : first and last + 1 of the places, and the control point from which they count
     pull, pulled : as there, and the jerks (A,) that it counts in
@@ -44,7 +44,7 @@ def objective_of_window(places, window, pull, pulled, band, linear):
 
 @njit(cache=True, error_model="numpy")
 def gain_of_step(places, y):
-    """By how much the step y (n, A+1) shortens the time (joint.py) [s]."""
+    """By how much the step y (n, A+1) shortens the time (combined.py) [s]."""
     axes = places.jet.shape[2]
     gain = 0.0
     for p in range(len(places.span)):

@@ -19,7 +19,7 @@ nothing. The third keeps the step where the first order holds. Limits are kept a
 may grow there by what the interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step
 must not promise what it cannot have there.
 
-Long runs are improved window by window (joint_solver.py).
+Long runs are improved window by window (combined_solver.py).
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from planner.base.kernels import njit
 from planner.base.search import first_not_before
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
+from planner.smoothing.combined_objective import gain_of_step, objective_of_window
+from planner.smoothing.combined_places import Places, places_of_run
+from planner.smoothing.combined_rows import rows_of_window
+from planner.smoothing.combined_solver import CombinedProblem, improve_window
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.joint_objective import gain_of_step, objective_of_window
-from planner.smoothing.joint_places import Places, places_of_run
-from planner.smoothing.joint_rows import rows_of_window
-from planner.smoothing.joint_solver import JointProblem, improve_window
 from planner.smoothing.relax import TIGHTENED, next_window
 from planner.smoothing.runs import SplineRuns
 from planner.smoothing.sites import Sites, with_radius
@@ -68,7 +68,7 @@ class Improved(NamedTuple):
     iterations: FloatArray  # (Q,) of its windows together
 
 
-class JointRun(NamedTuple):
+class CombinedRun(NamedTuple):
     """One run that is improved: n control points, in the A axes that it moves in."""
 
     corridor: Corridor  # in all axes
@@ -161,7 +161,7 @@ def _improve_window(run, radius, lo, hi, y):
     objective_of_window(places, (first, last, a), run.pull, run.pulled, band, linear)
     rows = rows_of_window(places, first, last, a)
     sites = _sites_of_window(with_radius(run.sites, radius), lo, hi, spans)
-    problem = JointProblem(band, linear, free, rows, run.control[a:b], sites)
+    problem = CombinedProblem(band, linear, free, rows, run.control[a:b], sites)
     time = places.weight[first:last].sum()
     found, iterations = improve_window(problem, y[a:b], time, run.gap * time, ITERATIONS)
     y[a:b] = found
@@ -218,7 +218,7 @@ def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, ag
         places = places_of_run(knots, own, motion, bound, _columns(limits.axes, moving), first, last)
         free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
         pulled = limits.pulled[moving]
-        run = JointRun(
+        run = CombinedRun(
             run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, pull[q], gap, again
         )  # fmt: skip
         y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)

@@ -31,7 +31,7 @@ from planner.tube.run import TubeRun
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
 # divided into.
-WINDOW, OVERLAP, LEAST = 1000, 150, 60
+WINDOW, OVERLAP, LEAST = 1500, 120, 60
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
 JOIN_WITHIN = 40
 # What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do not converge with the

@@ -45,9 +45,8 @@ class Interpreter:
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
-        self.state = self.setup.start()
-        self.store = Store()
         self.assumed = Assumed(reading)
+        self.mover = Mover(self.setup.start(), Store(), self.assumed, self.setup.feed_default, self.note)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
@@ -58,7 +57,24 @@ class Interpreter:
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
         self.found = Findings()
-        self.mover = Mover(self.state, self.store, self.assumed, self.setup.feed_default, self.note)
+
+    @property
+    def state(self) -> State:
+        """What is in force, and where the axes are; another one may be put in its place for a while."""
+        return self.mover.state
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self.mover.state = state
+
+    @property
+    def store(self) -> Store:
+        """The blocks so far; another one may be put in its place for a while."""
+        return self.mover.store
+
+    @store.setter
+    def store(self, store: Store) -> None:
+        self.mover.store = store
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""

@@ -32,7 +32,7 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE, ORDER
-from planner.smoothing.combined import MotionLimits, improve
+from planner.smoothing.combined import MotionLimits, StepAim, improve
 from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
@@ -43,7 +43,9 @@ FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]
 GAP = 1e-4  # of the convex problem with the multipliers, share of the run's time [-]
-AGAIN = 2  # times at most in windows around sites that are tightened; 1 and 3 end up to 2.4e-4 later and 1e-4 earlier, on a spiral
+# Times at most in windows around sites that are tightened. Of 32 plans (benchmarks/results/ablation-retries.md), 0 makes 24 longer or
+# shorter, 4.2e-4 longer on the mean and 6e-3 at most; 1 makes 14 so, 9e-5 longer on the mean and 1.8e-3 at most.
+AGAIN = 2
 UNBOUNDED = 1e12  # stands for a feed or an acceleration that nothing bounds [mm/s], [mm/s2]
 
 
@@ -89,11 +91,8 @@ def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape,
         shape.runs,
         shape.used,
         motion,
-        _bounds(planned, on),
-        MotionLimits(limits, scale[:axes].copy()),
-        pull,
-        gap,
-        AGAIN,
+        MotionLimits(limits, scale[:axes].copy(), _bounds(planned, on)),
+        StepAim(pull, gap, AGAIN),
     )
     # where the curve leaves the tolerance between its sites, the nearest one that does not
     new = splines._replace(control=step.control)

@@ -53,7 +53,7 @@ from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
 from planner.feedrate.jerk.columns import ProblemColumns, columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.part import LONG
-from planner.feedrate.jerk.piece import Piece, Solved, slow_down
+from planner.feedrate.jerk.piece import Piece, Solved, slowed_piece
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.lagrangian import lagrangian
@@ -169,7 +169,7 @@ class JerkLimited:
             problem = replace(problem, limit_scale=scale)
             columns = columns_of(problem)
         at = np.unique(np.searchsorted(problem.piece, [own.first for own in ranges], side="right") - 1)
-        slower = [slow_down(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in at]
+        slower = [slowed_piece(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in at]
         most = max([1.0, *slower, *(piece.slower for piece in pieces)])
         stops = sum(len(piece.stops) for piece in pieces)
         again = {"pieces": len(whole), "ranges": len(ranges), "kept": sum(not one.solved for one in work)}

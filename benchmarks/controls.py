@@ -9,8 +9,8 @@ starves its queue. Setpoints always run in real time, on HAL, as the user `lcnc`
 
 The machine is peers.toml: 100 mm/s and 2000 mm/s2 per axis, tolerance 0.05 mm; the plan keeps a jerk of 2e5 mm/s3 besides, which
 LinuxCNC 2.9 does not know. Programs get G64 P0.05 Q0; the exported one has a G64 of its own, and is made of a plan with nine tenths of
-the tolerance. Times are counted in servo periods of the motion, from the first to the last that moves; the errors are what the
-verifier finds of it.
+the tolerance where that is predicted to be the faster one. Times are counted in servo periods of the motion, from the first to the
+last that moves; the errors are what the verifier finds of it.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def row_of(
 
 
 def measure(job: str, machine: Machine, peers: Path, real: bool) -> list[dict[str, Any]]:
-    """The four rows of a job."""
+    """The four rows of a job; that of the exported program says what was exported and what the model predicted."""
     source = SHARED / "peers" / "programs" / f"{job}.ngc"
     program = planner.read_program(source, machine)
     plan = planner.plan(program, machine)
@@ -125,6 +125,7 @@ def measure(job: str, machine: Machine, peers: Path, real: bool) -> list[dict[st
             row_of(way, *on_linuxcnc(peers, file, work, real), program, machine)
             for way, file in files.items()
         ]
+        rows[2] |= {"exported": made.sentence, "predicted": made.predicted}
         rows.append(row_of("streamed", *streamed(plan, work), program, machine))
     return [{"job": job, "planned_time": plan.cycle_time, **row} for row in rows]
 
@@ -144,7 +145,7 @@ def main() -> None:
     shown = [
         [
             row["job"],
-            row["way"],
+            row["way"] + (f": {row['exported']}" if "exported" in row else ""),
             f"{row['cycle_time']:.3f}",
             "-" if row["contour_error_um"] is None else f"{row['contour_error_um']:.1f}",
             "-" if row["vertex_error_um"] is None else f"{row['vertex_error_um']:.1f}",

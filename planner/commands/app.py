@@ -15,12 +15,14 @@ from planner.commands.plan import plan_command
 from planner.commands.pulses import pulses_command
 from planner.commands.report import report_command
 from planner.commands.sweep import sweep_command
+from planner.commands.usage import PlainCommand, PlainGroup
 from planner.commands.verify import verify_command
 from planner.commands.what_if import what_if_command
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 
 app = typer.Typer(
+    cls=PlainGroup,
     help="The fastest motion of an NC program within the limits of a machine, planned and verified.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -46,23 +48,29 @@ def common(
     """The fastest motion of an NC program within the limits of a machine, planned and verified."""
 
 
-for name, command in {
-    "plan": plan_command,
-    "what-if": what_if_command,
-    "sweep": sweep_command,
-    "compare": compare_command,
-    "verify": verify_command,
-    "info": info_command,
-    "expand": expand_command,
-    "pulses": pulses_command,
-    "export": export_command,
-    "report": report_command,
+# Every command with the line that `planner --help` has of it; its docstring is what its own --help says.
+for name, (command, line) in {
+    "plan": (plan_command, "Plan and verify the motion of a program, or of several."),
+    "what-if": (what_if_command, "What other limits would change: foretold and planned again."),
+    "sweep": (sweep_command, "Plan a program over ranges of limits, into a table."),
+    "compare": (compare_command, "Plan a program with several methods, side by side."),
+    "verify": (verify_command, "Judge a trajectory file, from any source."),
+    "info": (info_command, "What a program contains, and what is not supported."),
+    "expand": (expand_command, "Write a program without parameters, loops and calls."),
+    "pulses": (pulses_command, "Make step and direction pulses of a trajectory."),
+    "export": (export_command, "Write a plan for a control."),
+    "report": (report_command, "Write the page of a plan that opens in a browser."),
 }.items():
-    app.command(name)(command)
+    app.command(name, cls=PlainCommand, short_help=line)(command)
 
-machine_app = typer.Typer(help="Machine files.", no_args_is_help=True, rich_markup_mode=None)
-machine_app.command("list")(list_machines)
-machine_app.command("show")(show_machine)
-machine_app.command("init")(init_file)
-machine_app.command("import")(import_file)
+machine_app = typer.Typer(
+    cls=PlainGroup,
+    help="Machine files: list, show, init, import.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+machine_app.command("list", cls=PlainCommand)(list_machines)
+machine_app.command("show", cls=PlainCommand)(show_machine)
+machine_app.command("init", cls=PlainCommand)(init_file)
+machine_app.command("import", cls=PlainCommand)(import_file)
 app.add_typer(machine_app, name="machine")

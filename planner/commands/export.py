@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from planner.base.errors import InputError
+from planner.commands.options import length_option
 from planner.commands.terminal import guarded, say
 
 
@@ -54,18 +55,15 @@ def export_command(
     unit: Annotated[Unit, typer.Option("--unit", help="length unit of the files")] = Unit.mm,
     within: Annotated[
         float | None,
-        typer.Option(
-            "--within",
-            metavar="MM",
-            help="pvt: how far the cubics between rows may be from the setpoints [mm] (default 0.001)",
+        length_option(
+            "--within", "pvt: how far the cubics between rows may be from the setpoints [mm] (default 0.001)"
         ),
     ] = None,
     tolerance: Annotated[
         float | None,
-        typer.Option(
+        length_option(
             "--tolerance",
-            metavar="MM",
-            help="programs: what plan and chords may be off the program together [mm] (default: that of the plan)",
+            "programs: what plan and chords may be off the program together [mm] (default: that of the plan)",
         ),
     ] = None,
 ) -> None:
@@ -79,13 +77,13 @@ def export_command(
         raise InputError(f"--tolerance is for programs; --for {for_} takes every setpoint as it is")
     from planner.control_files.pvt import WITHIN, write_pvt
     from planner.control_files.stream import write_stream
-    from planner.report.trajectory_reader import read_trajectory
+    from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     if within is not None and for_ is not For.pvt:
         raise InputError(f"--within is for pvt; --for {for_} takes every setpoint as it is")
     if os.path.lexists(output):
         raise InputError("exists already and is not overwritten; give another name", source=str(output))
-    trajectory = read_trajectory(_trajectory(plan)).trajectory
+    trajectory = read_trajectory(trajectory_file(plan)).trajectory
     new = output.with_name(f".{output.name}.{os.getpid()}")
     try:
         new.mkdir(parents=True)
@@ -110,8 +108,6 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
 
     if os.path.lexists(output):
         raise InputError("exists already and is not overwritten; give another name", source=str(output))
-    if tolerance is not None and not 0 < tolerance < float("inf"):
-        raise InputError(f"--tolerance must be above 0 mm, found {tolerance:g}")
     if not plan.is_dir():
         raise InputError(
             "give the directory that 'plan -o' wrote: the program is needed too", source=str(plan)
@@ -128,18 +124,7 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
     finally:
         shutil.rmtree(new, ignore_errors=True)
     say(f"{output / made.file}: {made.sentence}")
+    if made.note is not None:
+        say(f"note: {made.note}", err=True)
     for name, seconds in made.predicted.items():
         say(f"  {seconds:10.4f} s predicted by a model of {for_.value}'s planner: {name}")
-
-
-def _trajectory(plan: Path) -> Path:
-    """The trajectory file of a plan. Raises InputError if its directory has none."""
-    if not plan.is_dir():
-        return plan
-    found = [plan / f"trajectory.{suffix}" for suffix in ("parquet", "csv", "npz")]
-    for file in found:
-        if file.exists():
-            return file
-    raise InputError(
-        "no trajectory in this directory; write one with: planner plan JOB -o DIR", source=str(plan)
-    )

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from planner.base.errors import InputError
+from planner.commands.options import length_option
 from planner.commands.terminal import guarded, say, show
 
 
@@ -64,9 +65,7 @@ def import_file(
             help="time in which an axis builds up its acceleration [s], for jerks that the control does not know (default 0.04)",
         ),
     ] = None,
-    tolerance: Annotated[
-        float | None, typer.Option("--tolerance", metavar="MM", help="contour tolerance [mm]")
-    ] = None,
+    tolerance: Annotated[float | None, length_option("--tolerance", "contour tolerance [mm]")] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
+import re
 from collections.abc import Callable, Container, Iterable
 from enum import StrEnum
 from pathlib import Path
@@ -13,9 +15,12 @@ import typer
 
 from planner.base import names
 from planner.base.errors import InputError
+from planner.base.units import MICROMETRE, MM_PER_INCH
 from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore_list
 
 DEFAULT_MACHINE = "mill"
+LENGTHS = {"mm": 1.0, "um": MICROMETRE, "µm": MICROMETRE, "in": MM_PER_INCH}
+_LENGTH = re.compile(rf"([^a-zµ]+(?:e[-+]?\d+)?)\s*({'|'.join(LENGTHS)})?")
 
 
 class Format(StrEnum):
@@ -53,6 +58,25 @@ def _choice(
         help=help_text,
         autocompletion=lambda incomplete: [each for each in offered if each.startswith(incomplete)],
     )
+
+
+def length_option(name: str, help_text: str) -> Any:
+    """An option that takes a length above 0: in mm, or with a unit, such as 20um."""
+
+    def parsed(text: str) -> float:
+        found = _LENGTH.fullmatch(text)
+        try:
+            value = float(found[1]) * LENGTHS[found[2] or "mm"] if found else math.nan
+        except ValueError:
+            value = math.nan
+        if not 0.0 < value < math.inf:
+            units = ", ".join(LENGTHS)
+            raise typer.BadParameter(
+                f"'{text}' is no length above 0; write one in mm, or with a unit: {units}"
+            )
+        return value
+
+    return typer.Option(name, metavar="MM", parser=parsed, help=help_text)
 
 
 def _machines(incomplete: str) -> list[str]:
@@ -105,7 +129,7 @@ CornerOption = Annotated[str | None, CORNER]
 EffortOption = Annotated[str | None, EFFORT]
 SolverOption = Annotated[str | None, SOLVER]
 RoundsOption = Annotated[int | None, ROUNDS]
-Jobs = Annotated[list[Path], typer.Argument(metavar="JOB...", help="NC program, or several")]
+Jobs = Annotated[list[Path], typer.Argument(metavar="JOB", help="NC program, or several")]
 Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
 MachineOption = Annotated[
     str | None,
@@ -119,9 +143,9 @@ MachineOption = Annotated[
 ]
 ToleranceOption = Annotated[
     float | None,
-    typer.Option(
-        metavar="MM",
-        help="contour tolerance; takes precedence over G64 P in the program and over the machine file",
+    length_option(
+        "--tolerance",
+        "contour tolerance [mm], or with a unit: 20um; takes precedence over G64 P in the program and over the machine file",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]

@@ -19,7 +19,11 @@ if TYPE_CHECKING:
 @guarded
 def pulses_command(
     trajectory: Annotated[
-        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
+        Path,
+        typer.Argument(
+            metavar="TRAJECTORY",
+            help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote",
+        ),
     ],
     steps: Annotated[
         str, typer.Option(metavar="x=400,y=400", help="pulses per mm of each axis (rotary axes: per degree)")
@@ -43,12 +47,13 @@ def pulses_command(
     """
     from planner.motion.pulses import Drive, overrun, pulses_of
     from planner.report.pulse_file import check_pulse_place, write_pulses
-    from planner.report.trajectory_file import read_trajectory
+    from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     wanted = parse_steps(steps)
     if output is not None:
         check_pulse_place(output, [trajectory], force=force)
     drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
+    trajectory = trajectory_file(trajectory)
     read = read_trajectory(trajectory)
     trains = pulses_of(read.trajectory, wanted)
     faults = overrun(trains, drive)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from planner.base.errors import InputError
 from planner.commands.options import ForceOption
 from planner.commands.terminal import guarded, say
 
@@ -21,6 +23,8 @@ def report_command(
     force: ForceOption = False,
 ) -> None:
     """Write a page of a plan that opens in a browser: path, profiles, NC lines, corners, verdict."""
+    if not os.path.isdir(directory):
+        raise InputError("give the directory that 'plan -o' wrote", source=str(directory))
     from planner.report.html.page import REPORT, check_report_place, report_page
     from planner.report.html.saved import saved_plan
     from planner.report.replace import replacing_file

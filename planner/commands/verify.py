@@ -39,7 +39,11 @@ if TYPE_CHECKING:
 @takes_reading
 def verify_command(
     trajectory: Annotated[
-        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz)")
+        Path,
+        typer.Argument(
+            metavar="TRAJECTORY",
+            help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote",
+        ),
     ],
     job: Job,
     machine: Annotated[
@@ -69,7 +73,7 @@ def verify_command(
     from planner.nc.reader import read_program
     from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
-    from planner.report.trajectory_file import read_trajectory
+    from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
     from planner.verify import verify
     from planner.verify.axes import fit_axes
     from planner.verify.judge import NOT_LIMITED_NAMES
@@ -77,6 +81,9 @@ def verify_command(
     unjudged = tuple(not_limited or ())
     for name in unjudged:
         known_name("limit", name, NOT_LIMITED_NAMES)
+    if job.suffix[1:].lower() in FORMATS and trajectory.suffix[1:].lower() not in FORMATS:
+        raise InputError(f"the trajectory comes first: planner verify {job} {trajectory}")
+    trajectory = trajectory_file(trajectory)
     read = read_trajectory(trajectory)
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
-from planner.constraints.limit import Cap
+from planner.constraints.limit import Cap, Limit
 from planner.constraints.limits import ACCELERATION, JERK, LIMITS, VELOCITY
 from planner.constraints.on_grid import OnGrid
 from planner.constraints.own_axes import own_inside, with_own_axes
@@ -71,17 +73,23 @@ def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
     return np.minimum(feed_sq, own_inside(samples, machine)) if machine.own else feed_sq
 
 
-def _caps(grid: OnGrid) -> _Caps:
-    """The smallest caps of all limits."""
+def bounds_of(samples: PathSamples, machine: Machine, limits: Sequence[Limit]) -> FloatArray:
+    """(P,) bound of feed^2 by some of `LIMITS` alone, without limits of one's own; inf where they bound nothing [mm2/s2]."""
+    return _caps(OnGrid(samples, machine), limits).feed_sq_max
+
+
+def _caps(grid: OnGrid, limits: Sequence[Limit] = LIMITS) -> _Caps:
+    """The smallest caps of limits."""
     caps = _Caps(len(grid.samples))
-    for limit in LIMITS:
+    for limit in limits:
         for cap in limit.at_points(grid):
             caps.tighten(cap)
-    for side in grid.sides():
-        for limit in LIMITS:
+    sided = [limit for limit in limits if type(limit).on_side is not Limit.on_side]
+    for side in grid.sides() if sided else ():
+        for limit in sided:
             for cap in limit.on_side(side, grid.machine):
                 caps.tighten(Cap(cap.name, cap.feed_sq * (1.0 - CURVATURE_MARGIN)))
-    for limit in LIMITS:
+    for limit in limits:
         for cap in limit.at_jumps(grid):
             caps.tighten(cap)
     return caps

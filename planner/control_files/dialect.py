@@ -67,6 +67,12 @@ def polyline_text(
     said_of = 0
     letters = [letter.upper() for letter in axes]
     position, feed, mode = line.points[0], "", ""
+    if position.any():  # a path of points may begin anywhere, and nothing but this leads there
+        rapid_speed = (
+            f" F{round_down(float(np.min(rapid)) * SECONDS_PER_MINUTE)}" if dialect.modal_rapids else ""
+        )
+        there = " ".join(f"{letter}{_number(value)}" for letter, value in zip(letters, position, strict=True))
+        said.append(f"G0 {there}{rapid_speed}")
     for k, end in enumerate(line.points[1:]):
         block = int(line.block[k])
         while said_of < len(words_between) and words_between[said_of][0] <= block:

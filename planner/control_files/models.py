@@ -38,6 +38,9 @@ from planner.machine import Machine
 ControlName = Literal["grbl", "klipper", "marlin"]
 # Turning angles below this pass at any speed [rad]: 1 - s would be lost in rounding.
 STRAIGHT = 1e-6
+STANDING = (
+    1e-12  # a speed of nothing [mm/s], so that pieces without a length where the motion stands take no time
+)
 SMALL_BLOCK, SMALL_TURN = 1.0, np.pi / 4  # Marlin's "small segments": shorter [mm], and turning by less [rad]
 
 
@@ -101,25 +104,25 @@ def predicted_time(
     stands = np.add.reduceat(stop, ends) > 0
     way, length, feed = step[moves] / length[moves, None], length[moves], feed[moves]
     velocity, acceleration = (machine.limits(name, axes) for name in ("velocity", "acceleration"))
-    top = np.minimum(feed, _along(way, velocity))
+    top = np.minimum(feed, along(way, velocity))
     if control.block_time:
         top = np.minimum(top, length / control.block_time)
-    accel = np.full(len(length), acceleration.min()) if control.square_corner else _along(way, acceleration)
+    accel = np.full(len(length), acceleration.min()) if control.square_corner else along(way, acceleration)
     corner = _corner_sq(way, length, accel, acceleration, control)
     bound = np.append(np.append(0.0, np.minimum(corner, np.minimum(top[1:], top[:-1]) ** 2)), 0.0)
     bound[stands] = 0.0
     if control.square_corner is not None:
         return float(_smoothed_times(length, top**2, accel, bound).sum())
     gain = 2.0 * accel * length
-    v_sq = _reachable(bound, gain)
+    v_sq = reachable(bound, gain)
     if control.blocks is not None:
-        v_sq = _reachable(np.minimum(v_sq, _stoppable(gain, control.blocks)), gain)
+        v_sq = reachable(np.minimum(v_sq, stoppable(gain, control.blocks)), gain)
     peak = np.minimum(top**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
-    return float(_times(length, accel, v_sq[:-1], peak, v_sq[1:]).sum())
+    return float(times(length, accel, v_sq[:-1], peak, v_sq[1:]).sum())
 
 
-def _along(way: FloatArray, limit: FloatArray) -> FloatArray:
-    """(n,) what limits (A,) of the axes allow along unit vectors (n, A)."""
+def along(way: FloatArray, limit: FloatArray) -> FloatArray:
+    """(n,) what the limits of the axes allow along directions: limit (A,), way (n, A) unit vectors."""
     with np.errstate(divide="ignore"):
         allowed: FloatArray = (limit / np.abs(way)).min(axis=1)
     return allowed
@@ -143,7 +146,7 @@ def _corner_sq(
     else:
         assert control.deviation is not None
         size = np.linalg.norm(bisector, axis=1, keepdims=True)
-        a = _along(np.divide(bisector, size, out=np.zeros_like(bisector), where=size > 0), limit)
+        a = along(np.divide(bisector, size, out=np.zeros_like(bisector), where=size > 0), limit)
         found = a * control.deviation * ratio
         if control.name == "marlin":
             small = (length[1:] < SMALL_BLOCK) & (2.0 * half_turn < SMALL_TURN)
@@ -151,15 +154,15 @@ def _corner_sq(
     return np.where(straight, np.inf, found)
 
 
-def _reachable(bound: FloatArray, gain: FloatArray) -> FloatArray:
-    """(n+1,) squares of speeds within bounds (n+1,) that blocks with 2 a l = gain (n,) lead to, and lead on from."""
+def reachable(bound: FloatArray, gain: FloatArray) -> FloatArray:
+    """(n+1,) squares of speeds, each at most its bound (n+1,), that blocks with 2 a l = gain (n,) lead to, and lead on from."""
     s = np.append(0.0, np.cumsum(gain))
     back = np.minimum.accumulate((bound + s)[::-1])[::-1] - s
     found: FloatArray = np.minimum.accumulate(back - s) + s
     return np.maximum(found, 0.0)
 
 
-def _stoppable(gain: FloatArray, blocks: int) -> FloatArray:
+def stoppable(gain: FloatArray, blocks: int) -> FloatArray:
     """(n+1,) squares of speeds from which the motion can stand within so many blocks, gain (n,)."""
     s = np.append(0.0, np.cumsum(gain))
     ahead = np.minimum(np.arange(len(s)) + blocks, len(s) - 1)
@@ -167,13 +170,15 @@ def _stoppable(gain: FloatArray, blocks: int) -> FloatArray:
     return found
 
 
-def _times(
+def times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
-    """(n,) times of blocks from x0 over a peak to x1, squares of speeds (n,), with constant acceleration."""
+    """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
     ramps = (2.0 * v * v - x0 - x1) / (2.0 * accel)
-    times: FloatArray = (2.0 * v - v0 - v1) / accel + np.maximum(length - ramps, 0.0) / v
+    times: FloatArray = (2.0 * v - v0 - v1) / accel + np.maximum(length - ramps, 0.0) / np.maximum(
+        v, STANDING
+    )
     return times
 
 
@@ -185,10 +190,10 @@ def _smoothed_times(length: FloatArray, top: FloatArray, accel: FloatArray, boun
     """
     gain = 2.0 * accel * length
     half = 0.5 * gain
-    fast = _reachable(bound, gain)
+    fast = reachable(bound, gain)
     along = np.append(0.0, np.cumsum(half))
     forward = np.minimum.accumulate(bound - along) + along
-    smooth = _reachable(bound, half)
+    smooth = reachable(bound, half)
     peak = np.empty(len(length))
     held, brakes = 0.0, False
     for i in range(len(length) - 1, -1, -1):
@@ -205,4 +210,4 @@ def _smoothed_times(length: FloatArray, top: FloatArray, accel: FloatArray, boun
         before = peak[i] if not np.isnan(peak[i]) else before
         peak[i] = before
     highest = np.minimum(np.minimum(top, 0.5 * (fast[1:] + fast[:-1] + gain)), peak)
-    return _times(length, accel, np.minimum(fast[:-1], highest), highest, np.minimum(fast[1:], highest))
+    return times(length, accel, np.minimum(fast[:-1], highest), highest, np.minimum(fast[1:], highest))

@@ -22,7 +22,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.columns import columns_of
+from planner.feedrate.jerk.columns import ProblemColumns, columns_of
 from planner.feedrate.jerk.rows import duration
 from planner.feedrate.solution import FeedrateSolution
 
@@ -50,9 +50,11 @@ class _Profile(NamedTuple):
     pi: FloatArray
 
 
-def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangian:
+def lagrangian(
+    problem: FeedrateProblem, solution: FeedrateSolution, columns: ProblemColumns | None = None
+) -> Lagrangian:
     """The Lagrangian of a problem at the profile and the multipliers of a solution, of this problem or of a neighbouring one on a
-    corresponding grid. Raises ValueError if the solution has no multipliers."""
+    corresponding grid; `columns` are those of the problem, if they are known. Raises ValueError if the solution has no multipliers."""
     found = solution.multipliers
     if found is None:
         raise ValueError(f"lagrangian: {solution.solver} gives no multipliers")
@@ -65,7 +67,7 @@ def lagrangian(problem: FeedrateProblem, solution: FeedrateSolution) -> Lagrangi
         pi=found.dynamics,
     )
     value, of_acceleration, of_jerk, of_rows, of_feed = _lagrangian(
-        columns_of(problem), problem.interval, profile
+        columns or columns_of(problem), problem.interval, profile
     )
     return Lagrangian(
         value=value, acceleration=of_acceleration, jerk=of_jerk, rows=of_rows, feed_sq_max=of_feed

@@ -44,6 +44,8 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis that moves and that the machine lacks,
     and coordinates beyond `COORDINATE_MAX`.
     """
+    if isinstance(tolerance, str):
+        raise InputError(f"tolerance '{tolerance}'; give a number, in mm")
     if tolerance is not None and not (0 < tolerance < np.inf):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
     axis = _axes_in_use(program, machine)

@@ -7,10 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.nc.program import Kind, PathControl, Program
-
-AXES = ("x", "y", "z")
-SOURCE = "<points>"
+from planner.nc.points import AXES, program_of_points
+from planner.nc.program import Program
 
 
 def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float | None = None) -> Program:
@@ -35,22 +33,8 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
     moves = len(position) - 1
     if tolerance is not None and not 0 < tolerance < np.inf:
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
-    nothing, none = np.zeros(0), np.zeros((0, len(AXES)))
-    return Program(
-        source=SOURCE,
-        axes=AXES,
-        start=position[0],
-        kind=np.full(moves, Kind.RAPID if feed is None else Kind.LINE),
-        end=position[1:],
-        feed=np.full(moves, np.inf) if feed is None else _feeds(feed, moves),
-        dwell=np.zeros(moves),
-        line=np.arange(1, moves + 1),
-        path_control=np.full(moves, PathControl.BLEND),
-        tolerance=np.full(moves, np.nan if tolerance is None else tolerance),
-        arc_block=nothing,
-        arc_center=none,
-        arc_normal=nothing,
-        arc_sweep=nothing,
+    return program_of_points(
+        position, np.full(moves, np.inf) if feed is None else _feeds(feed, moves), tolerance
     )
 
 

@@ -66,5 +66,7 @@ def _read(path: Path) -> str:
             f"machine file not found; give a TOML file or one of the built-in machines: {names}{hint}",
             source=str(path),
         ) from fault
+    except IsADirectoryError as fault:
+        raise InputError("this is a directory; give the machine file", source=str(path)) from fault
     except (OSError, UnicodeDecodeError) as fault:
         raise InputError(f"machine file cannot be read: {fault}", source=str(path)) from fault

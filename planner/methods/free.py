@@ -14,9 +14,12 @@ from planner.geometry.toolpath import Toolpath
 from planner.job.job import Delivered, Job
 from planner.job.method import Method
 from planner.job.plan import Plan
+from planner.job.records import NO_TABLES, Tables
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import passing_times, standstills
+from planner.sensitivity.found_activity import found_history
+from planner.sensitivity.found_prices import found_prices
 from planner.tube.guess import Guess, guess_from
 from planner.tube.own import TubeOwn
 from planner.tube.parts import Found, parts_of
@@ -26,12 +29,14 @@ from planner.tube.splice import Spliced, SplicedRun
 
 # The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
+# Share of the time without prices from which that is said, and from which those of the start say more [-].
+UNPRICED, UNPRICED_MOST = 0.01, 0.5
 
 
 def freed(job: Job, plan: Plan) -> Plan:
     """The plan with a faster motion near its own where one is found (tube/own.py), else the plan.
 
-    What holds the motion at its limits is not told of the faster one, and what limits cost stays that of the plan.
+    What holds the motion, and what limits cost, is told from the search (`told`).
     """
     filtered, curves = job.real[0].fir is not None, (job.toolpath.curve >= 0).any()
     if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed or filtered or curves:
@@ -51,13 +56,13 @@ def freed(job: Job, plan: Plan) -> Plan:
     )
     if made[0] is plan.trajectory:
         return plan
-    if plan.prices is not None:
-        job.note("what limits cost is told of the motion before geometry and feed were found together")
+    tables = told(job, plan, made[0], found, kept)
     return dataclasses.replace(
         plan,
         trajectory=made[0],
         verdict=made[1],
-        grid=None,
+        grid=tables.grid,
+        prices=tables.prices,
         sentence=f"{plan.sentence}; then {said(job, starts.made[0], found, kept, why)[1]}",
         notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),
         timings=job.stages.timings,
@@ -156,7 +161,9 @@ def search(k: int, run: TubeRun, starts: Starts, solver: TubeSolver) -> Found:
             why.append("the search did not end faster than its start")
             continue
         times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
-        return Found(run, solution.status, solution.sentence, steps, solution.place, times, kept)
+        return Found(
+            run, solution.status, solution.sentence, steps, solution.place, times, kept, solution.price
+        )
     return Found(run, Status.ACCEPTABLE, why[0])
 
 
@@ -184,6 +191,26 @@ def delivered(job: Job, first: Start, found: list[Found]) -> tuple[Delivered, li
         missed = set() if filtered else _missed(job, motion, found) - set(kept)
         kept = sorted(missed | set(kept)) if missed else list(range(len(found)))
     return (start[0], start[1]), kept, why
+
+
+def told(job: Job, start: Plan, trajectory: Trajectory, found: list[Found], kept: list[int]) -> Tables:
+    """What holds the motion that was delivered, and what limits and tolerance cost (sensitivity/found_*.py), of the search where it
+    tells: not on the runs in `kept`, of which a note speaks, and not behind filters."""
+    if job.real[0].fir is not None:
+        return NO_TABLES
+    with job.stage("report"):
+        taken = [one for k, one in enumerate(found) if k not in kept]
+        prices = found_prices(job.toolpath, job.machine, taken, trajectory.cycle_time)
+        grid = found_history(job.toolpath, job.motion_of[trajectory], found, kept, start.grid)
+    moving = trajectory.cycle_time - float(job.toolpath.dwell.sum())
+    unpriced = 1.0 - sum(one.priced_time() for one in taken) / moving
+    if prices is None or unpriced > UNPRICED_MOST:
+        prices = start.prices
+        if prices is not None:
+            job.note("what limits cost is told of the motion before geometry and feed were found together")
+    elif unpriced > UNPRICED:
+        job.note(f"what limits cost leaves out {unpriced:.2g} of the time, on which the motion before stays")
+    return Tables(grid=grid, prices=prices)
 
 
 def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -139,9 +140,10 @@ def _given(settings: MethodSettings) -> MethodSettings:
     """The settings that are set. Raises TypeError for others than those of `MethodSettings`."""
     unknown = settings.keys() - MethodSettings.__annotations__.keys()
     if unknown:
-        raise TypeError(
-            f"unexpected keyword argument '{min(unknown)}'; settings are {', '.join(MethodSettings.__annotations__)}"
-        )
+        wrong, allowed = min(unknown), (*MethodSettings.__annotations__, "tolerance", "limits", "reading")
+        near = difflib.get_close_matches(wrong, allowed, n=1, cutoff=0.4)
+        hint = f" (did you mean '{near[0]}'?)" if near else ""
+        raise TypeError(f"unexpected keyword argument '{wrong}'; settings are {', '.join(allowed)}{hint}")
     given = {name: value for name, value in settings.items() if value is not None and value is not False}
     return cast(MethodSettings, given)
 

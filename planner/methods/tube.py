@@ -23,7 +23,8 @@ from planner.feedrate.solution import Status
 from planner.job.job import Delivered, Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.methods.free import Starts, delivered, said, search
+from planner.job.records import NO_TABLES, Tables
+from planner.methods.free import Starts, delivered, said, search, told
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
 from planner.tube.parts import Found
@@ -62,10 +63,17 @@ class TubeMethod(Method):
         made, kept, why = delivered(job, first, found)
         status, sentence = said(job, first, found, kept, why)
         grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.plan.grid_points
-        return self._plan(job, made, status, sentence, grid_points)
+        tables = told(job, first.plan, made[0], found, kept)
+        return self._plan(job, made, status, sentence, grid_points, tables)
 
     def _plan(
-        self, job: Job, made: Delivered | None, status: Status, sentence: str, grid_points: int
+        self,
+        job: Job,
+        made: Delivered | None,
+        status: Status,
+        sentence: str,
+        grid_points: int,
+        tables: Tables = NO_TABLES,
     ) -> Plan:
         """The plan of this method with what was delivered."""
         return job.plan(
@@ -76,6 +84,7 @@ class TubeMethod(Method):
             status=status,
             sentence=sentence,
             grid_points=grid_points,
+            tables=tables,
         )
 
 

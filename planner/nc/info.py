@@ -221,7 +221,8 @@ def _set_spline_tangents(program: Program, leaving: FloatArray, arriving: FloatA
 def _count_events(program: Program) -> dict[str, int]:
     """Events by letter (S, T) or code (M3, G97), without making an object of each."""
     table = program.events
-    assert isinstance(table, EventTable)
+    if not isinstance(table, EventTable):  # of a program of points, which has none
+        return {}
     pairs = np.column_stack([table.letter, table.value])
     counts: dict[str, int] = {}
     for (letter, value), count in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):

@@ -5,6 +5,8 @@ and what to do. The content of a text says which of the two it is, and its name 
 from __future__ import annotations
 
 import dataclasses
+import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -18,8 +20,11 @@ from planner.nc.interpreter import Interpreter
 from planner.nc.language.detect import LATHE_NOTE, dialect_of, is_turned
 from planner.nc.leader import without_leader
 from planner.nc.lexer import Words, split_words, text_alone
+from planner.nc.points import are_points, read_points
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, LATHE, SIEMENS, Reading
+
+_WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
 
 
 def read_program(
@@ -46,6 +51,10 @@ def read_program(
     """
     if (path is None) == (text is None):
         raise InputError("give a program file, or its text as text=...")
+    if path is not None and not isinstance(path, str | os.PathLike):
+        raise InputError(
+            f"a program is a file, or planner.path(points), or planner.read_program(text=...); found a {type(path).__name__}"
+        )
     if text is not None:
         return dataclasses.replace(
             parse_program(text, machine, reading), text=text.encode() if isinstance(text, str) else text
@@ -80,6 +89,8 @@ def interpret(
     Raises InputError for an empty or binary text.
     """
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
+    if are_points(data):
+        return read_points(data, source), ()
     refuse_models(data, source)
     _check_text(data, source)
     if is_plotter_file(data, source):
@@ -155,7 +166,8 @@ def load(path: str | Path) -> bytes:
         require_ending(path)
         return Path(path).read_bytes()
     except FileNotFoundError as fault:
-        raise InputError("program file not found", source=str(path)) from fault
+        text = "; its text goes into planner.read_program(text=...)" if _WORDS.match(str(path)) else ""
+        raise InputError(f"program file not found{text}", source=str(path)) from fault
     except IsADirectoryError as fault:
         raise InputError("this is a directory; give the program file", source=str(path)) from fault
     except InputError:

@@ -31,9 +31,9 @@ What is tried more than once:
                                    the plan fails its verdict
 
 Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
-certificate fails are tightened (smoothing/relax.py). Around the loop, a job is planned again with less tolerance where chords between
-samples leave it, and with shares of the tolerance on machines with filters (job/method.py). How often each of these fires, and what
-plans lose without it, is in benchmarks/results/ablation-retries.md.
+certificate fails are tightened (smoothing/relax.py; in a round of reshaping smoothing/combined.py, twice at most). Around the loop, a
+job is planned again with less tolerance where chords between samples leave it, and with shares of the tolerance on machines with
+filters (job/method.py). How often each of these fires, and what plans lose without it, is in benchmarks/results/ablation-retries.md.
 """
 
 from __future__ import annotations
@@ -250,6 +250,14 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
 
 def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
     """The motion on the first splines, the grids, and the resolution of the one that it is on."""
+    spans, effort = len(path.spline.spans), settings.effort  # a grid has a point for each span at least
+    if settings.rounds is None and spans > effort.work and effort.grids(spans) is effort.sizes[-1]:
+        grids = effort.sizes[-1]
+        return (
+            dataclasses.replace(settings.order.solve(path, job, grids.final), shape=shape),
+            grids,
+            grids.final,
+        )
     grids, samples = grids_for(path, job, settings)
     reshaped_at_all = settings.effort.work >= len(samples) if settings.rounds is None else settings.rounds > 0
     resolution = grids.rounds if reshaped_at_all else grids.final

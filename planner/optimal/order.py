@@ -119,7 +119,7 @@ class SecondOrder:
 
 
 def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:
-    """The motion of another problem on the same grid: where only few of its limits are tighter, solved again around them only."""
+    """The motion of another problem on the same grid: where some of its limits are a little tighter, solved again around them only."""
     if isinstance(solver, JerkLimited) and _tighter_only(planned.problem, problem):
         found = solver.again(planned.problem, planned.solution, problem)
         if found is not None:

@@ -32,17 +32,20 @@ from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE, ORDER
-from planner.smoothing.combined import MotionLimits, improve
+from planner.smoothing.combined import MotionLimits, StepAim, improve
 from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
+DEAR = 0.95  # of what the tolerance costs: the runs on which a wider one is solved for [-]
 PRICED = 100_000  # points of the grid whose prices are made at a time: half a kilobyte each
 FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]
 GAP = 1e-4  # of the convex problem with the multipliers, share of the run's time [-]
-AGAIN = 2  # times at most in windows around sites that are tightened; 1 and 3 end up to 2.4e-4 later and 1e-4 earlier, on a spiral
+# Times at most in windows around sites that are tightened. Of 32 plans (benchmarks/results/ablation-retries.md), 0 makes 24 longer or
+# shorter, 4.2e-4 longer on the mean and 6e-3 at most; 1 makes 14 so, 9e-5 longer on the mean and 1.8e-3 at most.
+AGAIN = 2
 UNBOUNDED = 1e12  # stands for a feed or an acceleration that nothing bounds [mm/s], [mm/s2]
 
 
@@ -88,11 +91,8 @@ def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape,
         shape.runs,
         shape.used,
         motion,
-        _bounds(planned, on),
-        MotionLimits(limits, scale[:axes].copy()),
-        pull,
-        gap,
-        AGAIN,
+        MotionLimits(limits, scale[:axes].copy(), _bounds(planned, on)),
+        StepAim(pull, gap, AGAIN),
     )
     # where the curve leaves the tolerance between its sites, the nearest one that does not
     new = splines._replace(control=step.control)
@@ -121,10 +121,27 @@ def _bounds(planned: OnPath, on: Array) -> FloatArray:
 Bands = tuple[FloatArray, FloatArray]
 
 
-def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0) -> FloatArray:
+def dear_runs(planned: OnPath, price: FloatArray) -> Array:
+    """(Q,) True for the runs, the dearest first, that together have `DEAR` of what the tolerance costs.
+
+    price : (J,) at every site, from `corridor_prices` [s/mm]
+    """
+    first = _shape(planned).splines.site_first
+    of_run = np.bincount(np.repeat(np.arange(len(first) - 1), np.diff(first)), -price, len(first) - 1)
+    order = np.argsort(-of_run, kind="stable")
+    before = np.cumsum(of_run[order]) - of_run[order]
+    dear = np.zeros(len(of_run), dtype=bool)
+    dear[order[before < DEAR * of_run.sum()]] = True
+    return dear
+
+
+def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0, on: Array | None = None) -> FloatArray:
     """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a corridor wider by `more` [mm], in a round from the present
-    shape, with its `price_bands`."""
+    shape, with its `price_bands`; only on some of the runs (Q,), where `on` says which, and 0 on the others."""
     shape, (H, Q) = _shape(planned), bands
+    if on is not None:
+        fits = shape.splines.fits & on
+        shape = dataclasses.replace(shape, splines=shape.splines._replace(fits=fits))
     corridor = shape.corridor
     corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
     goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))

@@ -13,7 +13,7 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import Motion
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.optimal.reshape import corridor_prices, price_bands
+from planner.optimal.reshape import corridor_prices, dear_runs, price_bands
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
 from planner.sensitivity.prices import MORE_TOLERANCE, WORTH, SitePrices, price_list
@@ -63,6 +63,8 @@ def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
         now = corridor_prices(best, bands)
         # where even this slope all along would save next to nothing, the least is nothing
         worth = -now.sum() * MORE_TOLERANCE >= WORTH * best.solution.cycle_time
-        wider = corridor_prices(best, bands, MORE_TOLERANCE) if worth else np.zeros(len(now))
+        wider = np.zeros(len(now))
+        if worth:  # on cheap runs, too, the least is nothing
+            wider = corridor_prices(best, bands, MORE_TOLERANCE, dear_runs(best, now))
         by_site = SitePrices(place=best.shape.splines.sites.place, now=now, wider=wider)
     return price_list(best.samples, best.problem, best.solution, machine, by_site)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.base.names import METHODS
+from planner.base.names import METHODS, method_name
 from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
@@ -93,7 +93,8 @@ def compare(
     methods   : names, or methods with settings of your own; None for all that have names
     the others : as in `planner.plan`
 
-    Raises InputError for a program or a machine that cannot be read; what a method cannot do is its row.
+    Raises InputError for a program or a machine that cannot be read, and for a name that is no method; what a method cannot do is its
+    row.
     """
     from planner.methods.registry import DEFAULT_MACHINE
 
@@ -106,6 +107,9 @@ def compare(
     elif reading != AS_USUAL:
         raise InputError("reading: the program is read already; give the settings to read_program")
     chosen = METHODS if methods is None else methods
+    for name in chosen:
+        if isinstance(name, str):
+            method_name(name)
     return [row_of(method, program, machine, tolerance, progress) for method in chosen]
 
 

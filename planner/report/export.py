@@ -1,8 +1,8 @@
 """The files of a plan, and the plan in numbers.
 
-`trajectory.parquet`, `.csv` or `.npz` (`planner.report.trajectory_file`), `planned.ngc` if the program was read from a file
-(`planner.report.planned`), `summary.json`, and pictures if asked for. They take their places together (`planner.report.replace`), and
-trajectory and summary carry the same `run_id`.
+`trajectory.parquet`, `.csv` or `.npz` (`planner.report.trajectory_file`), `planned.ngc` if the program is an NC text
+(`planner.report.planned`), the program itself if no other file has it, `summary.json`, and pictures if asked for. They take their
+places together (`planner.report.replace`), and trajectory and summary carry the same `run_id`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.info import PLACES_SHOWN
+from planner.nc.points import SOURCE, points_file
 from planner.report.beside import beside_summary
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from planner.verify import CornerCheck, Verdict
 
 PLANNED = "planned.ngc"
+KEPT = (KEPT_TEXT, KEPT_POINTS) = ("program.ngc", "program.json")  # programs that no other file has
 NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
 PACKAGES = ("numpy", "scipy", "numba", "toppra", "pyarrow")
 
@@ -67,7 +69,7 @@ def write_plan(
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
     directory = Path(directory)
     run_id = uuid.uuid4().hex
-    kept = {PLANNED} if _is_source(plan, directory / PLANNED) else set()
+    kept = {name for name in (PLANNED, *KEPT) if _is_source(plan, directory / name)}
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
         trajectory, blocks = plan.trajectory, None
@@ -80,6 +82,8 @@ def write_plan(
         program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
+        for name, text in program_to_keep(plan).items():
+            (new / name).write_bytes(text)
         if plots:
             from planner.report.plots import write_figures
 
@@ -100,6 +104,13 @@ def write_plan(
         }
         _write_json(new / SUMMARY, said)
     return names
+
+
+def program_to_keep(plan: Plan) -> dict[str, bytes]:
+    """The program of a plan as a file, by name, if it was given as a text or as points: no other file has it. Empty otherwise."""
+    if plan.program.text is not None:
+        return {KEPT_TEXT: plan.program.text}
+    return {KEPT_POINTS: points_file(plan.program)} if plan.program.source == SOURCE else {}
 
 
 def check_places(

@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.nc.dialects import is_plotter_file
+from planner.nc.points import are_points
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
@@ -53,7 +54,7 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     assert plan.trajectory is not None
     source, data = plan.program.source, source_text(plan)
     if data is None:
-        raise LeftOut(f"the program was not read from a file, or {source} is no longer there")
+        raise LeftOut(f"the program is points, which have no F words, or {source} is no longer there")
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
     planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
@@ -90,13 +91,14 @@ def _is_source(plan: Plan, text: bytes) -> bool:
 
 
 def source_text(plan: Plan) -> bytes | None:
-    """The text of the program, if it was given as a text, or read from a file that is still there."""
-    if plan.program.text is not None:
-        return plan.program.text
-    try:
-        return Path(plan.program.source).read_bytes()
-    except (OSError, ValueError):
-        return None
+    """The NC text of the program, if it was given as a text, or read from a file that is still there; None for points."""
+    data = plan.program.text
+    if data is None:
+        try:
+            data = Path(plan.program.source).read_bytes()
+        except (OSError, ValueError):
+            return None
+    return None if are_points(data) else data
 
 
 def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:

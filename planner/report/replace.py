@@ -43,6 +43,8 @@ OUTPUTS = (
     "trajectory.csv",
     "trajectory.npz",
     "planned.ngc",
+    "program.ngc",
+    "program.json",
     "toolpath.png",
     "profiles.png",
     "report.html",

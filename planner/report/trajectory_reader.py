@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -52,6 +53,21 @@ class TrajectoryFile:
     notes: tuple[str, ...]
 
 
+def trajectory_file(path: Path) -> Path:
+    """The trajectory file that a path names: itself, or the one in a directory that `plan -o` wrote.
+
+    Raises InputError for a directory without one.
+    """
+    if not os.path.isdir(path):  # which a name that is too long is not
+        return path
+    for suffix in FORMATS:
+        if (file := path / f"trajectory.{suffix}").exists():
+            return file
+    raise InputError(
+        "no trajectory in this directory; write one with: planner plan JOB -o DIR", source=str(path)
+    )
+
+
 def read_trajectory(path: str | Path) -> TrajectoryFile:
     """Read a trajectory file, written by this package or by another program.
 
@@ -63,6 +79,8 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
     """
     path = Path(path)
     read = {".parquet": _read_parquet, ".csv": _read_csv, ".npz": _read_npz}.get(path.suffix.lower())
+    if read is None and not os.path.exists(path):
+        raise InputError("trajectory file not found", source=str(path))
     if read is None:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(FORMATS)}", source=str(path))
     try:

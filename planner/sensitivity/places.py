@@ -17,14 +17,17 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.assemble import feedrate_problem
+from planner.constraints.assemble import bounds_of, feedrate_problem
+from planner.constraints.limits import FEED, LIMITS, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.lagrangian import Lagrangian
 from planner.job.records import PlacePrices
+from planner.machine import Machine
 from planner.path.samples import PathSamples
 from planner.sensitivity.savings import Change
 
+SPEEDS = (FEED, VELOCITY)
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-]
 
 
@@ -34,15 +37,17 @@ def by_place(
     now: Lagrangian,
     faster: Change,
     by_joint: FloatArray | None,
+    rest: FloatArray | None = None,
 ) -> PlacePrices:
     """The prices of a solution by place.
 
     now      : the Lagrangian at the solution
     faster   : more of the programmed feed
     by_joint : (R+1,) dT/d(tolerance) at the joints of the path's legs [s/mm]; None where it is not known
+    rest     : what `bounds_but_speeds` gives
     """
     segments = len(samples.path.toolpath)
-    share = 1.0 - np.sqrt(problem.feed_sq_max / bounds_with(samples, faster, MORE_LIMIT))
+    share = 1.0 - np.sqrt(problem.feed_sq_max / bounds_with(samples, faster, MORE_LIMIT, rest))
     all_limits = -(now.rows + 2.0 * now.feed_sq_max) * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
     of_feed = -2.0 * now.feed_sq_max * share
     tolerance = None
@@ -56,9 +61,25 @@ def by_place(
     )
 
 
-def bounds_with(samples: PathSamples, change: Change, share: float) -> FloatArray:
-    """(P,) bounds of feed^2 with a share more feed or axis velocity [mm2/s2]."""
+def bounds_with(
+    samples: PathSamples, change: Change, share: float, rest: FloatArray | None = None
+) -> FloatArray:
+    """(P,) bounds of feed^2 with a share more feed or axis velocity [mm2/s2].
+
+    rest : the bounds by all other limits, from `bounds_but_speeds`, if they are known
+    """
     toolpath = samples.path.toolpath
     faster = dataclasses.replace(toolpath, feed=toolpath.feed * change.feed(share))
     there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=faster))
-    return feedrate_problem(there, change.machine(share)).feed_sq_max
+    machine = change.machine(share)
+    if rest is None:
+        return feedrate_problem(there, machine).feed_sq_max
+    return np.minimum(rest, bounds_of(there, machine, SPEEDS))
+
+
+def bounds_but_speeds(samples: PathSamples, machine: Machine) -> FloatArray | None:
+    """(P,) bounds of feed^2 by all limits but programmed feed and axis velocities [mm2/s2]; None with limits of one's own, whose bounds
+    are not apart from each other."""
+    if machine.own:
+        return None
+    return bounds_of(samples, machine, [limit for limit in LIMITS if limit not in SPEEDS])

@@ -17,9 +17,9 @@ are priced with the path as it is.
 (sensitivity/savings.py), on rounded corners to within a few per cent, on splines between a least and a most. For the tolerance of
 splines these are the multipliers of two rounds, one in the corridor as it is and one in the wider one, times the 10 um: a round's
 problem is convex, so its optimum falls ever less steeply. Where the first round alone promises less than `WORTH`, there is no second
-one, and the least is nothing. A plan made again finds another shape, too, and ends a little faster or slower for no other reason: by
-`UNREST`. Where least and most are so far apart that their middle may be off by more than `HINT` of itself and more than `HINT_LEAST`
-of the time, the saving is a hint only.
+one, and the least is nothing; so it is on the runs that cost least, 5 % together (optimal/reshape.py). A plan made again finds another
+shape, too, and ends a little faster or slower for no other reason: by `UNREST`. Where least and most are so far apart that their middle
+may be off by more than `HINT` of itself and more than `HINT_LEAST` of the time, the saving is a hint only.
 
 **Long periods.** Where chords between samples use more than `CHORDS` of the tolerance, a faster motion may need some of it back
 (delivery/periods.py), which no multiplier knows: 10 % more feed saved 16 % less than the problem says, 10 um half, on five points at
@@ -52,7 +52,7 @@ from planner.sensitivity.corner_prices import (
     corner_prices,
     sums,
 )
-from planner.sensitivity.places import MORE_LIMIT, bounds_with, by_place
+from planner.sensitivity.places import MORE_LIMIT, bounds_but_speeds, bounds_with, by_place
 from planner.sensitivity.savings import Change, more_of, thinned
 
 WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
@@ -93,6 +93,7 @@ def price_list(
     Raises ValueError if the solver of the solution gives no multipliers.
     """
     now = lagrangian(problem, solution)
+    rest = bounds_but_speeds(samples, machine)
     prices = solution.prices
     assert prices is not None  # solvers that give multipliers give prices
     limit, by_share = _by_share(problem, prices)
@@ -101,7 +102,7 @@ def price_list(
     velocities = [name for name in map(VELOCITY.called, problem.axes) if name in limit]
     speeds = [FEED.name, *(name for name in velocities if by_share[name] < 0.0)]
     for name in speeds:  # these are dT/d(ln limit)
-        by_share[name] = _by_speed(samples, problem, now, changes[name])
+        by_share[name] = _by_speed(samples, problem, now, changes[name], rest)
     dear, tolerance, together = None, None, None
     corners: CornerPrices | None = None
     if by_site is not None:
@@ -119,7 +120,7 @@ def price_list(
         changes["tolerance"] = Change(
             machine=lambda share: machine, tolerance=lambda share: share * MORE_TOLERANCE
         )
-    found = _Savings(samples, problem, solution, machine, changes, speeds, now).all(by_share, tolerance)
+    found = _Savings(samples, problem, solution, machine, changes, speeds, now, rest).all(by_share, tolerance)
     if by_site is not None:
         found["tolerance"] = Saving(*sorted(-MORE_TOLERANCE * float(x.sum()) for x in by_site[1:]))
     if _chord_use(samples, solution, machine) > CHORDS:
@@ -136,7 +137,7 @@ def price_list(
         corners=dear,
         ranges={name: (saving.least, saving.most) for name, saving in found.items()},
         hints=tuple(name for name, saving in found.items() if saving.vague(solution.cycle_time)),
-        places=by_place(samples, problem, now, changes[FEED.name], together),
+        places=by_place(samples, problem, now, changes[FEED.name], together, rest),
     )
 
 
@@ -191,6 +192,7 @@ class _Savings:
     changes: dict[str, Change]
     speeds: list[str]
     now: Lagrangian
+    rest: FloatArray | None  # of `bounds_but_speeds`
 
     def all(self, by_share: dict[str, float], tolerance: float | None) -> dict[str, Saving]:
         """Of `MORE_LIMIT` more of every limit, and of `MORE_TOLERANCE` more tolerance where that is a change of corners; from the
@@ -217,7 +219,7 @@ class _Savings:
             return -price
         if name not in self.speeds:
             return -price * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-        more = bounds_with(self.samples, self.changes[name], MORE_LIMIT)
+        more = bounds_with(self.samples, self.changes[name], MORE_LIMIT, self.rest)
         return -2.0 * float(self.now.feed_sq_max @ (1.0 - np.sqrt(self.problem.feed_sq_max / more)))
 
 
@@ -244,9 +246,11 @@ def _dearest(path: SmoothPath, price: FloatArray, saved: FloatArray) -> DearCorn
     )
 
 
-def _by_speed(samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change) -> float:
+def _by_speed(
+    samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change, rest: FloatArray | None
+) -> float:
     """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the other one that stays."""
-    gained = np.log(bounds_with(samples, change, STEP) / problem.feed_sq_max)
+    gained = np.log(bounds_with(samples, change, STEP, rest) / problem.feed_sq_max)
     return float(now.feed_sq_max @ gained) / STEP
 
 

@@ -46,7 +46,8 @@ INTERVALS_MIN = 12  # intervals that a piece keeps at least, as far as it has th
 # The same with limits of one's own, whose rows bend on straight legs, too: with 0.1 a job that a joint holds everywhere was 4.6 %
 # slower on the thinned grid, and more jerk of x saved 1.2 times what a new plan found; with 0.025 it is 0.7 % slower, and that is 0.98.
 STEP_OWN = 0.025
-POINTS = 25_000  # of all thinned problems together, at least; a quarter of the job's grid if that is more
+# Of all thinned problems together: a quarter of the job's grid, but no fewer and no more than these.
+POINTS, POINTS_MOST = 25_000, 200_000
 WINDOW = 1_000  # points of a window, where the thinned grid is too large
 SOLVER = JerkLimited(tol=1e-5)  # with a gap a tenth of the usual one: differences of times are wanted
 SLOPE_STEP = 1e-4  # for the thinned problem's own price [-]: as in sensitivity/prices.py
@@ -144,7 +145,7 @@ def thinned(
     again = rounds_again(samples.path)
     kept = _kept(samples, problem, solution, elements=again)
     piece, kept, sampled = windows_of_grid(
-        samples.piece, kept, int(max(POINTS, len(samples) / 4) / (rows + 1))
+        samples.piece, kept, int(min(max(POINTS, len(samples) / 4), POINTS_MOST) / (rows + 1))
     )
     part = dataclasses.replace(_subset(samples, piece, kept), margin=problem.margin[kept])
     scale = problem.limit_scale[kept]

@@ -57,6 +57,15 @@ class MotionLimits(NamedTuple):
 
     axes: FloatArray  # (3, A) velocity, acceleration and jerk
     pulled: FloatArray  # (A,) jerks that the pull counts in [mm/s3]
+    along: FloatArray  # (I, 2) the feed [mm/s], and the acceleration across the path [mm/s2], in each interval of the motion
+
+
+class StepAim(NamedTuple):
+    """How far a step of Q runs goes."""
+
+    pull: FloatArray  # (Q,) towards what is there; inf for runs that stay
+    gap: float  # of the convex problem, share of the time [-]
+    again: int  # times at most in windows around sites that are tightened
 
 
 class Improved(NamedTuple):
@@ -199,12 +208,12 @@ def _improve_run(run):
 
 
 @njit(cache=True, error_model="numpy")
-def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, again):
+def _improve(corridor, splines, runs, used, motion, limits, aim):
     """Columns of `Improved`."""
     count, radius = len(splines.fits), used.copy()
     control, gain, iterations = splines.control.copy(), np.zeros(count), np.zeros(count)
     for q in range(count):
-        if not splines.fits[q] or pull[q] == np.inf:
+        if not splines.fits[q] or aim.pull[q] == np.inf:
             continue
         knots, whole, begin = run_knots(splines, q), run_control(splines, q), control_first(splines, q)
         first, last = motion.interval[q], motion.interval[q + 1]
@@ -215,11 +224,11 @@ def _improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, ag
             sites.span, sites.place, sites.weights, _columns(sites.target, moving), _columns(sites.along, moving),
             sites.slide, used[splines.site_first[q] : splines.site_first[q + 1]],
         )  # fmt: skip
-        places = places_of_run(knots, own, motion, bound, _columns(limits.axes, moving), first, last)
+        places = places_of_run(knots, own, motion, limits.along, _columns(limits.axes, moving), first, last)
         free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
         pulled = limits.pulled[moving]
         run = CombinedRun(
-            run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, pull[q], gap, again
+            run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, aim.pull[q], aim.gap, aim.again
         )  # fmt: skip
         y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)
         moved = _moved(run, y)
@@ -236,17 +245,11 @@ def improve(
     runs: SplineRuns,
     used: FloatArray,
     motion: SplineMotion,
-    bound: FloatArray,
     limits: MotionLimits,
-    pull: FloatArray,
-    gap: float,
-    again: int,
+    aim: StepAim,
 ) -> Improved:
     """One step of all splines that fit (module text).
 
-    used   : (J,) radius that each site may use [mm]
-    bound  : (I, 2) of the feed [mm/s], and of the acceleration across the path [mm/s2], in each interval of the motion
-    pull   : (Q,) of each run, inf for those that stay
-    gap    : of the convex problem, share of the time [-]
+    used : (J,) radius that each site may use [mm]
     """
-    return Improved(*_improve(corridor, splines, runs, used, motion, bound, limits, pull, gap, again))
+    return Improved(*_improve(corridor, splines, runs, used, motion, limits, aim))

@@ -40,7 +40,7 @@ class Balls(NamedTuple):
     square: FloatArray  # (J, 48) block of the weights with themselves
 
 
-class Blocks(NamedTuple):
+class SpanBlocks(NamedTuple):
     """The sum over one span, and where it goes in the banded matrix (banded.py) from the first row of the span on."""
 
     values: FloatArray  # (pairs of columns, 6, 8) one after the other, the last two columns of each 0
@@ -50,13 +50,13 @@ class Blocks(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def block_of(k, m, columns):
-    """Where the block of the columns k <= m begins in `Blocks.values`."""
+    """Where the block of the columns k <= m begins in `SpanBlocks.values`."""
     return (k * columns - k * (k - 1) // 2 + m - k) * SQUARE
 
 
 @njit(cache=True, error_model="numpy")
 def blocks_of(columns):
-    """`Blocks` of a step with so many columns, all 0."""
+    """`SpanBlocks` of a step with so many columns, all 0."""
     width = ORDER * columns
     count = width * (width + 1) // 2
     source, target = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -70,12 +70,12 @@ def blocks_of(columns):
                 at = block_of(m, k, columns) + b * STRIDE + a
             source[t], target[t] = at, own * width + other - own
             t += 1
-    return Blocks(np.zeros(columns * (columns + 1) // 2 * SQUARE), source, target)
+    return SpanBlocks(np.zeros(columns * (columns + 1) // 2 * SQUARE), source, target)
 
 
 @njit(cache=True, error_model="numpy")
 def scatter(values, source, target, i, columns, band):
-    """Add the `Blocks` of span i to the banded matrix, and clear them."""
+    """Add the `SpanBlocks` of span i to the banded matrix, and clear them."""
     flat = band.reshape(-1)
     begin = i * columns * band.shape[1]
     for t in range(len(source)):
@@ -145,8 +145,8 @@ def put_products(basis, p, order, theta, products):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_row(values, along, p, kind, weight, theta, products):
-    """Add the square of a row of place p, of this kind, times its weight to `Blocks`; its theta (6,) and `put_products`, all over its
-    factor."""
+    """Add the square of a row of place p, of this kind, times its weight to `SpanBlocks`; its theta (6,) and `put_products`, all over
+    its factor."""
     axes = along.shape[2]
     columns = axes + 1
     _add_square(values, block_of(axes, axes, columns), theta, weight)
@@ -164,8 +164,8 @@ def add_row(values, along, p, kind, weight, theta, products):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_objective(values, basis, along, p, pull, own, cost):
-    """Add the objective's part of place p to `Blocks`: `pull` (A,) of the squared jerks, `own` of theta squared, and `cost` of what the
-    velocity has across the path, squared."""
+    """Add the objective's part of place p to `SpanBlocks`: `pull` (A,) of the squared jerks, `own` of theta squared, and `cost` of what
+    the velocity has across the path, squared."""
     axes, of_place = along.shape[2], basis[p]
     columns, first, third = axes + 1, of_place[ORDER : 2 * ORDER], of_place[3 * ORDER :]
     _add_square(values, block_of(axes, axes, columns), of_place[:ORDER], own)
@@ -181,7 +181,7 @@ def add_objective(values, basis, along, p, pull, own, cost):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_balls(balls, j, i, values):
-    """Add z G + z/s grad g grad g' of the sites of `Balls` from j on that are on span i, or before it, to `Blocks`; the next j."""
+    """Add z G + z/s grad g grad g' of the sites of `Balls` from j on that are on span i, or before it, to `SpanBlocks`; the next j."""
     span, _, _, way, slide, radius, _, normal, slack, multiplier = balls[:10]
     axes, square = normal.shape[1], balls.square
     while j < len(span) and span[j] <= i:

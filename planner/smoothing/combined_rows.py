@@ -51,7 +51,7 @@ class Rows(NamedTuple):
     products: FloatArray  # (R, 2, 48) `put_products`
 
 
-class State(NamedTuple):
+class RowState(NamedTuple):
     """Where an iteration is."""
 
     sides: FloatArray  # (R, 10) value, slope, and slack, multiplier and their steps of the upper and of the lower side
@@ -163,7 +163,7 @@ def _add_forces(span, basis, along, force, out):
 
 @njit(cache=True, error_model="numpy")
 def first_state(rows, y, product):
-    """The `State` at the step y (n, A+1): slacks that are at least `LEAST_SLACK`, and multipliers with this product with them."""
+    """The `RowState` at the step y (n, A+1): slacks that are at least `LEAST_SLACK`, and multipliers with this product with them."""
     factor, kinds, P = rows.factor, 3 * rows.along.shape[2] + 2, len(rows.span)
     sides, moves = np.zeros((len(factor), 10)), np.empty((P, kinds + 3))
     _put_moves(rows.span, rows.basis, rows.along, y, moves)
@@ -175,7 +175,7 @@ def first_state(rows, y, product):
             up, low = max(factor[r, UPPER] - value, LEAST_SLACK), max(factor[r, LOWER] + value, LEAST_SLACK)
             sides[r, VALUE], sides[r, S_UP], sides[r, S_LOW] = value, up, low
             sides[r, Z_UP], sides[r, Z_LOW] = product / up, product / low
-    return State(sides, moves, np.zeros((P, kinds + 3)), np.zeros((P, kinds + 3)))
+    return RowState(sides, moves, np.zeros((P, kinds + 3)), np.zeros((P, kinds + 3)))
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)

@@ -34,7 +34,9 @@ FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no ene
 # reshaping; with 0.9999 one ends 3e-3 slower, and the others change by at most 2.4e-4.
 USED = 0.9995
 TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
-ROUNDS = 20  # of tightening, in windows around the sites that need it; 2 are the rule
+# Of tightening, in windows around the sites that need it; 2 are the rule. With 3, a run of each of 10 plans that need
+# more gets no spline; 7 of them take longer, up to 2.7e-2 (benchmarks/results/ablation-retries.md).
+ROUNDS = 20
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it
 # On those six jobs windows of 120 and 480 end up to 2e-4 and 5e-4 later; overlaps of 15 and 60 change them by -2e-4 to 1e-3 and by

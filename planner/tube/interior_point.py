@@ -114,7 +114,7 @@ def _predicted(on, slacks, along, dual, second):
 @njit(cache=True, error_model="numpy", nogil=True)
 def solve(legs, limits, x, u, place, tuning):
     """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns whether it has been
-    reached, and the iterations."""
+    reached, the iterations, and the multipliers (N, R) of the rows, in units of time."""
     N, axes = len(u), u.shape[1] - 1
     R, S, C, on = limits.on.shape[1], 3 * axes, axes + 1, limits.on
     many = (N, R)
@@ -151,11 +151,11 @@ def solve(legs, limits, x, u, place, tuning):
         if settled:
             prox = min(prox * FREEZE, FROZEN)
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF * tuning.missed:
-                return True, iteration
+                return True, iteration, z
         if not products <= LOST * time or not factorise(
             x, u, legs, limits, lin, z, ratio, tuning.pull + prox, factor
         ):
-            return False, iteration
+            return False, iteration, z
         second[:] = 0.0
         aim, along, dual = 0.0, 1.0, 1.0
         for phase in range(2):
@@ -183,4 +183,4 @@ def solve(legs, limits, x, u, place, tuning):
                     s[i, r] += along * ds[i, r]
                     z[i, r] += dual * dz[i, r]
                     missing[i, r] = lin.g[i, r] + s[i, r]
-    return False, ITERATIONS
+    return False, ITERATIONS, z

@@ -25,6 +25,7 @@ from planner.tube.interior_point import Tuning, solve
 from planner.tube.motion import Steps, closed, integrated
 from planner.tube.nlp import PULL
 from planner.tube.outcome import TubeSolution
+from planner.tube.price import columns, step_prices
 from planner.tube.problem import Window, window_of
 from planner.tube.rows import Legs
 from planner.tube.run import TubeRun
@@ -84,6 +85,7 @@ class TubeOwn:
             steps=search.steps(),
             place=search.places(),
             kept=search.kept,
+            price=search.price,
         )
 
 
@@ -109,6 +111,7 @@ class _Search:
         self.settings, self.run, self.guess = settings, run, _Cut(guess)
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
+        self.price = np.zeros((len(guess), columns(len(run.axis))))
         self.iterations, self.windows, self.solved = 0, 0, 0
         self._keeps = keeps_of(run)
         self._strain = _strain(run, guess)
@@ -186,11 +189,14 @@ class _Search:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
                 tuning = Tuning(PULL, prox, self.settings.gap, missed)
-                done, iterations = solve(window.legs, window.limits, window.x, window.u, window.place, tuning)
+                done, iterations, z = solve(
+                    window.legs, window.limits, window.x, window.u, window.place, tuning
+                )
                 count[1] += iterations
                 if not done:
                     break
                 if self._taken(lo, hi, window, tight):
+                    self.price[lo:hi] = step_prices(window, z)
                     return True
                 if not (tight > 1.0).any():
                     break

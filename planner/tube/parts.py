@@ -24,6 +24,7 @@ class Found:
     place : (N+1,) of the nodes along the run [mm]
     times : (N+1,) of the nodes in the motion of the start [s]
     kept  : (N,) steps that stand for the motion of the start; None for none
+    price : (N, 3 A + 5) what the limits of each step cost (price.py) [s]; None where the solver does not tell
     """
 
     run: TubeRun
@@ -33,11 +34,25 @@ class Found:
     place: FloatArray | None = None
     times: FloatArray | None = None
     kept: Array | None = None
+    price: FloatArray | None = None
 
     @property
     def whole(self) -> bool:
         """Whether nothing of the start's motion is left."""
         return self.steps is not None and (self.kept is None or not self.kept.any())
+
+    def priced_time(self) -> float:
+        """How long the steps that have prices last [s]."""
+        if self.steps is None or self.price is None:
+            return 0.0
+        return float(self.steps.h[self.price.any(axis=1)].sum())
+
+    def ranges(self) -> list[tuple[int, int, bool]]:
+        """First step, the one behind the last, and whether the start stays, of what goes out in one part."""
+        assert self.steps is not None
+        kept = np.zeros(len(self.steps.h), dtype=bool) if self.kept is None else self.kept
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(kept)) + 1, [len(kept)]])
+        return [(lo, hi, bool(kept[lo])) for lo, hi in pairwise(edges.tolist())]
 
 
 def parts_of(toolpath: Toolpath, found: Found, start: SplicedRun) -> list[SplicedRun]:
@@ -48,11 +63,9 @@ def parts_of(toolpath: Toolpath, found: Found, start: SplicedRun) -> list[Splice
     assert found.steps is not None
     assert found.times is not None
     steps = len(found.steps.h)
-    kept = np.zeros(steps, dtype=bool) if found.kept is None else found.kept
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(kept)) + 1, [steps]])
     parts = []
-    for lo, hi in pairwise(edges.tolist()):
-        if kept[lo]:
+    for lo, hi, stays in found.ranges():
+        if stays:
             begin = start.begin if lo == 0 else float(found.times[lo])
             end = start.end if hi == steps else float(found.times[hi])
             parts.append(SplicedRun(motion=start.motion, begin=begin, end=end, moving=hi < steps))

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +37,14 @@ from planner.machine import Machine
 # Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
 # turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
+
+
+class Budgets(NamedTuple):
+    """What R legs and the R+1 vertices around them may use of the tolerance, eps_ap, and what the rest of it allows."""
+
+    leg: FloatArray  # (R,) [mm]
+    vertex: FloatArray  # (R+1,) 0 at both ends [mm]
+    across: FloatArray  # (R,) normal acceleration [mm/s2]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,6 +119,10 @@ class TubeRun:
         """(R+1,) place of the vertices along the run [mm]."""
         return np.append(0.0, np.cumsum(self.length))
 
+    def leg_at(self, place: FloatArray) -> Array:
+        """(n,) legs at the places `place` (n,) along the run [mm]."""
+        return np.clip(np.searchsorted(self.offset, place, side="right") - 1, 0, len(self) - 1)
+
     def points(self, leg: Array, x: FloatArray) -> FloatArray:
         """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
@@ -133,46 +146,51 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             line=int(toolpath.line[curves[0]]),
         )
     limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
-    reachable = normal_limit.anywhere(machine, toolpath.axes)
-    rate = error_rate(machine)
-    budget = np.maximum(
-        toolpath.tolerance[:-1], toolpath.tolerance[1:]
-    )  # of a segment: the larger of its joints'
-    edges = _edges(toolpath, budget)
+    edges = _edges(toolpath)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
     for begin, end in pairwise(stops):
         first = edges[begin : end + 1]
         row = first[:-1]  # the segment that stands for its leg
-        tol_leg = budget[row]
-        tol_ap = allocate(tol_leg, np.full(len(row), reachable), rate)
-        left = normal_limit.within_budget(tol_leg, tol_ap, np.full(len(row), reachable), rate)
+        budgets = budgets_of(toolpath, machine, first)
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
-        at_vertex = np.minimum(
-            toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
-        )
-        vertex_ap = allocate(at_vertex, np.full(len(first), reachable), rate)
-        vertex_ap[[0, -1]] = 0.0
         shape = _shapes(toolpath, row, vertex)
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
-        held = left < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
+        held = budgets.across < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
         yield TubeRun(
             axis=np.flatnonzero(moves),
             first=first,
             curvature=toolpath.curvature[row],
-            budget=tol_ap,
+            budget=budgets.leg,
             feed=toolpath.feed[row],
-            across_max=np.where(held, left, np.inf),
+            across_max=np.where(held, budgets.across, np.inf),
             vertex=vertex[:, moves],
-            vertex_budget=vertex_ap,
+            vertex_budget=budgets.vertex,
             **{name: limit[moves] for name, limit in limits.items()},
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
 
 
-def _edges(toolpath: Toolpath, budget: FloatArray) -> Array:
-    """Joints between legs: those of geometry/legs.py, and where feed or budget change on a line."""
+def budgets_of(toolpath: Toolpath, machine: Machine, first: Array) -> Budgets:
+    """What eq. (18)-(20) leave for the legs that hold the segments first[r] : first[r+1], first (R+1,)."""
+    reachable = normal_limit.anywhere(machine, toolpath.axes)
+    rate = error_rate(machine)
+    row = first[:-1]  # the segment that stands for its leg
+    tol_leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
+    most = np.full(len(tol_leg), reachable)
+    tol_ap = allocate(tol_leg, most, rate)
+    at_vertex = np.minimum(
+        toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
+    )
+    vertex_ap = allocate(at_vertex, np.full(len(first), reachable), rate)
+    vertex_ap[[0, -1]] = 0.0
+    return Budgets(tol_ap, vertex_ap, normal_limit.within_budget(tol_leg, tol_ap, most, rate))
+
+
+def _edges(toolpath: Toolpath) -> Array:
+    """Joints between legs: those of geometry/legs.py, and where feed or budget, the larger one of its joints', change on a line."""
+    budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
     edge = np.zeros(len(toolpath) + 1, dtype=bool)
     edge[legs_of(toolpath).first] = True
     edge[1:-1] |= (toolpath.feed[1:] != toolpath.feed[:-1]) | (np.diff(budget) != 0)

@@ -99,7 +99,7 @@ def test_command_writes_new_directories_only(tmp_path: Path, motion: Trajectory)
             (tmp_path / "plan", "--for", "linuxcnc-stream", "-o", tmp_path / "new", "--within", "1"),
             "--within is for pvt",
         ),
-        ((tmp_path / "plan", "--for", "pvt", "-o", tmp_path / "new", "--within", "0"), "must be above 0"),
+        ((tmp_path / "plan", "--for", "pvt", "-o", tmp_path / "new", "--within", "0"), "no length above 0"),
     ]:
         refused = run("export", *arguments)
         assert refused.exit_code == 2

@@ -13,8 +13,9 @@ from scipy.integrate import quad
 from benchmarks.random_paths import nurbs, random_path
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.reference.near_rest import NEAR
 from planner.feedrate.reference.nlp import JerkLimitedNLP
-from planner.feedrate.reference.sequential_convex import NEAR, SequentialConvex
+from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.solution import FeedrateSolution, Status
 
 ROWS = 1e-6  # by which a row may exceed its limit [relative]

@@ -115,10 +115,17 @@ def test_where_no_solution_is_found_motion_and_limits_are_as_before(before, tigh
     np.testing.assert_allclose(slower, slower[0], rtol=1e-12)
 
 
-def test_what_changed_by_much_or_nearly_everywhere_is_not_solved_in_places(before, tighter):
+def test_a_piece_that_changed_nearly_everywhere_is_solved_as_a_whole(before):
     problem, known = before
-    many = dataclasses.replace(problem, limit_scale=np.full(len(problem), TIGHTER))
-    assert JerkLimited().again(problem, known, many) is None
+    scale = np.full(len(problem), TIGHTER)
+    tighter = dataclasses.replace(problem, limit_scale=scale)
+    _, solution = JerkLimited().again(problem, known, tighter)
+    assert same(solution, JerkLimited().solve(tighter))
+    assert solution.effort["pieces again"] == 1
+
+
+def test_what_changed_by_much_is_not_solved_in_places(before, tighter):
+    problem, known = before
     much = dataclasses.replace(problem, limit_scale=tighter.limit_scale**20)
     assert JerkLimited().again(problem, known, much) is None
 

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 import planner
+from benchmarks import problems
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
 from planner.job.records import PlacePrices
 from planner.machine import load_machine
-from planner.sensitivity.places import MORE_LIMIT
+from planner.path.samples import sample_path
+from planner.sensitivity.places import MORE_LIMIT, bounds_but_speeds, bounds_with
+from planner.sensitivity.savings import Change, more_of
 
 MILL = load_machine("mill")
 TENTH = 1.0 - 1.0 / (1.0 + MORE_LIMIT)
@@ -64,3 +70,19 @@ def test_places_add_up_to_the_whole(zigzag: Plan) -> None:
     assert places.tolerance.sum() == pytest.approx(zigzag.prices.tolerance, rel=0.05)
     assert places.feed.sum() == pytest.approx(-zigzag.prices.feed * TENTH, rel=0.05)
     assert (places.limits >= places.feed - 1e-6).all()
+
+
+@pytest.mark.parametrize("change", ["feed", "velocity.x"])
+def test_bounds_of_speeds_beside_those_of_all_other_limits_are_the_bounds_of_all(change: str) -> None:
+    given = toolpath_from_program(problems.zigzag(), MILL)
+    fast = np.where(np.arange(len(given)) % 2, 20.0, 1.0)  # half of it faster than the axes
+    toolpath = dataclasses.replace(given, feed=fast * given.feed)
+    path = round_corners(toolpath, MILL, BezierCorner(), blend_tangents=True)
+    samples = sample_path(path, MILL, third_order=True)
+    of_feed = Change(machine=lambda share: MILL, feed=lambda share: 1.0 + share)
+    more = of_feed if change == "feed" else Change(machine=more_of(MILL, change))
+    rest = bounds_but_speeds(samples, MILL)
+    assert rest is not None
+    assert np.isfinite(rest).any()
+    np.testing.assert_array_equal(bounds_with(samples, more, 0.1, rest), bounds_with(samples, more, 0.1))
+    assert (bounds_with(samples, more, 0.1, rest) != bounds_with(samples, more, 0.0, rest)).any()

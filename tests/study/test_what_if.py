@@ -172,7 +172,7 @@ def test_the_command(tmp_path: Path) -> None:
         ([], "nothing to change"),
         (["--set", "feed=1.1", "--set", "feed=1.2"], "planner sweep"),
         (["--set", "feed=1.1", "--method", "stop", "--effort", "quick"], "method stop does not use it"),
-        (["--set", "feed=1.1", "--tolerance", "0"], "must be positive"),
+        (["--set", "feed=1.1", "--tolerance", "0"], "no length above 0"),
     ):
         result = run(job, *wrong)
         assert (result.exit_code, told in result.stderr) == (2, True), result.stderr

@@ -252,7 +252,7 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
 
     def hasty(legs, limits, x, u, place, tuning):
         return (
-            (False, 0)
+            (False, 0, None)
             if x[0].any() and abs(x[-1, 2:]).max() > 0
             else asked(legs, limits, x, u, place, tuning)
         )

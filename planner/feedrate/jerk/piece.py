@@ -60,7 +60,7 @@ class Piece:
             self._parts[0].finish(room)
         for held in self._held:
             hold(task.profile, task.columns, held)
-        slower = slow_down(task.profile, task.columns, task.first, task.last)
+        slower = slowed_piece(task.profile, task.columns, task.first, task.last)
         chains = [chain for part in self._parts for chain in part.chains]
         joined = [done for part in self._parts for done in part.joined]
         stops = [stop for part in self._parts for stop in part.stops]
@@ -75,7 +75,7 @@ class Piece:
         return Solved(slower, stops, max([*joined, *(chain.iterations for chain in chains)]), effort)
 
 
-def slow_down(profile: Profile, columns: ProblemColumns, first: int, last: int) -> float:
+def slowed_piece(profile: Profile, columns: ProblemColumns, first: int, last: int) -> float:
     """Slow a profile down between two full stops, at the points first and last, until it keeps every limit at the grid points; returns
     by what factor."""
     own, intervals = slice(first, last + 1), slice(first, last)

@@ -46,6 +46,11 @@ class Profile:
             dynamics=found.dynamics.copy(),
         )
 
+    def forget(self, first: int, beyond: int) -> None:
+        """Make the points first..beyond-1 zero, as `at_rest`."""
+        for name in (field.name for field in fields(self)):
+            getattr(self, name)[first:beyond] = 0.0
+
     def put(self, begin: int, found: Window, count: int) -> None:
         """Take over the first intervals of a window that begins at a point, and the state at their end."""
         for name in (field.name for field in fields(self)):

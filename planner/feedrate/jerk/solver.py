@@ -48,21 +48,21 @@ import numpy as np
 
 from planner.base.threads import side_by_side, threads
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.again import RangeAgain, ranges_of
+from planner.feedrate.jerk.again import Range, RangeAgain, ranges_of
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
-from planner.feedrate.jerk.columns import columns_of
+from planner.feedrate.jerk.columns import ProblemColumns, columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.part import LONG
-from planner.feedrate.jerk.piece import Piece, Solved, slow_down
+from planner.feedrate.jerk.piece import Piece, Solved, slowed_piece
 from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
 PLACES_NAMED = 3  # in a sentence
-# Where more than this share of what was solved for has to be solved again, all of it is [-].
+# A piece of which more than this share has to be solved again is solved as a whole [-].
 SHARE_MAX = 0.8
-CHANGE_MAX = 0.05  # ... and where limits of speed change by more than this [-]: it is felt beyond the ranges
+CHANGE_MAX = 0.05  # limits of speed that change by more than this are felt beyond the ranges [-]
 POINTS_SHARED = 3_000  # fewer are solved by one thread: threads take 1 ms to begin, a point some us
 
 
@@ -97,7 +97,9 @@ class JerkLimited:
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
         profile = Profile.at_rest(*problem.d1.shape)
-        pieces = self._solve_pieces(problem, profile, progress)
+        columns, counted = columns_of(problem), _Counted(len(problem), progress)
+        task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
+        pieces = self._solve_pieces(list(pairwise(problem.piece.tolist())), task, counted)
         stops = [stop for piece in pieces for stop in piece.stops]
         slower = max(piece.slower for piece in pieces)
         sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk"
@@ -118,16 +120,13 @@ class JerkLimited:
             effort={name: sum(piece.effort[name] for piece in pieces) for name in pieces[0].effort},
             **_columns_of_solution(profile),
         )
-        return _priced(problem, solution, began)
+        return _priced(problem, columns, solution, began)
 
     def _solve_pieces(
-        self, problem: FeedrateProblem, profile: Profile, progress: Callable[[float], None] | None
+        self, ends: list[tuple[int, int]], task: Callable[..., Task], counted: _Counted
     ) -> list[Solved]:
-        """Solve all pieces into `profile`, on several cores if it is worth it. Long ones come first, as many at a time as there are
-        threads for their two ends: each takes a third of a kilobyte a point while it is being solved."""
-        columns, counted = columns_of(problem), _Counted(len(problem), progress)
-        task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
-        ends = list(pairwise(problem.piece.tolist()))
+        """Solve the pieces of these first points and points behind the last, on several cores if it is worth it. Long ones come first,
+        as many at a time as there are threads for their two ends: each takes a third of a kilobyte a point while it is being solved."""
         order = sorted(range(len(ends)), key=lambda g: ends[g][0] - ends[g][1])
         long = sum(beyond - 1 - first > LONG * self.window for first, beyond in ends)
         at_once = max(threads() // 2, 1)
@@ -144,18 +143,21 @@ class JerkLimited:
     ) -> tuple[FeedrateProblem, FeedrateSolution] | None:
         """The solution of a problem that differs from the one `before` in the scales of its limits, a little and at few points, from
         that one's solution `known` (again.py): with the problem itself, whose scales are those of before where no solution was found;
-        None where so much changed that all has to be solved."""
+        None where limits changed by so much that all has to be solved."""
         began = time.perf_counter()
         change = problem.limit_scale / before.limit_scale
         if known.multipliers is None or np.abs(change - 1.0).max() > CHANGE_MAX:
             return None
-        ranges = ranges_of(before, known, change != 1.0)
-        size = sum(own.last - own.first for own in ranges)
-        if size > SHARE_MAX * (len(problem) - known.effort.get("held", 0)):
-            return None
-        profile, columns = Profile.of_solution(known), columns_of(problem)
-        counted = _Counted(len(problem), None)
+        profile, columns, counted = (
+            Profile.of_solution(known),
+            columns_of(problem),
+            _Counted(len(problem), None),
+        )
         task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
+        whole, ranges = _whole_pieces(problem, ranges_of(before, known, change != 1.0))
+        for first, beyond in whole:
+            profile.forget(first, beyond)
+        pieces = self._solve_pieces(whole, task, counted)
         work = [RangeAgain(task(first=own.first, last=own.last)) for own in ranges]
         _do([(one.last - one.first, one) for one in work], counted)
         if not all(one.solved for one in work):
@@ -166,20 +168,37 @@ class JerkLimited:
                     scale[own] = before.limit_scale[own]
             problem = replace(problem, limit_scale=scale)
             columns = columns_of(problem)
-        pieces = np.unique(np.searchsorted(problem.piece, [own.first for own in ranges], side="right") - 1)
-        slower = max(
-            [slow_down(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in pieces],
-            default=1.0,
-        )
+        at = np.unique(np.searchsorted(problem.piece, [own.first for own in ranges], side="right") - 1)
+        slower = [slowed_piece(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in at]
+        most = max([1.0, *slower, *(piece.slower for piece in pieces)])
+        stops = sum(len(piece.stops) for piece in pieces)
+        again = {"pieces": len(whole), "ranges": len(ranges), "kept": sum(not one.solved for one in work)}
         solution = replace(
             known,
-            sentence=f"{known.sentence}; {len(ranges)} ranges solved again, slowed by {slower - 1.0:.1e}",
-            iterations=max([known.iterations, *(one.chain.iterations for one in work)]),
-            effort=known.effort
-            | {"again": len(ranges), "not again": sum(not one.solved for one in work), "again points": size},
+            status=Status.ACCEPTABLE if stops else known.status,
+            sentence=f"{known.sentence}; {len(whole)} pieces and {len(ranges)} ranges solved again, slowed by {most - 1.0:.1e}"
+            + (f", with {stops} full stops where the method did not converge" if stops else ""),
+            iterations=max(
+                [
+                    known.iterations,
+                    *(one.chain.iterations for one in work),
+                    *(one.iterations for one in pieces),
+                ]
+            ),
+            effort=known.effort | {f"{name} again": count for name, count in again.items()},
             **_columns_of_solution(profile),
         )
-        return problem, _priced(problem, solution, began)
+        return problem, _priced(problem, columns, solution, began)
+
+
+def _whole_pieces(problem: FeedrateProblem, ranges: list[Range]) -> tuple[list[tuple[int, int]], list[Range]]:
+    """Pieces, first points and points behind the last, of which the ranges are more than `SHARE_MAX`; and the ranges of the others."""
+    piece = problem.piece
+    of = np.searchsorted(piece, [own.first for own in ranges], side="right") - 1
+    size = np.bincount(of, [own.last - own.first for own in ranges], len(piece) - 1)
+    whole = size > SHARE_MAX * (np.diff(piece) - 1)
+    ends = [(int(piece[g]), int(piece[g + 1])) for g in np.flatnonzero(whole)]
+    return ends, [own for own, g in zip(ranges, of, strict=True) if not whole[g]]
 
 
 def _columns_of_solution(profile: Profile) -> dict[str, Any]:
@@ -193,9 +212,11 @@ def _columns_of_solution(profile: Profile) -> dict[str, Any]:
     }
 
 
-def _priced(problem: FeedrateProblem, solution: FeedrateSolution, began: float) -> FeedrateSolution:
+def _priced(
+    problem: FeedrateProblem, columns: ProblemColumns, solution: FeedrateSolution, began: float
+) -> FeedrateSolution:
     """The solution with its prices and the time that it took."""
-    found = lagrangian(problem, solution)
+    found = lagrangian(problem, solution, columns)
     prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
     return replace(solution, prices=prices, solve_time=time.perf_counter() - began)
 

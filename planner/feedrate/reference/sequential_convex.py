@@ -60,6 +60,7 @@ from planner.base.arrays import FloatArray
 from planner.base.packages import import_needed
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
+from planner.feedrate.reference.near_rest import NODES, WEIGHTS, IntervalShape, beside_rest
 from planner.feedrate.reference.piecewise import (
     INTERVALS_MIN,
     Found,
@@ -70,10 +71,6 @@ from planner.feedrate.reference.piecewise import (
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# Gauss' rule for the time of an interval: off by 4e-5 where feed^2 grows fourfold in it, 1e-3 where tenfold.
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-NODES, WEIGHTS = (1.0 + NODES) / 2.0, WEIGHTS / 2.0  # of the unit interval
-NEAR = 100.0  # distance from rest up to which the acceleration is shaped like a cube root [lengths of the interval]
 # Largest violation of a scaled row or bound that a solution may have, and the residual asked of ipopt [-].
 VIOLATION_MAX = 1e-6
 FEASIBILITY = 1e-8
@@ -155,7 +152,7 @@ def _solve_piece(
     inner = slice(1, n - 1)  # the intervals, or their left ends, that do not touch rest
 
     # ---- objective: the time, by Gauss's rule; exact on the first and the last interval ---------------------------------------
-    shape = _Shape.of(problem.s[here])
+    shape = IntervalShape.of(problem.s[here])
     gain = u[1:] - u[:-1]
     times = ca.vertcat(3.0 * ds[0] / ca.sqrt(x[1]), ca.MX(n - 2, 1), 3.0 * ds[-1] / ca.sqrt(x[n - 1]))
     for node, weight, part in zip(NODES, WEIGHTS, shape.integrals, strict=True):
@@ -191,7 +188,7 @@ def _solve_piece(
     # ---- boundary: rest, and what the jerk of the first and last interval allows next to it -----------------------------------
     free = np.full(n + 1, np.inf)
     lower, upper = np.concatenate([np.zeros(n + 1), -free]), np.concatenate([cap, free])
-    beside = (1, *_beside_rest(problem, here.start, 1)), (n - 1, *_beside_rest(problem, here.stop - 1, -1))
+    beside = (1, *beside_rest(problem, here.start, 1)), (n - 1, *beside_rest(problem, here.stop - 1, -1))
     for i, x_max, _ in beside:
         upper[i] = min(upper[i], x_max / speed**2)
     for at_rest in (0, n):
@@ -284,61 +281,6 @@ def _passes(
             status, sentence = CONVERGED
             break
     return _Passed(status=status, sentence=sentence, iterations=iterations, result=result)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Shape:
-    """How u goes from 0 to 1 on each of n intervals, over the share of the interval.
-
-    mean                   : (n,)
-    integrals              : (nodes, n) of the shape, from the start of the interval to the nodes of Gauss's rule
-    slope_start, slope_end : (n,) where an interval touches rest, the one there is infinite and not used
-    """
-
-    mean: FloatArray
-    integrals: FloatArray
-    slope_start: FloatArray
-    slope_end: FloatArray
-
-    @classmethod
-    def of(cls, s: FloatArray) -> _Shape:
-        """The shapes on a grid from rest to rest: cube roots near its ends (module text), linear elsewhere."""
-        ds = np.diff(s)
-        back = s[-1] - s[1:] < s[:-1] - s[0]  # nearer to the last point: the mirror image
-        away = np.where(back, s[-1] - s[1:], s[:-1] - s[0]) / ds
-        linear, away = away > NEAR, np.minimum(away, NEAR)
-        first, span = np.cbrt(away), np.cbrt(away + 1.0) - np.cbrt(away)
-
-        def integral(share: FloatArray | float) -> FloatArray:
-            rooted = (0.75 * ((away + share) * np.cbrt(away + share) - away * first) - first * share) / span
-            return np.where(linear, share**2 / 2.0, rooted)
-
-        mean = integral(1.0)
-        at = NODES[:, None]
-        with np.errstate(divide="ignore"):
-            near, far = (np.where(linear, 1.0, (away + k) ** (-2 / 3) / (3.0 * span)) for k in (0.0, 1.0))
-        return cls(
-            mean=np.where(back, 1.0 - mean, mean),
-            integrals=np.where(back, at - mean + integral(1.0 - at), integral(at)),
-            slope_start=np.where(back, far, near),
-            slope_end=np.where(back, near, far),
-        )
-
-
-def _beside_rest(problem: FeedrateProblem, rest: int, step: int) -> tuple[float, tuple[int, int]]:
-    """Largest x at the point before or after a rest, what the jerks on the interval between them allow (module text); also the axis
-    of the jerk that says so, and its row in `Multipliers.rows`: 1 at the start of the interval, 2 at its end."""
-    beside = rest + step
-    d = abs(problem.s[beside] - problem.s[rest])
-    d2 = problem.d2_left[beside] if step > 0 else problem.d2_right[beside]
-    d3 = problem.d3_left[beside] if step > 0 else problem.d3_right[beside]
-    jerk = 2.0 / (9.0 * d**2)  # of the motion, per x^(3/2)
-    at_rest = np.abs(problem.d1[rest]) * jerk
-    moving = np.abs(problem.d1[beside] * jerk + step * 2.0 / d * d2 + d3)
-    ratio = np.column_stack([at_rest / problem.jerk_limit[rest], moving / problem.jerk_limit[beside]])
-    k, where = np.unravel_index(int(ratio.argmax()), ratio.shape)
-    row = 1 + where if step > 0 else 2 - where
-    return float(ratio.max() ** (-2.0 / 3.0)), (int(k), int(row))
 
 
 def _violation(result: dict[str, FloatArray], bounds: dict[str, FloatArray]) -> float:

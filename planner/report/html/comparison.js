@@ -67,11 +67,7 @@
   const layout = (text) => ({ ...look, margin: { l: 62, r: 14, t: 8, b: 42 }, xaxis: { title: { text: title[against] }, gridcolor: rule },
     yaxis: { title: { text }, gridcolor: rule, zerolinecolor: rule, rangemode: "tozero" } });
   const extents = ["x", "y", "z"].map((axis) => shown.reduce(([a, b], k) => column(k, axis).reduce(([u, v], w) => [Math.min(u, w), Math.max(v, w)], [a, b]), [Infinity, -Infinity]));
-  const size = Math.max(...extents.map(([a, b]) => b - a), 1e-9), flat = extents[2][1] - extents[2][0] < 0.12 * size;
-  const camera = { projection: { type: "orthographic" }, eye: flat ? { x: 0, y: 0, z: 1.6 } : { x: 1.2, y: -1.3, z: 0.9 },
-    up: flat ? { x: 0, y: 1, z: 0 } : { x: 0, y: 0, z: 1 } };
-  const space = { ...look, margin: { l: 0, r: 0, t: 0, b: 0 },
-    scene: { aspectmode: "data", xaxis: axis3d("x"), yaxis: axis3d("y"), zaxis: axis3d("z", !flat), camera } };
+  const space = { ...look, margin: { l: 0, r: 0, t: 0, b: 0 }, scene: fittedScene(extents, element("path"), axis3d, ["x", "y", "z"]) };
   async function draw() {
     await Plotly.react("path", paths(), space, bare);
     await Plotly.react("feed", profile("feed", 1), layout("feed [mm/s]"), bare);

@@ -22,7 +22,7 @@ LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
 def page_of(
     name: str, kind: str, source: str, about: dict[str, Any], columns: Mapping[str, Array], **places: str
 ) -> str:
-    """A page for a browser: the body NAME.html in the frame of all pages, with shared.js and NAME.js.
+    """A page for a browser: the body NAME.html in the frame of all pages, with shared.js, view.js and NAME.js.
 
     kind    : what the page is, behind the file's name in its title
     source  : the program's file
@@ -40,7 +40,7 @@ def page_of(
         "BODY": filled(template(f"{name}.html"), {**places, "PLOTLY": plotly_script()}),
         "ABOUT": json_text({**about, "columns": kinds}),
         "COLUMNS": columns_text(columns),
-        "SCRIPT": template("shared.js") + template(f"{name}.js"),
+        "SCRIPT": template("shared.js") + template("view.js") + template(f"{name}.js"),
     }
     return filled(template("frame.html"), parts)
 

@@ -2,7 +2,9 @@
 (async () => {
   const summary = about.summary;
   // Okabe and Ito's colours, told apart with red-green blindness too; axes take them in order, limits have theirs from colours.py.
-  const COLOURS = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
+  const COLOURS = [dark ? "#56B4E9" : "#0072B2", "#E69F00", dark ? "#2fc49a" : "#009E73", "#CC79A7", dark ? "#0072B2" : "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
+  // Cividis; on a dark ground its dark end would not be seen.
+  const LOW_TO_HIGH = dark ? [[0, "#4a7ccc"], [0.25, "#6f86b0"], [0.5, "#9a978f"], [0.75, "#cdb969"], [1, "#fee838"]] : "Cividis";
   const POINTS_OF_PATH = 20000, BUCKETS = 1200;
   const mark = (name) => performance.mark(name);
 
@@ -71,8 +73,8 @@
 
   // The path
   const colourings = {
-    feed: { column: c.feed, title: "feed [mm/s]", scale: "Cividis" },
-    deviation: { column: c.deviation.map((v) => 1000 * v), title: "deviation [µm]", scale: "Cividis" },
+    feed: { column: c.feed, title: "feed [mm/s]", scale: LOW_TO_HIGH },
+    deviation: { column: c.deviation.map((v) => 1000 * v), title: "deviation [µm]", scale: LOW_TO_HIGH },
     limit: { column: c.limit, title: "", limits: true },
   };
   const button = (colour) => document.querySelector(`#colours [data-colour=${colour}]`);
@@ -141,38 +143,31 @@
     const [x, y, z] = place(now);
     return { x: [[x]], y: [[y]], z: [[z]] };
   };
-  const extents = linear.map((axis) => c[axis].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]));
-  const size = Math.max(...extents.map(([a, b]) => b - a), 1e-9);
-  const flat = linear.length < 3 || extents[2][1] - extents[2][0] < 0.12 * size;
-  const axis3d = (title) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false });
+  const extents = [0, 1, 2].map((a) => [a < linear.length ? c[linear[a]] : [0], Object.values(programmed)[a]].reduce(
+    (found, column) => column.reduce(([low, high], v) => (v === null || Number.isNaN(v) ? [low, high] : [Math.min(low, v), Math.max(high, v)]), found), [Infinity, -Infinity]));
+  const axis3d = (title, visible) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, visible });
   const bare = { displaylogo: false, responsive: true };
   const modebar = { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink };
-  function scene() {
-    return {
-      aspectmode: "data", xaxis: axis3d(linear[0] || ""), yaxis: axis3d(linear[1] || ""), zaxis: { ...axis3d(linear[2] || ""), visible: !flat },
-      camera: { projection: { type: "orthographic" }, eye: flat ? { x: 0, y: 0, z: 1.6 } : { x: 1.2, y: -1.3, z: 0.9 },
-        up: flat ? { x: 0, y: 1, z: 0 } : { x: 0, y: 0, z: 1 } },
-    };
-  }
   const pathPlot = element("path"), profilePlot = element("profile");
   element("first").remove();
+  const view = fittedScene(extents, pathPlot, axis3d, linear), fitted = view.aspectratio.x;
   await Plotly.newPlot(pathPlot, [
     { type: "scatter3d", mode: "lines", ...programmed, line: { width: 2, color: dim }, opacity: 0.45, hoverinfo: "skip", name: "programmed" },
     pathTrace(),
     { type: "scatter3d", mode: "markers", x: [place(0)[0]], y: [place(0)[1]], z: [place(0)[2]], hoverinfo: "skip",
       marker: { size: 7, color: dark ? "#ffffff" : "#000000" }, name: "here" },
-  ], { scene: scene(), margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, modebar, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, uirevision: "keep" }, bare);
+  ], { scene: view, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, modebar, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, uirevision: "keep" }, bare);
   mark("path");
   // Zoomed in, the part in sight is drawn finer: the samples near the axis of sight. The scene's own lengths are those of its aspect ratio.
   let waiting = null;
   pathPlot.on("plotly_relayout", (change) => {
-    if (!Object.keys(change).some((key) => key.startsWith("scene.camera"))) return;
+    if (!Object.keys(change).some((key) => key.startsWith("scene.camera") || key.startsWith("scene.aspectratio"))) return;
     clearTimeout(waiting);
     waiting = setTimeout(() => {
-      const { eye, center } = pathPlot.layout.scene.camera, full = pathPlot._fullLayout.scene, at = { x: 0, y: 0, z: 0, ...center };
-      const way = ["x", "y", "z"].map((a) => eye[a] - at[a]), reach = Math.hypot(...way);
-      if (reach > 1.2) { sight = () => true; redrawPath(); return; }
-      const unit = way.map((w) => w / reach), scale = ["x", "y", "z"].map((a) => {
+      const full = pathPlot._fullLayout.scene, { eye, center } = full.camera, at = { x: 0, y: 0, z: 0, ...center };
+      if (full.aspectratio.x < 1.3 * fitted) { sight = () => true; redrawPath(); return; }
+      const way = ["x", "y", "z"].map((a) => eye[a] - at[a]), far = Math.hypot(...way), reach = Math.hypot(1, pathPlot.clientWidth / pathPlot.clientHeight);
+      const unit = way.map((w) => w / far), scale = ["x", "y", "z"].map((a) => {
         const [low, high] = full[a + "axis"].range;
         return [(low + high) / 2, full.aspectratio[a] / (high - low)];
       });
@@ -339,7 +334,7 @@
     }, (k) => goToLine(lineOf[order[k]]));
   }
   table("lines", [
-    { name: "line", whole: true }, { name: "text", text: true }, { name: "planned [s]" }, { name: "programmed [s]" }, { name: "planned / programmed" },
+    { name: "line", whole: true }, { name: "text", text: true }, { name: "planned [s]" }, { name: "at F [s]" }, { name: "planned / at F" },
     { name: "highest feed [mm/s]" }, { name: "held by", text: true }, { name: "deviation [µm]" },
     ...(c.line_more ? [{ name: "10 % more F saves [ms]" }, { name: "10 % more of all limits saves [ms]" }] : []),
   ], [

@@ -12,17 +12,20 @@ from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
 from planner.machine import machine_from_dict
+from planner.nc.points import are_points
 from planner.nc.reader import load, parse_program
 from planner.nc.reading import Reading
+from planner.report.export import KEPT
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
 from planner.verify import verify
 
 
-def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes]:
-    """The plan that a directory holds, judged anew; its summary; and the text of its program, read from where it was planned.
+def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
+    """The plan that a directory holds, judged anew; its summary; and the text of its program, None for points.
 
-    The plan lacks what files do not hold: the profile at the grid points and the prices (those are in the summary).
+    The program is read from where it was planned, or from the directory if it was given as a text or as points. The plan lacks
+    what files do not hold: the profile at the grid points and the prices (those are in the summary).
 
     Raises InputError if a file is missing or damaged, or if the trajectory is not that of the program.
     """
@@ -36,15 +39,16 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes]:
     read = read_trajectory(files[0])
     if read.metadata.get("run_id") != summary.get("run_id"):
         raise InputError("the trajectory and the summary are of two runs; plan again", source=str(directory))
-    text = load(summary["program"])
+    source = _program_file(directory, summary["program"])
+    text = load(source)
     machine = machine_from_dict(read.metadata["machine"], source=f"{files[0]} (its own machine)")
     reading = Reading.saved(read.metadata.get("reading"))
-    program = parse_program(text, machine, reading, source=summary["program"])
+    program = parse_program(text, machine, reading, source=source)
     toolpath = toolpath_from_program(program, machine, read.metadata.get("tolerance_mm"))
     if len(program) != summary["blocks"]:
         raise InputError(
             f"the program has {len(program):,} blocks now, and had {summary['blocks']:,} when it was planned; plan again",
-            source=summary["program"],
+            source=source,
         )
     free = tuple(read.metadata.get("not_limited", ()))
     verdict = verify(read.trajectory, toolpath, machine, given=read.given, not_limited=free)
@@ -67,7 +71,13 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes]:
         notes=tuple(summary["notes"]),
         timings=summary["timings_s"],
     )
-    return plan, summary, text
+    return plan, summary, None if are_points(text) else text
+
+
+def _program_file(directory: Path, source: str) -> str:
+    """Where the program of a plan is: where it was read, or in the directory itself if it was given as a text or as points."""
+    kept = [directory / name for name in KEPT if (directory / name).exists()]
+    return str(kept[0]) if kept and source.startswith("<") else source
 
 
 _KEYS = (

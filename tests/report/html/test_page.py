@@ -290,9 +290,33 @@ def test_prices_are_a_colour_and_columns(browser: Any, plan: Plan) -> None:
 def test_zoomed_in_what_is_in_sight_is_drawn_finer(browser: Any, plan: Plan) -> None:
     browser.execute_script("Plotly.relayout('profile', {'xaxis.autorange': true})")
     everywhere = wait_for(browser, "const n = report.drawn(); return n > 2000 ? n : null")
-    close = "{'scene.camera.eye': {x: 0, y: 0, z: 0.3}, 'scene.camera.center': {x: 0, y: 0, z: 0}}"
-    browser.execute_script(f"Plotly.relayout('path', {close})")
+    wheel = """
+        const canvas = document.querySelector('#path canvas'), box = canvas.getBoundingClientRect();
+        for (let k = 0; k < 16; k++) canvas.dispatchEvent(new WheelEvent('wheel', { deltaY: arguments[0], bubbles: true,
+          cancelable: true, clientX: box.left + box.width / 2, clientY: box.top + box.height / 2 }));"""
+    browser.execute_script(wheel, -100)
     less = wait_for(browser, f"const n = report.drawn(); return n < {everywhere} ? n : null")
     assert less > everywhere / 3, "what is out of sight is still there, coarser"
-    browser.execute_script("Plotly.relayout('path', {'scene.camera.eye': {x: 0, y: 0, z: 1.6}})")
+    browser.execute_script(wheel, 100)
     assert wait_for(browser, f"return report.drawn() === {everywhere}")
+
+
+@pytest.mark.slow
+def test_the_path_fills_its_box_and_is_not_cut_off(browser: Any) -> None:
+    """The corners of the path's own box, as the camera projects them, are within the picture, and not far within."""
+    seen = browser.execute_script("""
+        const scene = document.getElementById('path')._fullLayout.scene, gl = scene._scene.glplot.cameraParams;
+        const times = (m, v) => [0, 1, 2, 3].map((r) => v.reduce((sum, w, k) => sum + m[4 * k + r] * w, 0));
+        const found = [];
+        for (const k of [0, 1, 2, 3, 4, 5, 6, 7]) {
+          const axes = [scene.xaxis, scene.yaxis, scene.zaxis], at = axes.map((axis, a) => {
+            const [low, high] = axis.range, middle = (low + high) / 2;
+            return middle + ((k >> a) & 1 ? 1 : -1) * (high - low) / 2 / 1.08;
+          });
+          const scaled = at.map((v, a) => v * scene._scene.dataScale[a]);
+          found.push(times(gl.projection, times(gl.view, times(gl.model, [...scaled, 1]))).slice(0, 2));
+        }
+        return found;""")
+    across, up = (max(abs(point[k]) for point in seen) for k in (0, 1))
+    assert max(across, up) <= 0.9
+    assert max(across, up) >= 0.6

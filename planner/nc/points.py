@@ -1,0 +1,90 @@
+"""Programs of points, and the file that keeps one: straight moves from one point to the next, for paths that are no NC program.
+
+The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n) [mm/s] with null for rapid moves, and `tolerance` [mm]
+or null. Numbers are written so that they read back exactly.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.nc.program import Kind, PathControl, Program
+
+AXES = ("x", "y", "z")
+SOURCE = "<points>"
+_FORMAT = "points"
+
+
+def program_of_points(
+    position: FloatArray, feed: FloatArray, tolerance: float | None, source: str = SOURCE
+) -> Program:
+    """A program that goes straight from each point to the next.
+
+    position  : (n+1, 3) x, y and z [mm]
+    feed      : (n,) [mm/s]; inf for rapid moves
+    tolerance : contour error budget [mm]; None for that of the machine
+    source    : what messages call it
+
+    `Program.line` counts the moves from 1.
+    """
+    moves = len(position) - 1
+    nothing, none = np.zeros(0), np.zeros((0, len(AXES)))
+    return Program(
+        source=source,
+        axes=AXES,
+        start=position[0],
+        kind=np.where(np.isinf(feed), Kind.RAPID, Kind.LINE),
+        end=position[1:],
+        feed=feed,
+        dwell=np.zeros(moves),
+        line=np.arange(1, moves + 1),
+        path_control=np.full(moves, PathControl.BLEND),
+        tolerance=np.full(moves, np.nan if tolerance is None else tolerance),
+        arc_block=nothing,
+        arc_center=none,
+        arc_normal=nothing,
+        arc_sweep=nothing,
+    )
+
+
+def points_file(program: Program) -> bytes:
+    """The file of a program that `program_of_points` made."""
+    tolerance = float(program.tolerance[0])
+    said = {
+        "format": _FORMAT,
+        "axes": "".join(program.axes),
+        "tolerance": None if np.isnan(tolerance) else tolerance,
+        "feed": [value if np.isfinite(value) else None for value in program.feed.tolist()],
+        "points": [program.start.tolist(), *program.end.tolist()],
+    }
+    return (json.dumps(said) + "\n").encode("ascii")
+
+
+def are_points(data: bytes) -> bool:
+    """Whether a file holds points: no NC program begins with a brace."""
+    return data[:64].lstrip().startswith(b"{")
+
+
+def read_points(data: bytes, source: str) -> Program:
+    """The program of a file of points. Raises InputError for anything else."""
+    try:
+        said: Any = json.loads(data)
+        position = np.asarray(said["points"], dtype=np.float64)
+        feed = np.array([np.inf if value is None else value for value in said["feed"]], dtype=np.float64)
+        tolerance = None if said["tolerance"] is None else float(said["tolerance"])
+        known = said["format"] == _FORMAT and said["axes"] == "".join(AXES)
+    except (ValueError, KeyError, TypeError, RecursionError) as fault:
+        raise InputError(f"begins like a file of points, and is none: {fault!r}", source=source) from None
+    good = known and position.ndim == 2 and position.shape[1] == len(AXES) and len(position) > 1
+    good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
+    if not good or not (feed > 0).all() or (tolerance is not None and not 0 < tolerance < np.inf):
+        raise InputError(
+            "begins like a file of points, and is none: format points, axes xyz, points (n+1, 3), n feeds above 0 or null",
+            source=source,
+        )
+    return program_of_points(position, feed, tolerance, source)

@@ -1,0 +1,133 @@
+"""What a motion is at where geometry and feed were found together: step by step, from the search's steps (tube/shares.py).
+
+A limit, or the tolerance, is active in a step that comes within `HELD` of it; those that are share its time. Shown is the one that has
+the largest price there. Where the motion of the start stays, it is what held that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.constraints.limits import ACCELERATION, CHORD_ERROR, FEED, JERK, VELOCITY
+from planner.geometry.toolpath import Toolpath
+from planner.job.records import GridHistory
+from planner.motion.timing import MotionInTime
+from planner.sensitivity.activity import HELD, NONE, REST
+from planner.tube import price
+from planner.tube.motion import Steps
+from planner.tube.parts import Found
+from planner.tube.shares import shares
+from planner.tube.splice import Spliced, SplicedRun
+
+TOLERANCE = "tolerance"
+STANDS = 1e-9  # shorter standstills are rounding of times [s]
+SEEN = 1e-3  # period of a trajectory that is looked at at given times only [s]
+PRICE_OF = (price.FEED, price.NORMAL, price.ROOM)  # of the shares behind those of the axes
+
+
+@dataclass
+class _Rows:
+    """Rows of a history, as they are gathered."""
+
+    names: tuple[str, ...]
+    share: FloatArray
+    t: list[FloatArray] = field(default_factory=list)
+    active: list[Array] = field(default_factory=list)
+
+    def add(self, t: FloatArray, active: Array) -> None:
+        self.t.append(t)
+        self.active.append(active)
+
+    def stand(self, begin: float, lasting: float) -> None:
+        """A standstill."""
+        if lasting > STANDS:
+            self.add(np.array([begin]), np.array([len(self.names) - 1]))
+            self.share[-1] += lasting
+
+
+def found_history(
+    toolpath: Toolpath, motion: MotionInTime, found: list[Found], kept: list[int], start: GridHistory | None
+) -> GridHistory | None:
+    """What holds a motion of runs `found` along a toolpath, of which the start's stays on those in `kept`; None where the start's part
+    in it does not tell.
+
+    motion : as it is delivered
+    start  : what held the start's motion
+    """
+    if not isinstance(motion, Spliced):
+        return None
+    axes = toolpath.axes
+    own = (*(kind.called(axis) for kind in (JERK, ACCELERATION, VELOCITY) for axis in axes),)
+    own = (*own, FEED.name, CHORD_ERROR.name, TOLERANCE)
+    others = () if start is None else tuple(name for name in start.active_names[:-2] if name not in own)
+    names = (*own, *others, NONE, REST)
+    rows = _Rows(names, np.zeros(len(names)))
+    parts = list(zip(motion.runs, motion.begin[:-1].tolist(), strict=True))
+    for k, one in enumerate(found):
+        for lo, hi, stays in [(0, 0, True)] if k in kept else one.ranges():
+            part, begin = parts.pop(0)
+            if not stays:
+                _of_steps(rows, toolpath, one, (lo, hi), (part, begin))
+            elif start is None:
+                return None
+            else:
+                _of_start(rows, start, part, begin)
+            rows.stand(begin + part.end - part.begin, part.hold)
+    t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
+    single, which = np.unique(t, return_inverse=True)
+    seen = motion.at(single, SEEN)
+    return GridHistory(
+        t=t,
+        s=seen.s[which],
+        feed=seen.feed[which],
+        active=np.concatenate(rows.active),
+        active_names=names,
+        share=rows.share / rows.share.sum(),
+    )
+
+
+def _of_start(rows: _Rows, start: GridHistory, part: SplicedRun, begin: float) -> None:
+    """Rows of the start's motion, as far as it is the part that begins at `begin` [s]."""
+    index = np.array([rows.names.index(name) for name in start.active_names])
+    lo, hi = np.searchsorted(start.t, [part.begin, part.end])
+    lo = max(lo - 1, 0)
+    t = np.append(np.clip(start.t[lo:hi], part.begin, part.end), part.end)
+    active = index[start.active[lo:hi]]
+    rows.add(begin + t[:-1] - part.begin, active)
+    np.add.at(rows.share, active, np.diff(t))
+
+
+def _of_steps(
+    rows: _Rows, toolpath: Toolpath, found: Found, which: tuple[int, int], at: tuple[SplicedRun, float]
+) -> None:
+    """Rows of the steps lo .. hi - 1 of a run, with the standstills around them."""
+    (lo, hi), (part, begin) = which, at
+    steps, place, run = found.steps, found.place, found.run
+    assert steps is not None
+    assert place is not None
+    before = toolpath.dwell[run.first[0]] if lo == 0 else 0.0
+    rows.stand(begin, before)
+    names = ("h", "position", "velocity", "acceleration", "jerk")
+    own = Steps(**{name: getattr(steps, name)[lo:hi] for name in names})
+    leg = run.leg_at((place[lo:hi] + place[lo + 1 : hi + 1]) / 2.0)
+    used = shares(run, own, leg, place[lo : hi + 1]) >= 1.0 - HELD
+    moving, many = len(run.axis), len(toolpath.axes)
+    column = np.concatenate([quantity * many + run.axis for quantity in range(3)])
+    column = np.append(column, 3 * many + np.arange(3))
+    holders = used.sum(axis=1)
+    part_of = np.divide(own.h, holders, out=np.zeros(hi - lo), where=holders > 0)
+    np.add.at(rows.share, column, (used * part_of[:, None]).sum(axis=0))
+    rows.share[-2] += own.h[holders == 0].sum()
+    paid = np.zeros(used.shape)
+    if found.price is not None:
+        of = [*range(3 * moving), *(3 * moving + column for column in PRICE_OF)]
+        paid = -found.price[lo:hi, of]
+        paid[:, -1] -= found.price[lo:hi, 3 * moving + price.VERTEX]
+    active = column[np.argmax(np.where(used, 1.0 + paid / own.h[:, None], 0.0), axis=1)]
+    active = np.where(holders > 0, active, len(rows.names) - 2)
+    t = begin + before + np.append(0.0, np.cumsum(own.h))
+    rows.add(t[:-1], active)
+    rows.stand(t[-1], part.end - part.begin - (t[-1] - begin))

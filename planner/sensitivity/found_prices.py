@@ -1,0 +1,254 @@
+"""What limits and tolerance cost where geometry and feed were found together, from the multipliers of that search (tube/price.py).
+
+Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So nothing is solved again. A
+limit acts at every step through its price there; the tolerance, and accelerations once more, through what eq. (20) leaves for the path,
+
+    dT  =  sum of room d(ln eps_ap) + vertex d(ln eps_ap) + normal d(ln X)        over legs and vertices, from budgets made again.
+
+**Finite changes.** A corner that jerk j lets through within eps takes a time that goes with (eps/j)^(1/3), one that acceleration lets
+through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(ln limit) foretells for r times the limit
+
+    T(r) - T(1)  =  p/n (1 - r^-n),      n = 1/3 for jerk and tolerance, 1/2 for accelerations, 1 for velocities and the feed,
+
+and the range is by `WITHIN` of it narrower and wider, and by `UNREST` of the time, by which a motion searched for again ends elsewhere.
+
+Where the programmed feed and an axis velocity hold together, more of one alone is worth nothing, as in sensitivity/prices.py; where an
+axis can follow only a part of ten per cent more feed, in the direction that the motion has, the least is that part. Where the start's
+motion stays nothing is priced.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.records import SAVED_MIN, DearCorners, PlacePrices, PriceList
+from planner.machine import Machine
+from planner.sensitivity.corner_prices import DEAREST, MORE_TOLERANCE, STEP
+from planner.sensitivity.places import MORE_LIMIT
+from planner.sensitivity.prices import Saving
+from planner.sensitivity.savings import more_of
+from planner.tube import price
+from planner.tube.parts import Found
+from planner.tube.run import budgets_of
+
+QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of tube/price.py
+TOLERANCE = "tolerance"
+POWER = {
+    **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
+    **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0},
+}
+# How far a change foretold to 10 % more of a limit may be off [-], and by how much a plan made again is faster or slower for no other
+# reason [share of the time] (benchmarks/found_prices.py).
+WITHIN, UNREST = 0.1, 2e-4
+SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
+TIED = 1e-2  # what a limit has to cost of a step's time to hold it [-]; of those that do not it is some 1e-5
+
+
+class RunPrices:
+    """dT/d(ln limit) of a run with N steps on R legs [s].
+
+    leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
+    step, alone          : (N, 3 A + 5) of tube/price.py, and the same without feed and velocities where these hold together
+    room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
+    """
+
+    def __init__(self, toolpath: Toolpath, found: Found, step: FloatArray, place: FloatArray):
+        """step : (N, 3 A + 5) of tube/price.py; place : (N+1,) of the nodes along the run [mm]"""
+        self.found, self.step, axes = found, step, len(found.run.axis)
+        assert found.steps is not None
+        least = TIED * found.steps.h
+        held = -step[:, 2 * axes : 3 * axes + 1] > least[:, None]  # by the velocities, and by the feed
+        tied = held[:, -1] & held[:, :-1].any(axis=1)
+        self.alone = step.copy()
+        self.alone[tied, 2 * axes : 3 * axes + 1] = 0.0
+        self.middle = (place[:-1] + place[1:]) / 2.0
+        self.leg = found.run.leg_at(self.middle)
+        first, last = found.run.first[0], found.run.first[-1]
+        along = np.cumsum(toolpath.length[first : last - 1])
+        self.segment = first + np.searchsorted(along, self.middle, side="right")
+        legs = len(found.run)
+        self.room = np.bincount(self.leg, self.of(price.ROOM), legs)
+        self.normal = np.bincount(self.leg, self.of(price.NORMAL), legs)
+        self.vertex = np.bincount(self.leg, self.of(price.VERTEX), legs + 1)
+
+    def of(self, column: int) -> FloatArray:
+        """(N,) prices of what is not of one axis."""
+        return np.asarray(self.step[:, 3 * len(self.found.run.axis) + column])
+
+    def of_feed(self) -> FloatArray:
+        """(N,) prices of the feed where more of it alone is worth something."""
+        return np.asarray(self.alone[:, 3 * len(self.found.run.axis) + price.FEED])
+
+    def of_axis(self, quantity: int, axis: int) -> float:
+        """dT/d(ln limit) of a quantity (`QUANTITIES`) of an axis of the toolpath, where more of it alone is worth something [s]."""
+        axes = self.found.run.axis
+        return float(self.alone[:, quantity * len(axes) + np.flatnonzero(axes == axis)].sum())
+
+    def feed_saves(self, ratio: float) -> FloatArray:
+        """(N,) time saved by `ratio` of the feed, as far as the axes can follow it in the direction that the motion has [s]."""
+        steps = self.found.steps
+        assert steps is not None
+        h = steps.h[:, None]
+        velocity = steps.velocity + h * (steps.acceleration / 2.0 + h * steps.jerk / 8.0)
+        follows = (self.found.run.velocity / np.maximum(np.abs(velocity), SLOWEST)).min(axis=1)
+        return np.asarray(-self.of_feed() * (1.0 - 1.0 / np.clip(follows, 1.0, ratio)))
+
+    def nearer_end(self) -> Array:
+        """(N,) vertices nearest to the steps, on their legs; no end of the run unless it has one leg alone."""
+        offset, legs = self.found.run.offset, len(self.found.run)
+        begin, end = offset[self.leg], offset[self.leg + 1]
+        nearer = self.leg + (self.middle - begin > end - self.middle)
+        return np.clip(nearer, 1, legs - 1) if legs > 1 else nearer
+
+
+class Priced(NamedTuple):
+    """dT/d(ln) of a limit or of the tolerance [s], and the share of it that what is saved is told for."""
+
+    kind: str
+    slope: float
+    ratio: float
+
+    def saved(self) -> float:
+        """What the power law of its kind foretells [s]."""
+        n = POWER[self.kind]
+        return -self.slope / n * (1.0 - self.ratio**-n)
+
+    def saving(self, least: float) -> Saving:
+        """The least and the most of it; of the least no more than what is given."""
+        low, high = sorted((1.0 + sign * WITHIN) * self.saved() for sign in (-1.0, 1.0))
+        return Saving(min(low, least), high)
+
+
+def found_prices(
+    toolpath: Toolpath, machine: Machine, found: list[Found], cycle_time: float
+) -> PriceList | None:
+    """The prices of the runs along a toolpath whose search tells them, of a motion of `cycle_time` [s]; None if there are none."""
+    runs = [
+        RunPrices(toolpath, one, one.price, one.place)
+        for one in found
+        if one.price is not None and one.place is not None
+    ]
+    if not runs:
+        return None
+    limit, slope = _of_limits(toolpath, machine, runs)
+    of_tolerance = _OfTolerance(toolpath, machine, runs)
+    tolerance, present = float(of_tolerance.together.sum()), _present(toolpath)
+    more = {name: Priced(name.partition(".")[0], slope[name], 1.0 + MORE_LIMIT) for name in slope}
+    more[TOLERANCE] = Priced(TOLERANCE, tolerance * present, 1.0 + MORE_TOLERANCE / present)
+    # Slower by 1.1, a motion with 1.1 of one limit keeps all the old ones.
+    most = cycle_time * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
+    at_feed = sum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)
+    ranges = {
+        name: priced.saving(at_feed if name == FEED.name else np.inf).widened(UNREST * cycle_time)
+        for name, priced in more.items()
+    }
+    ranges |= {name: saving.below(most) for name, saving in ranges.items() if name != TOLERANCE}
+    return PriceList(
+        limits={name: slope[name] / limit[name] for name in limit},
+        feed=slope[FEED.name],
+        tolerance=tolerance,
+        saved={name: saving.middle for name, saving in ranges.items()},
+        corners=_dearest(toolpath, of_tolerance.alone),
+        ranges={name: (saving.least, saving.most) for name, saving in ranges.items()},
+        hints=tuple(name for name, saving in ranges.items() if saving.vague(cycle_time)),
+        places=_by_place(toolpath, runs, of_tolerance.together),
+    )
+
+
+def _of_limits(
+    toolpath: Toolpath, machine: Machine, runs: list[RunPrices]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """The limits of the axes by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
+    limit, slope = {}, {FEED.name: sum(float(run.of_feed().sum()) for run in runs)}
+    for quantity, kind in enumerate(QUANTITIES):
+        values = machine.limits(kind.name, toolpath.axes)  # type: ignore[arg-type]
+        for k, axis in enumerate(toolpath.axes):
+            name = kind.called(axis)
+            limit[name], slope[name] = float(values[k]), sum(run.of_axis(quantity, k) for run in runs)
+            if kind is ACCELERATION:
+                slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name)(STEP))
+    return limit, slope
+
+
+def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], changed: Machine) -> float:
+    """dT/d(ln limit) through eq. (20), from a machine with `STEP` more of a limit [s]."""
+    total = 0.0
+    for run in runs:
+        first = run.found.run.first
+        before, after = (budgets_of(toolpath, one, first) for one in (machine, changed))
+        total += float(run.room @ np.log(after.leg / before.leg))
+        total += float(run.normal @ np.log(after.across / before.across))
+        total += float(run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1]))
+    return total / STEP
+
+
+class _OfTolerance:
+    """dT/d(tolerance) [s/mm].
+
+    together : (M+1,) at the joints, where it is raised at all of them; what steps pay goes to the nearer end of their leg
+    alone    : (M+1,) of a joint alone, with the segments beside it whose budget, the larger of their joints', grows; 0 of full stops
+    """
+
+    def __init__(self, toolpath: Toolpath, machine: Machine, runs: list[RunPrices]):
+        self.together = np.zeros(len(toolpath) + 1)
+        vertex, segment = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath))
+        wider = dataclasses.replace(toolpath, tolerance=toolpath.tolerance * (1.0 + STEP))
+        for run in runs:
+            first = run.found.run.first
+            before, after = (budgets_of(one, machine, first) for one in (toolpath, wider))
+            room, normal = (
+                np.log(a / b) / STEP for a, b in ((after.leg, before.leg), (after.across, before.across))
+            )
+            paid = run.of(price.ROOM) * room[run.leg] + run.of(price.NORMAL) * normal[run.leg]
+            at_vertex = run.vertex[1:-1] * np.log(after.vertex[1:-1] / before.vertex[1:-1]) / STEP
+            of_vertex = np.bincount(run.nearer_end(), paid, len(first)).astype(np.float64)
+            of_vertex[1:-1] += at_vertex
+            np.add.at(self.together, first, of_vertex / toolpath.tolerance[first])
+            vertex[first[1:-1]] += at_vertex
+            np.add.at(segment, run.segment, paid)
+        tolerance = toolpath.tolerance
+        grows_before = np.append(False, tolerance[1:] >= tolerance[:-1])
+        grows_behind = np.append(tolerance[:-1] >= tolerance[1:], False)
+        beside = grows_before * np.append(0.0, segment) + grows_behind * np.append(segment, 0.0)
+        self.alone = np.where(toolpath.joint == Joint.STOP, 0.0, (vertex + beside) / tolerance)
+
+
+def _present(toolpath: Toolpath) -> float:
+    """The tolerance of most joints between blocks [mm]."""
+    inner = toolpath.tolerance[toolpath.joint != Joint.STOP]
+    return float(np.median(inner if len(inner) else toolpath.tolerance))
+
+
+def _dearest(toolpath: Toolpath, alone: FloatArray) -> DearCorners:
+    """The joints where more tolerance saves most, of prices (M+1,)."""
+    tolerance = toolpath.tolerance
+    n = POWER[TOLERANCE]
+    saved = -alone * tolerance / n * (1.0 - (1.0 + MORE_TOLERANCE / tolerance) ** -n)
+    best = np.argsort(-saved, kind="stable")[:DEAREST]
+    best = best[saved[best] >= SAVED_MIN]
+    return DearCorners(
+        line=toolpath.line[best - 1],
+        position=toolpath.end[best - 1],
+        theta=toolpath.theta[best],
+        price=alone[best],
+        saved=saved[best],
+    )
+
+
+def _by_place(toolpath: Toolpath, runs: list[RunPrices], by_joint: FloatArray) -> PlacePrices:
+    """The prices by segment and joint."""
+    feed, limits = np.zeros(len(toolpath)), np.zeros(len(toolpath))
+    share = 1.0 - 1.0 / (1.0 + MORE_LIMIT)
+    for run in runs:
+        axes = len(run.found.run.axis)
+        jerk, acceleration, velocity = (run.step[:, q * axes : (q + 1) * axes].sum(axis=1) for q in range(3))
+        every = velocity + run.of(price.FEED) + acceleration + run.of(price.NORMAL) + jerk
+        np.add.at(feed, run.segment, run.feed_saves(1.0 + MORE_LIMIT))
+        np.add.at(limits, run.segment, -share * every)
+    return PlacePrices(feed=feed, limits=limits, tolerance=by_joint)

@@ -1,0 +1,71 @@
+"""Wrong turns on the command line, and what they are answered with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import planner
+from tests.commands.command_line import run
+
+JOB = "G21 F3000\nG1 X10\nY5\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["part.nc"], "'part.nc' is no command. To plan a program:"),
+        (["pln"], "No such command 'pln'. Did you mean 'plan'?"),
+        (["machine", "sho"], "No such command 'sho'. Did you mean 'show'?"),
+        (["plan", "part.nc", "--tolerence", "0.02"], "no option --tolerence; did you mean --tolerance?"),
+        (["plan", "part.nc", "--threads", "x"], "Invalid value for '--threads': give a whole number"),
+        (["plan", "part.nc", "--threads", "0"], "Invalid value for '--threads': must be 1 or more"),
+        (["export", "out", "--for", "fanuc", "-o", "x"], "'fanuc' is not one of"),
+        (["verify", "part.nc", "t.csv"], "the trajectory comes first: planner verify t.csv part.nc"),
+        (["verify", "nowhere", "part.nc"], "nowhere: trajectory file not found"),
+        (["export", "nowhere", "--for", "pvt", "-o", "x"], "nowhere: trajectory file not found"),
+        (["report", "nowhere"], "nowhere: give the directory that 'plan -o' wrote"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_wrong_turn_is_answered_with_the_right_one(words: list[str], said: str) -> None:
+    done = run(*words)
+    assert done.exit_code == 2
+    assert said in done.output
+    assert "Value error" not in done.output
+    assert "Input should" not in done.output
+
+
+@pytest.mark.parametrize("given", ["0", "-1", "nan", "inf", "20xm", "1e", "mm", ""])
+def test_a_tolerance_that_is_none_is_refused_before_any_work(given: str) -> None:
+    done = run("plan", "nowhere.nc", "--tolerance", given)
+    assert done.exit_code == 2
+    assert f"'{given}' is no length above 0; write one in mm, or with a unit: mm, um, µm, in" in done.output
+
+
+@pytest.mark.parametrize("given", ["0.04", "40um", "40 µm", "4e-2mm", "0.0015748031496062992in"])
+def test_a_tolerance_may_have_a_unit(given: str, tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(JOB)
+    done = run("plan", tmp_path / "part.nc", "--tolerance", given, "--method", "stop", "-o", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    read = planner.report.trajectory_file.read_trajectory(tmp_path / "out" / "trajectory.parquet")
+    assert read.metadata["tolerance_mm"] == pytest.approx(0.04)
+
+
+def test_commands_of_trajectories_take_the_directory_of_a_plan(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(JOB)
+    out = tmp_path / "out"
+    assert run("plan", tmp_path / "part.nc", "--method", "stop", "-o", out).exit_code == 0
+    assert "passed" in run("verify", out, tmp_path / "part.nc").output
+    assert run("pulses", out, "--steps", "x=100,y=100").exit_code == 0
+    (tmp_path / "empty").mkdir()
+    done = run("verify", tmp_path / "empty", tmp_path / "part.nc")
+    assert done.exit_code == 2
+    assert "no trajectory in this directory" in done.output
+
+
+def test_every_command_has_a_line_that_fits() -> None:
+    lines = run("--help").output.partition("Commands:")[2].strip().splitlines()
+    assert len(lines) == 11
+    assert all(line.endswith(".") and not line.endswith("...") for line in lines)

@@ -1,0 +1,60 @@
+"""What holds a motion whose geometry and feed were found together."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner.job.plan import Plan
+from planner.methods.optimal import OptimalMethod
+from planner.methods.tube import TubeMethod
+from planner.nc.reader import parse_program
+
+MACHINE = problems.machine()
+PROGRAMS = {
+    "corner": problems.polyline([[0, 0], [6, 0], [9, 4]], feed=90.0),
+    "dwells": parse_program("G21 G90 F4800\nG4 P0.2\nG1 X6\nY6\nG4 P0.3\nX2\nM2\n"),
+}
+
+
+@cache
+def made(name: str) -> Plan:
+    return TubeMethod(starts=(OptimalMethod(corner="bezier"),)).plan(PROGRAMS[name], MACHINE).require()
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_it_follows_the_delivered_motion(name):
+    """Times, places and feeds are those of the samples, shares add up, and the motion is nearly always at something."""
+    plan = made(name)
+    grid, seen = plan.grid, plan.trajectory
+    assert grid.t[0] == 0.0
+    assert (np.diff(grid.t) >= 0).all()
+    assert grid.t[-1] <= seen.cycle_time
+    assert grid.share.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(grid.s, np.interp(grid.t, seen.t, seen.s), atol=0.05)
+    np.testing.assert_allclose(grid.feed, np.interp(grid.t, seen.t, seen.feed), atol=1.0)
+    assert dict(grid.ranked()).get("none", 0.0) < 0.05
+    rest = float(plan.toolpath.dwell.sum()) / seen.cycle_time
+    assert dict(grid.ranked()).get("rest", 0.0) == pytest.approx(rest, rel=1e-2)
+
+
+def test_the_limit_that_it_names_is_used():
+    """Jerks, accelerations and the feed named for a step are within 2 % of the limits in the samples of the middle half of the step."""
+    plan = made("corner")
+    grid, seen = plan.grid, plan.trajectory
+    end = np.append(grid.t[1:], seen.cycle_time)
+    step = np.searchsorted(grid.t, seen.t, side="right") - 1
+    inside = np.abs((seen.t - grid.t[step]) / (end - grid.t)[step] - 0.5) < 0.05
+    names = np.array(grid.active_names)[grid.active[step]]
+    looked = 0
+    for k, axis in enumerate(seen.axes):
+        for quantity in ("jerk", "acceleration"):
+            rows = inside & (names == f"{quantity}.{axis}")
+            share = np.abs(getattr(seen, quantity)[rows, k]) / MACHINE.limits(quantity, (axis,))[0]
+            looked += rows.sum()
+            assert (share > 0.98).all()
+    assert (seen.feed[inside & (names == "feed")] > 0.98 * 90.0).all()
+    assert looked > 5

@@ -27,6 +27,7 @@ from planner.commands.interrupt import INTERRUPTED, interrupts_raise
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import BUG, say, show
 
+# By the exit code of a program's process.
 OUTCOMES = {0: "passed", 1: "failed", 2: "refused", 3: "not solved", INTERRUPTED: "interrupted"}
 CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
 ENDING = 5.0  # that processes get to remove what they have half written [s]

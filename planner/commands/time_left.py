@@ -49,7 +49,7 @@ SEEN = (
 )
 ENOUGH = 1e-5  # gain after which there are no more rounds [share of the time]
 
-BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)
+BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)  # where a plan is, in this order
 
 
 @dataclass

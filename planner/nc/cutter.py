@@ -23,18 +23,17 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.offset_lines import NOWHERE, OffsetMove, dot, meeting
 from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.store import Store
 
 STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
 _ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
-NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of coordinates around 1e3 mm
 
 _GOUGE = (
     "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a "
@@ -44,28 +43,6 @@ _GOUGE = (
 
 class CutterFault(ValueError):
     """The tool cannot follow the programmed moves; the text says why."""
-
-
-@dataclass(frozen=True)
-class OffsetMove:
-    """An offset move: where it would end, its tangent there and at its start, and its line or circle.
-
-    turning : +1 counter-clockwise, -1 clockwise, 0 for a line
-    """
-
-    end: complex
-    first: complex  # unit tangent
-    last: complex  # unit tangent
-    turning: int = 0
-    centre: complex = 0j
-    radius: float = 0.0
-
-    def tangent(self, point: complex) -> complex:
-        """Unit tangent at a point of the line or circle."""
-        if not self.turning:
-            return self.first
-        spoke = point - self.centre
-        return 1j * self.turning * spoke / abs(spoke)
 
 
 @dataclass
@@ -87,38 +64,6 @@ class _Open:
     fixed: bool = False
 
 
-def meeting(before: OffsetMove, after: OffsetMove, sense: float) -> complex | None:
-    """Where two offset moves cross in a sense (the sign of the turn from the one to the other), or None."""
-    crossing = [
-        p for p in _crossings(before, after) if _cross(before.tangent(p), after.tangent(p)) * sense > 0
-    ]
-    return min(crossing, key=lambda p: abs(p - before.end)) if crossing else None
-
-
-def _crossings(one: OffsetMove, other: OffsetMove) -> Sequence[complex]:
-    if not one.turning and not other.turning:
-        slope = _cross(one.first, other.first)
-        along = _cross(other.end - one.end, other.first) / slope
-        return [one.end + along * one.first]
-    if one.turning and other.turning:
-        apart = other.centre - one.centre
-        distance = abs(apart)
-        if distance < NOWHERE:
-            return []
-        along = (distance**2 + one.radius**2 - other.radius**2) / (2.0 * distance)
-        direction, foot, size = 1j * apart / distance, one.centre + along * apart / distance, one.radius
-        rest = size**2 - along**2
-    else:
-        line, circle = (other, one) if one.turning else (one, other)
-        direction = line.first
-        foot = line.end + _dot(circle.centre - line.end, direction) * direction
-        rest = circle.radius**2 - abs(foot - circle.centre) ** 2
-    if rest < 0.0:
-        return []
-    reach = math.sqrt(rest)
-    return [foot - reach * direction, foot + reach * direction]
-
-
 class Cutter:
     """The compensation in force, from G41 or G42 to G40; it writes its moves into the store.
 
@@ -132,12 +77,25 @@ class Cutter:
         self._radius, self._sign = radius, 1 if left else -1
         self.normal = normal
         self._open: _Open | None = None
+        self._placed = False
         state.actual = state.position.copy()
 
     @property
     def started(self) -> bool:
         """Whether the first move has been made."""
         return self._open is not None
+
+    @property
+    def leaving(self) -> complex:
+        """Unit tangent of the last move at its end."""
+        assert self._open is not None
+        return self._open.side.last
+
+    def begin_beside(self, tangent: complex) -> None:
+        """The tool stands beside the programmed place already, normal to the first move, whose unit tangent is given."""
+        state = self._state
+        state.actual = self._at(self._beside(self._plane(state.position), tangent), state.position)
+        self._placed = True
 
     def line(self, target: FloatArray, kind: Kind, line: int) -> None:
         """A straight move to `target` (3,), the programmed end. Raises CutterFault if the tool cannot follow."""
@@ -149,7 +107,9 @@ class Cutter:
             return
         tangent = (end - start) / length
         side = OffsetMove(self._beside(end, tangent), tangent, tangent)
-        if not self.started:
+        if self._placed:
+            self._placed = False
+        elif not self.started:
             if length <= self._radius:
                 raise CutterFault(
                     f"the first move of cutter radius compensation is {length:.6g} mm long; it must be longer than the tool's "
@@ -173,7 +133,9 @@ class Cutter:
             )
         side = OffsetMove(self._beside(end, last), first, last, turning, centre, size - nearer)
         sweep = arc.sweep
-        if not self.started:
+        if self._placed:
+            self._placed = False
+        elif not self.started:
             side, sweep = self._entry_arc(side, start, sweep)
         else:
             inner = self._corner(start, side, Kind.ARC, line)
@@ -243,7 +205,7 @@ class Cutter:
         if open_.arc >= 0 and not open_.fixed:
             block, centre, normal, _ = self._store.arcs[open_.arc]
             self._store.arcs[open_.arc] = (block, centre, normal, open_.sweep)
-        elif not open_.fixed and _dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
+        elif not open_.fixed and dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
             raise CutterFault(_GOUGE)
 
     # --- blocks -------------------------------------------------------------------------------------------------------------
@@ -276,7 +238,7 @@ class Cutter:
         """The arc from where the tool is that ends at the offset end with the programmed tangent."""
         inwards = 1j * side.turning * side.last  # from the end towards the centre
         chord = start - side.end
-        reach = _dot(chord, inwards)
+        reach = dot(chord, inwards)
         if abs(self._plane(self._state.position) - side.centre) <= self._radius or reach <= 0.0:
             raise CutterFault(
                 "the first arc of cutter radius compensation must have a radius larger than the tool's, "
@@ -291,7 +253,7 @@ class Cutter:
 
     def _stay(self, target: FloatArray, kind: Kind, line: int) -> None:
         """A move along the normal: the place in the plane stays the tool's."""
-        if not self.started:
+        if not (self.started or self._placed):
             raise CutterFault(
                 "the first move of cutter radius compensation does not move in its plane; write G41 or G42 after it"
             )
@@ -331,11 +293,3 @@ class Cutter:
 def _turn(start: complex, end: complex, side: OffsetMove) -> float:
     """The angle from one point to another about the centre, at most half a turn either way [rad]."""
     return cmath.phase((end - side.centre) / (start - side.centre))
-
-
-def _cross(one: complex, other: complex) -> float:
-    return (one.conjugate() * other).imag
-
-
-def _dot(one: complex, other: complex) -> float:
-    return (one.conjugate() * other).real

@@ -28,7 +28,7 @@ from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
-from planner.nc.state import REFUSED_MOTION, Setup, set_units, system_name
+from planner.nc.state import REFUSED_MOTION, Setup, State, set_units, system_name
 from planner.nc.store import Store
 
 
@@ -45,9 +45,8 @@ class Interpreter:
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
-        self.state = self.setup.start()
-        self.store = Store()
         self.assumed = Assumed(reading)
+        self.mover = Mover(self.setup.start(), Store(), self.assumed, self.setup.feed_default, self.note)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
@@ -58,13 +57,35 @@ class Interpreter:
         self._read = 0  # rows of the last chunk
         self._units_at: int | None = None  # number of blocks before the first G20 or G21
         self.found = Findings()
-        self.mover = Mover(self.state, self.store, self.assumed, self.setup.feed_default, self.note)
+
+    @property
+    def state(self) -> State:
+        """What is in force, and where the axes are; another one may be put in its place for a while."""
+        return self.mover.state
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self.mover.state = state
+
+    @property
+    def store(self) -> Store:
+        """The blocks so far; another one may be put in its place for a while."""
+        return self.mover.store
+
+    @store.setter
+    def store(self, store: Store) -> None:
+        self.mover.store = store
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
         self._end_compensation()
         return self.store.finish(self.source, self.notes, frames, self.reading)
+
+    def go_on_with(self, state: State, store: Store) -> None:
+        """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
+        self.state = self.mover.state = state
+        self.store = self.mover.store = store
 
     def _end_compensation(self) -> None:
         """Settle the last move, if the program just ends while compensation is on."""

@@ -79,7 +79,7 @@ ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class CodeSetting:
     """A code that moves nothing: what is said of it, the letters behind it on its line that are its own, whether it is a full stop."""
 
     what: Assumption
@@ -87,7 +87,7 @@ class Setting:
     stops: bool = False
 
 
-def setting(letter: str, code: int, before: str, behind: str) -> Setting | None:
+def setting(letter: str, code: int, before: str, behind: str) -> CodeSetting | None:
     """The setting that a code (in tenths) is beside the letters before it on its line, and those behind it up to the next code.
 
     None for a code that is read, or refused.
@@ -95,25 +95,25 @@ def setting(letter: str, code: int, before: str, behind: str) -> Setting | None:
     return _g_setting(code, before, behind) if letter == "G" else _m_setting(code, before, behind)
 
 
-def _g_setting(code: int, before: str, behind: str) -> Setting | None:
+def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
     moved = _MOVED.intersection(before + behind)
     if moved:
         return None
     if code in (500, 920) and "S" in behind:
-        return Setting(SPINDLE_LIMIT, "SPQR")
+        return CodeSetting(SPINDLE_LIMIT, "SPQR")
     if code == 500 or code in _G_SETTINGS:
-        return Setting(G_SETTING, "DEHLPQRS")
+        return CodeSetting(G_SETTING, "DEHLPQRS")
     if code in (100, 110) and "L" not in behind:
-        return Setting(RETRACTION, "PRS")
+        return CodeSetting(RETRACTION, "PRS")
     if code == 920 and "E" in behind:
-        return Setting(EXTRUDER_ZERO, "")
+        return CodeSetting(EXTRUDER_ZERO, "")
     # look-ahead of Fanuc controls: G5 P10000, G5.1 Q1, G8 P1
     if (code in (50, 80) and "P" in behind) or (code == 51 and "Q" in behind):
-        return Setting(G_SETTING, "PQR")
+        return CodeSetting(G_SETTING, "PQR")
     return None
 
 
-def _m_setting(code: int, before: str, behind: str) -> Setting | None:
+def _m_setting(code: int, before: str, behind: str) -> CodeSetting | None:
     number = code // 10
     progress = number == 73 and ("P" in behind or "R" in behind)
     if (
@@ -124,15 +124,15 @@ def _m_setting(code: int, before: str, behind: str) -> Setting | None:
     ):
         return None
     if number in _PARKING:
-        return Setting(PARKS, EVERYTHING, stops=True)
+        return CodeSetting(PARKS, EVERYTHING, stops=True)
     what = PRINTER_M if number in _OF_PRINTERS else UNKNOWN_M
     if before:
-        return Setting(what, "PQ")
+        return CodeSetting(what, "PQ")
     if number in _OF_AXES:
-        return Setting(what, EVERYTHING)
+        return CodeSetting(what, EVERYTHING)
     if 100 <= number <= 199:
-        return Setting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
-    return None if set("XYZ").intersection(behind) else Setting(what, EVERYTHING)
+        return CodeSetting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
+    return None if set("XYZ").intersection(behind) else CodeSetting(what, EVERYTHING)
 
 
 def may_be_ignored(name: str) -> bool:

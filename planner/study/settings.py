@@ -24,6 +24,7 @@ from planner.nc.program import Program
 TOLERANCE, FEED = "tolerance", "feed"
 G = 9806.65  # standard gravity [mm/s2]
 
+# Units, each in those of a machine file.
 _LENGTH = {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "m": 1e3, "in": MM_PER_INCH}
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
 _SPEED = {"mm/s": 1.0, "m/s": 1e3, "mm/min": 1 / SECONDS_PER_MINUTE, "m/min": 1e3 / SECONDS_PER_MINUTE,

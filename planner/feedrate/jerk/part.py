@@ -22,6 +22,8 @@ from planner.feedrate.jerk.window import ScaledWindow, Way
 LONG = 10
 # The joining window starts and ends at points so far from the middle, in windows [-]; of these, where most speed would help.
 NEAR, FAR = 0.25, 0.5
+# What is passed backward reaches so far beyond the middle [windows]: its windows end in a stop of their own before that.
+BEYOND = 3.0
 
 
 class Part:
@@ -37,10 +39,11 @@ class Part:
         n, middle = self.last - self.first, (self.first + self.last) // 2
         self._until = self.last
         if n > LONG * self.solver.window:
-            turned = backward(self.columns, self.first, self.last)
-            found = Profile.at_rest(n + 1, turned.d1.shape[1])
-            turned_task = replace(task, columns=turned, profile=found, first=0, last=n)
-            self.backward = Chain(replace(turned_task, start=task.end, end=task.start))
+            cut = middle - int(BEYOND * self.solver.window)
+            turned = backward(self.columns, cut, self.last)
+            found = Profile.at_rest(self.last - cut + 1, turned.d1.shape[1])
+            turned_task = replace(task, columns=turned, profile=found, first=0, last=self.last - cut)
+            self.backward = Chain(replace(turned_task, start=task.end, end=0.0))
             self._until = middle - int(NEAR * self.solver.window)
         self._middle = middle
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.travel import Travel
 from planner.nc.program import PathControl
 from planner.nc.state import System, system_name
 
@@ -36,6 +37,7 @@ class Asked:
 
     def __init__(self, interpreter: Interpreter):
         self.interpreter = interpreter
+        self.travel: Travel | None = None
 
     def get(self, parameter: int | str, depth: int) -> float:
         """The value of a parameter, by number or name; `depth` calls are open."""
@@ -217,7 +219,10 @@ class PositionAsked(Asked):
 
     def get(self, parameter: int | str, depth: int) -> float:
         """The position of an axis in the program's coordinates and unit."""
-        return self.here(int(parameter) - FIRST_POSITION)
+        axis = int(parameter) - FIRST_POSITION
+        if self.travel is not None and self.travel.active:
+            return float(self.travel.place[axis]) / self.interpreter.state.unit
+        return self.here(axis)
 
 
 class LinuxcncAsked(Asked):

@@ -34,6 +34,7 @@ from planner.nc.language.tree import (
     Language,
     Line,
     Loop,
+    Made,
     Message,
     Modes,
     Named,
@@ -293,6 +294,10 @@ class _Function:
         place = tuple(turning.place)
         self.blocks.put(f"run.turning({turning.action!r},{turning.letters!r},{place!r})", turning.place)
 
+    def _made(self, made: Made) -> None:
+        given = "".join(f"({name!r},{self.say.value(value)})," for name, value in made.given)
+        self.blocks.put(f"run.made({made.maker!r},({given}),{tuple(made.place)!r})", made.place)
+
 
 _WRITE: dict[type, Callable[..., None]] = {
     PlainRows: _Function._plain_rows,
@@ -308,4 +313,5 @@ _WRITE: dict[type, Callable[..., None]] = {
     Message: _Function._message,
     Modes: _Function._modes,
     Turning: _Function._turning,
+    Made: _Function._made,
 }

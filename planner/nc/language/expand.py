@@ -15,18 +15,19 @@ from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, PositionAsked
 from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.fanuc import text as fanuc_text
-from planner.nc.language.fanuc.calls import files as fanuc_files
+from planner.nc.language.fanuc.calls import fanuc_files
 from planner.nc.language.fanuc.lathe import LatheParser
 from planner.nc.language.fanuc.lathe_words import LatheAsked
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
+from planner.nc.language.heidenhain.flow import files as heidenhain_files
 from planner.nc.language.heidenhain.parser import HeidenhainParser
 from planner.nc.language.linuxcnc import text as linuxcnc_text
 from planner.nc.language.linuxcnc.parser import LinuxcncParser
 from planner.nc.language.rows import AppendedRows
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import text as siemens_text
-from planner.nc.language.siemens.calls import files as siemens_files
+from planner.nc.language.siemens.calls import siemens_files
 from planner.nc.language.siemens.parser import SiemensParser
 from planner.nc.language.source import Source
 from planner.nc.language.tree import Language, Parser
@@ -93,7 +94,7 @@ _FRONTS = {
     ),
     FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
     LATHE: _Front(fanuc_text.LANGUAGE, LatheAsked, LatheParser, fanuc_files),
-    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, lambda name: frozenset()),
+    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, heidenhain_files),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, siemens_files),
 }
 

@@ -18,7 +18,11 @@ from typing import TYPE_CHECKING
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
+from planner.nc.language.making import Making
 from planner.nc.language.rows import AppendedRows, NotFinite
+from planner.nc.language.stops import Endless, TooDeep, sentence
+from planner.nc.language.travel import Travel
+from planner.nc.language.travel_rows import TravelRow, words_of
 from planner.nc.language.tree import Language, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
@@ -77,12 +81,17 @@ class ProgramRun:
         self._messages = 0
         self._lathe: LatheCycles | None = None
         self._at_once = IDLE_AT_ONCE
+        self.travel = Travel(interpreter)
+        asked.travel = self.travel
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
         try:
             self.functions[main](self, {})
             self.flush()
+            left = self.travel.end()
+            if left:
+                self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
         except Ended:
             return None
         except ProgramFault as fault:
@@ -91,7 +100,7 @@ class ProgramRun:
             place = SourcePlace(self._file_at(fault.at), fault.line, fault.at)
             return ProgramFault(place, f"the computed {fault.letter} word is infinite")
         except (ArithmeticError, ValueError, KeyError) as fault:
-            return self._stopped(ProgramFault(self._place(fault.__traceback__), _sentence(fault)))
+            return self._stopped(ProgramFault(self._place(fault.__traceback__), sentence(fault)))
         return None
 
     def add(self, compiled: Compiled, marker: str) -> None:
@@ -105,31 +114,38 @@ class ProgramRun:
     def flush(self) -> None:
         """Execute what is pending. Raises Ended if the program has ended with it."""
         if self.rows.pending:
-            words = self.rows.take()
-            self.executed += len(words.line)
-            self.tee(words)
-            self.interpreter.execute(words)
+            self._pass_on(self.rows.take())
         if self.interpreter.ended:
             raise Ended
+
+    def _pass_on(self, words: Words) -> None:
+        """Execute rows, in the frame and with the compensation in force."""
+        for rows in self.travel.through(words):
+            self._execute(rows)
+
+    def _execute(self, words: Words) -> None:
+        self.executed += len(words.line)
+        self.tee(words)
+        self.interpreter.execute(words)
 
     def tick(self, turns: int) -> int:
         """Count turns of a loop and look at the limits; returns 0."""
         self.turns += turns
         if self.turns > TURNS_MAX:
-            raise _Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
+            raise Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
         if pending > self._at_once:
-            blocks = self.interpreter.store.blocks
+            blocks = self.interpreter.store.blocks + self.travel.moves
             self.flush()
-            moved = self.interpreter.store.blocks > blocks
+            moved = self.interpreter.store.blocks + self.travel.moves > blocks
             self.idle = 0 if moved else self.idle + pending
             self._at_once = min(2 * self._at_once, ROWS_AT_ONCE) if moved else IDLE_AT_ONCE
             if self.idle > IDLE_MAX:
-                raise _Endless(f"{self.idle:,} lines executed without a move")
+                raise Endless(f"{self.idle:,} lines executed without a move")
             if self.interpreter.by_word > BY_WORD_MAX:
-                raise _Endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
+                raise Endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
         if self.executed + pending > ROWS_MAX:
-            raise _Endless(f"{ROWS_MAX:,} lines executed")
+            raise Endless(f"{ROWS_MAX:,} lines executed")
         return 0
 
     def goes_on(self) -> None:
@@ -147,7 +163,7 @@ class ProgramRun:
         """Run a procedure; its value, if it has one, is `_value` afterwards."""
         function = self._function(str(name), word)
         if self._depth >= DEPTH_MAX:
-            raise _TooDeep(f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time")
+            raise TooDeep(f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time")
         count, numbered, own = whole(times), self.numbered, self.language.locals
         caller, self._frame = self._frame, self._frame_of(place, str(name))
         self._depth += 1
@@ -245,6 +261,22 @@ class ProgramRun:
             self._lathe = LatheCycles(self)
         self._lathe.act(action, letters, place)
 
+    def made(self, maker: str, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
+        """Execute the rows that a maker makes of values; each row a list of letters and numbers."""
+        from planner.nc.language.makers import MAKERS  # for programs of Heidenhain and Siemens
+
+        self.flush()
+        making = Making(self.interpreter, self.travel, self.shared, place[1], place[2], self._frame)
+        made = MAKERS[maker](making, dict(given))
+        rows = [
+            TravelRow([(ord(letter), value, place[2]) for letter, value in row], place[1], self._frame)
+            for row in made
+        ]
+        if rows:
+            self._pass_on(words_of(rows, self.rows.data, tuple(self.rows.files)))
+        self.tick(1)
+        self.flush()
+
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""
         if whole(number) not in blocks:
@@ -276,7 +308,7 @@ class ProgramRun:
         known = self._known_frames.get(key)
         if known is None:
             if len(self.frames) >= FRAMES_MAX:
-                raise _Endless(f"{FRAMES_MAX:,} different chains of calls")
+                raise Endless(f"{FRAMES_MAX:,} different chains of calls")
             known = self._known_frames[key] = len(self.frames)
             file = self.units[self.functions[name].__code__.co_filename].places[0].file
             self.frames.append(Frame(name=name, source=self.files[file], line=place[1], caller=self._frame))
@@ -291,7 +323,7 @@ class ProgramRun:
                 message += " ..."
                 break
             frame = self.frames[frame].caller
-        with contextlib.suppress(Ended, NotFinite):
+        with contextlib.suppress(Ended, NotFinite, ProgramFault):
             self.flush()
         return ProgramFault(fault.place, message)
 
@@ -308,29 +340,3 @@ class ProgramRun:
 
     def _file_at(self, at: int) -> int:
         return sum(begin <= at for begin, _ in self.rows.files)
-
-
-class _Endless(ValueError):
-    def __init__(self, what: str):
-        super().__init__(
-            f"stopped after {what}: does this loop end? if it does, split the program "
-            "(limits: TURNS_MAX, ROWS_MAX, BY_WORD_MAX in planner.nc.language.run)"
-        )
-
-
-class _TooDeep(ValueError):
-    pass
-
-
-def _sentence(fault: Exception) -> str:
-    """What a Python error of the compiled program means."""
-    text = str(fault)
-    if isinstance(fault, ZeroDivisionError):
-        return "division by zero"
-    if isinstance(fault, OverflowError):
-        return "the result is too large"
-    if isinstance(fault, KeyError):
-        return f"the named parameter #<{fault.args[0]}> has no value here; assign one before it is read"
-    if text == "math domain error" or text.startswith("expected a"):
-        return "the function or power is not defined for this number"
-    return text

@@ -180,8 +180,16 @@ class Turning(NamedTuple):
     letters: str = ""
 
 
+class Made(NamedTuple):
+    """Rows that Python makes of values while the program runs: a pocket, a change of frame (`makers.MAKERS`)."""
+
+    place: SourcePlace
+    maker: str
+    given: tuple[tuple[str, Expression], ...] = ()
+
+
 Statement = (
-    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning
+    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning | Made
 )  # fmt: skip
 
 

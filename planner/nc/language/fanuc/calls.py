@@ -93,7 +93,7 @@ def macro(words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
     return Call(line.place, program, tuple(arguments.items()), _called(code, program), times)
 
 
-def files(name: str) -> frozenset[str]:
+def fanuc_files(name: str) -> frozenset[str]:
     """What the file of program O1000 may be called, in small letters."""
     numbers = {name, name.zfill(_LONGEST_NUMBER)}
     stems = {f"{letter}{number}" for number in numbers for letter in ("", "o")}

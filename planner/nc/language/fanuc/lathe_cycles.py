@@ -83,7 +83,8 @@ class LatheCycles:
             )
         self._start = state.programmed().copy()
         self._aside = copy.deepcopy(state), interpreter.store, self.run.tee
-        interpreter.store, self.run.tee = Store(), lambda words: None
+        interpreter.go_on_with(state, Store())
+        self.run.tee = lambda words: None
         state.feed_mode, state.feed = (
             "per minute",
             1.0,
@@ -94,7 +95,8 @@ class LatheCycles:
         interpreter, kept = self.run.interpreter, self._aside
         assert kept is not None
         program, offset = interpreter.store.finish("", ()), interpreter.state.offset.copy()
-        interpreter.state, interpreter.store, self.run.tee = kept
+        interpreter.go_on_with(kept[0], kept[1])
+        self.run.tee = kept[2]
         self._aside = None
         if (offset != interpreter.state.offset).any():
             raise ValueError("the profile changes an offset; write it before the cycle")

@@ -5,18 +5,22 @@ from __future__ import annotations
 import re
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.language.heidenhain import drilling
+from planner.nc.language.heidenhain import contour, cycles, drilling, patterns
 from planner.nc.language.heidenhain.flow import Flow
-from planner.nc.language.heidenhain.items import items, looked_up, word
+from planner.nc.language.heidenhain.items import looked_up, word
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, of, own, parameter, value
 from planner.nc.language.tree import (
+    ONE,
+    ZERO,
     Expression,
     If,
     Line,
+    Made,
     Message,
     Number,
     Parameter,
+    Return,
     Statement,
 )
 
@@ -42,9 +46,12 @@ class Definitions(Flow):
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         at = block.place.at
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        return [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+        rows: list[Statement] = [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+        return [*rows, looked_up(block)] if self.file else rows
 
     def _end(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        if self.file:
+            return [Return(block.place)]
         return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
 
     def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
@@ -87,23 +94,25 @@ class Definitions(Flow):
         cycle, part, column = int(found.group(1)), found.group(2), column + found.end()
         if part is not None:
             return self._old_cycle(block, cycle, int(part), column)
-        if cycle not in drilling.CYCLES:
-            raise block.fault(
-                f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}",
-                column,
-            )
+        if cycle not in READ:
+            raise block.fault(_not_read(cycle), column)
         given: list[tuple[Parameter, Expression]] = []
         for entry in re.finditer(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE):
             number, _ = value(block, column + entry.end())
-            if int(entry.group(1)) == 212 and isinstance(number, Number) and number.value != 0.0:
-                raise block.fault("Q212, a decrement of the infeed, is not read", column + entry.start())
+            if int(entry.group(1)) in _REFUSED and number != ZERO:
+                raise block.fault(_REFUSED[int(entry.group(1))], column + entry.start())
             given.append((self._q(block, int(entry.group(1))), number))
+        if cycle in patterns.PATTERNS:
+            called = [*self._call_cycle(block), looked_up(block)]
+            return [Line(block.place, (), tuple(given)), *patterns.pattern(block, cycle, called)]
         return [Line(block.place, (), (*given, (own("cycle"), Number(float(cycle)))))]
 
     def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
         at = block.place.at
-        if cycle in (7, 9, 32) and part == 0:
+        if cycle in (9, 32, *contour.TITLES) and part == 0:
             return []
+        if cycle in contour.TITLES:
+            return contour.transformed(block, cycle, column)
         if cycle == 32:
             found = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
             if found is None:
@@ -116,18 +125,7 @@ class Definitions(Flow):
             return [Line(block.place, (word("G", at, Number(4.0)), word("P", at, seconds)))]
         if cycle == 1:
             return self._pecking(block, part, column)
-        if cycle == 7:
-            given = items(block, column)
-            words = [word("G", at, Number(52.0))]
-            words += [word(axis, at, end) for axis, (end, relative) in given.axes.items() if not relative]
-            if len(words) == 1 or any(relative for _, relative in given.axes.values()):
-                raise block.fault(
-                    "a datum shift by X, Y or Z is read, not incremental and not from a table", column
-                )
-            return [Line(block.place, tuple(words)), looked_up(block)]
-        raise block.fault(
-            f"cycle {cycle} is not read; read are 7, 9, 32, {', '.join(map(str, drilling.CYCLES))}", column
-        )
+        raise block.fault(_not_read(cycle), column)
 
     def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[Statement]:
         """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
@@ -141,17 +139,37 @@ class Definitions(Flow):
         return [Line(block.place, (), ((parameter(drilling.PECKING[part - 1]), number),))]
 
     def _call_cycle(self, block: ConversationalBlock) -> list[Statement]:
-        known = [cycle for cycle in drilling.CYCLES if cycle in self.cycles]
+        known = sorted(self.cycles & {*drilling.CYCLES, *cycles.PARAMETERS})
         if not known:
-            raise block.fault("there is no drilling cycle to call; write CYCL DEF 200 before")
+            raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
         branches = tuple(
-            (
-                of("EQ", own("cycle"), Number(float(cycle))),
-                drilling.drilled(block, cycle, self.moves, self.unit),
-            )
-            for cycle in known
+            (of("EQ", own("cycle"), Number(float(cycle))), self._one_cycle(block, cycle)) for cycle in known
         )
         nothing: list[Statement] = [
             Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
         ]
         return [If(block.place, branches, nothing)]
+
+    def _one_cycle(self, block: ConversationalBlock, cycle: int) -> list[Statement]:
+        """A cycle at the present place, and the feed as it was before."""
+        keep, back = Made(block.place, "keep"), Made(block.place, "bring back", (("feed", ONE),))
+        if cycle in drilling.CYCLES:
+            return [keep, *drilling.drilled(block, cycle, self.moves, self.unit), back]
+        given: list[tuple[str, Expression]] = [
+            (f"Q{q}", self.moves.scaled(parameter(q)) if q in _FEEDS else parameter(q))
+            for q in cycles.PARAMETERS[cycle]
+        ]
+        return [keep, Made(block.place, f"cycle {cycle}", tuple(given)), back, looked_up(block)]
+
+
+READ = (*drilling.CYCLES, *cycles.PARAMETERS, *patterns.PATTERNS)
+_FEEDS = (206, 207, 208, 385)  # Q parameters, in tenths of an inch per minute in inch programs
+_REFUSED = {
+    365: "Q365 1, moves between the places on the circle, is not read; write 0",
+    439: "Q439, another reference of the feed, is not read; write 0",
+}
+
+
+def _not_read(cycle: int) -> str:
+    read = sorted({*READ, 9, 32, *contour.TITLES})
+    return f"cycle {cycle} is not read; read are {', '.join(map(str, read))}"

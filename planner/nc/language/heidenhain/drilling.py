@@ -1,4 +1,4 @@
-"""Drilling cycles: 200 drilling, 201 reaming, 203 universal drilling without a decrement, 240 centring to a depth; and cycle 1, pecking
+"""Drilling cycles: 200 drilling, 201 reaming, 240 centring to a depth; and cycle 1, pecking
 on older controls, for which the tool stands at the clearance above the surface.
 
     Q200 set-up clearance    Q201 depth (its sign does not matter: into the part)    Q202 infeed    Q206 feed    Q208 feed out (201)
@@ -16,7 +16,7 @@ from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, parameter, plus
 from planner.nc.language.tree import ONE, ZERO, Expression, If, Line, Loop, Number, Statement
 
-CYCLES = (1, 200, 201, 203, 240)  # that are read
+CYCLES = (1, 200, 201, 240)  # that are read
 # Q parameters (module text).
 _CLEARANCE, _DEPTH, _INFEED, _SURFACE, _SECOND, _FEED = 200, 201, 202, 203, 204, 206
 PECKING = (_CLEARANCE, _DEPTH, _INFEED, 211, _FEED)  # what the lines 1.1 to 1.5 of cycle 1 give

@@ -49,6 +49,7 @@ class Flow:
     known   : label to its block
     called  : labels that are called as subprograms
     repeats : how many sections are repeated
+    file    : number of the file
     """
 
     def __init__(self) -> None:
@@ -57,6 +58,7 @@ class Flow:
         self.known: dict[int, int] = {}
         self.called: set[int] = set()
         self.repeats = 0
+        self.file = 0
 
     def _label(self, block: ConversationalBlock, column: int) -> tuple[int, int]:
         found = _LABEL.match(block.text, column)
@@ -81,8 +83,8 @@ class Flow:
         repeat = _REPEAT.match(block.text, column)
         if repeat is None:
             self.called.add(label)
-            return [Call(block.place, procedure_name(label), None, block.text)]
-        counter = own(f"rep{self.repeats}")
+            return [Call(block.place, procedure_name(label, self.file), None, block.text)]
+        counter = own(f"rep{self.file}_{self.repeats}")
         self.repeats += 1
         again: list[Statement] = [
             Line(block.place, (), ((counter, plus(counter, ONE)),)),
@@ -146,6 +148,17 @@ class Flow:
         return [If(block.place, ((of(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
 
 
-def procedure_name(label: int) -> str:
-    """The name of a label's subprogram."""
-    return f"LBL {label}"
+def procedure_name(label: int, file: int = 0) -> str:
+    """The name of a label's subprogram, in the file of that number."""
+    return f"LBL {label} of {file}" if file else f"LBL {label}"
+
+
+def called_file(text: str) -> str:
+    """The name of a called program without its folder and ending, in small letters."""
+    name = text.strip().strip('"').replace("\\", "/").split("/")[-1].split(":")[-1].lower()
+    return name.removesuffix(".h")
+
+
+def files(name: str) -> frozenset[str]:
+    """What the file of a called program may be called, in small letters."""
+    return frozenset((name, f"{name}.h"))

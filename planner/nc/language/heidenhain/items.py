@@ -11,7 +11,8 @@ from planner.nc.language.tree import Expression, Line, Number, Numbered, Word
 
 _ITEM = re.compile(
     r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
-    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+))",
+    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
+    r"(?P<ahead>LA)(?=\s*\d))",
     re.IGNORECASE,
 )
 X, Y, Z = own("x"), own("y"), own("z")
@@ -19,7 +20,6 @@ POSITION = {"X": X, "Y": Y, "Z": Z}
 POLE = own("cx"), own("cy")
 DIRECTION = own("dx"), own("dy")
 POLAR = own("pr"), own("pa")
-CORNER = own("px"), own("py")  # of a rounding or chamfer
 
 
 @dataclass
@@ -32,6 +32,7 @@ class Items:
     radius  : R of CR
     feed    : F with a number;  fast : FMAX;  automatic : F AUTO
     codes   : M codes, each with its column
+    side    : 1 for RL, -1 for RR, 0 for R0, None where none is given
     """
 
     axes: dict[str, tuple[Expression, bool]] = field(default_factory=dict)
@@ -42,6 +43,7 @@ class Items:
     fast: bool = False
     automatic: bool = False
     codes: list[tuple[int, int]] = field(default_factory=list)
+    side: int | None = None
 
 
 def items(block: ConversationalBlock, column: int) -> Items:
@@ -68,15 +70,13 @@ def items(block: ConversationalBlock, column: int) -> Items:
         elif item["turn"]:
             found.turn = 1 if item["turn"] == "+" else -1
         elif item["comp"]:
-            if item["comp"].upper() != "R0":
-                raise block.fault(
-                    "radius compensation of the conversational language is not read; program the centre of the tool and R0",
-                    at,
-                )
+            found.side = {"R0": 0, "RL": 1, "RR": -1}[item["comp"].upper()]
         elif item["radius"]:
             found.radius, column = value(block, column)
         elif item["fast"]:
             found.fast, found.automatic = item["fast"].upper() == "MAX", item["fast"].upper() == "AUTO"
+        elif item["ahead"]:  # of M120, blocks that the control looks ahead
+            _, column = value(block, column)
         elif item["unit"]:
             raise block.fault(
                 f"{item['unit'].upper()}, a feed per tooth, turn or time, is not read; write F in mm/min", at

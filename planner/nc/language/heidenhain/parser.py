@@ -1,13 +1,14 @@
 """A conversational program as statements.
 
-    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP RND CHF    LBL, CALL LBL [REP]    Q1 = formula, FN 0-14
-    CYCL DEF 1 200 201 203 240 7 (datum shift) 9 (dwell) 32 (tolerance)    CYCL CALL [POS], M99    STOP, M codes
+    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP CTP RND CHF    LBL, CALL LBL [REP], CALL PGM    Q1 = .., FN 0-14
+    RL RR R0, APPR, DEP (`contour`)    CYCL DEF 7 8 10 11 26, TRANS DATUM (`contour`)    9 (dwell) 32 (tolerance)
+    CYCL DEF 1 200 201 240 (`drilling`) 202 to 209, 251 to 254 (`cycles`) 220 221 (`patterns`)    CYCL CALL [POS], M99    STOP, M codes
 
 LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
 LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.
 
-Refused with their block: radius compensation, PLANE and M128 (tilted axes), tapping, milling and measuring cycles, M89, polar
-coordinates without a pole, texts and QS parameters.
+Refused with their block: PLANE and M128 (tilted axes), LN, free contours (FK), APPR and DEP with polar coordinates, other cycles, M89
+and other M codes that change moves, polar coordinates without a pole, texts and QS parameters.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from planner.nc.language.corner_moves import KINDS as CORNERS
+from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
 from planner.nc.language.heidenhain.definitions import Definitions
-from planner.nc.language.heidenhain.flow import procedure_name
+from planner.nc.language.heidenhain.flow import called_file, procedure_name
 from planner.nc.language.heidenhain.items import (
-    CORNER,
     POLAR,
     POLE,
     Items,
@@ -31,12 +33,14 @@ from planner.nc.language.heidenhain.items import (
     refuse_arc_axes,
     word,
 )
-from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, plus, value
+from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
     ZERO,
+    Call,
     Expression,
     Line,
+    Made,
     Number,
     Parameter,
     Procedure,
@@ -47,11 +51,15 @@ from planner.nc.language.tree import (
 )
 
 _FUNCTION = re.compile(
-    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CYCLE? DEF|CYCL CALL|LBL|FN|STOP|PLANE RESET|RND|CHF|LP|CP|CC|CR|CT|C|L|"
+    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
+    r"PLANE RESET|RND|CHF|LN|LP|CP|CC|CR|CTP|CT|C|L|"
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
-_TILTED = (128, 129, 144)  # M codes that follow or leave the tilt of the tool
+# M codes that follow or leave the tilt of the tool; small steps and open corners of contours; feeds of plunging and per turn; M140
+# retracts the tool.
+_REFUSED = (89, 92, 97, 98, 103, 114, 115, 128, 129, 136, 140, 144)
+_MOVES = ("L", "LP", "C", "CR", "CT", "CP", "CTP")  # that RND and CHF may follow
 _AT_END = (2, 30)  # M codes that end the program
 
 
@@ -60,15 +68,18 @@ class HeidenhainParser(Definitions):
 
     def __init__(self, source: Source):
         super().__init__()
-        self.source = source
+        self.source, self.file = source, source.file
         self.faults: list[ProgramFault] = []
         self.skip = False  # the block was read with the one before
+        self.compensates = False  # a block of the program has RL, RR, APPR or DEP
 
     def parse(self) -> list[Procedure]:
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
-        start = SourcePlace(self.source.file, 1, self.source.begin)
+        self.compensates = any(compensates(block.text) for block in self.blocks)
+        source = self.source
+        start = SourcePlace(source.file, 1, source.begin)
         main = self._body(0, len(self.blocks))
         procedures = []
         done: set[int] = set()
@@ -79,18 +90,19 @@ class HeidenhainParser(Definitions):
                     first = self.known[label]
                     procedures.append(
                         Procedure(
-                            procedure_name(label),
+                            procedure_name(label, source.file),
                             self.blocks[first].place,
                             self._body(first, self._end_of(first), True),
                         )
                     )
         set_up: list[tuple[Parameter, Expression]] = [
-            (one, ZERO) for one in (X, Y, Z, *POLE, *POLAR, *CORNER)
+            (own(f"rep{source.file}_{k}"), ZERO) for k in range(self.repeats)
         ]
-        set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")] + [
-            (own(f"rep{k}"), ZERO) for k in range(self.repeats)
-        ]
-        return [Procedure("", start, [Line(start, (), tuple(set_up)), *main]), *procedures]
+        if not source.file:
+            set_up += [(one, ZERO) for one in (X, Y, Z, *POLE, *POLAR)]
+            set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")]
+        name = "file" if source.file else ""
+        return [Procedure(name, start, [Line(start, (), tuple(set_up)), *main]), *procedures]
 
     # --- labels -----------------------------------------------------------------------------------------------------------------
 
@@ -140,12 +152,24 @@ class HeidenhainParser(Definitions):
         name = " ".join(found.group().upper().split()) if found else ""
         read = _READ.get(name)
         if found is None or read is None:
+            why = f" ({_WHY[name]})" if name in _WHY else ""
             raise block.fault(
-                f"{name or block.text[:20]} of the conversational language is not read; {_REMEDY}"
+                f"{name or block.text[:20]} of the conversational language is not read{why}; {_REMEDY}"
             )
-        if name in ("L", "LP"):
-            return self._straight(k, last, found.end(), name)
-        return read(self, block, found.end())
+        if name not in _MOVES:
+            return read(self, block, found.end())
+        corner = self._corner(k + 1, last)
+        self.skip = bool(corner)
+        return [*corner, *read(self, block, found.end())]
+
+    def _call_program(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        """CALL PGM name: a file of the program's folder; its units end with it."""
+        name = called_file(block.text[column:])
+        if not name:
+            raise block.fault("CALL PGM is followed by the name of a program", column)
+        units = word("G", block.place.at, Number(21.0 if self.unit == 1.0 else 20.0))
+        called = Call(block.place, name, None, block.text[column:].strip())
+        return [called, Line(block.place, (units,)), looked_up(block)]
 
     def _nothing(self, block: ConversationalBlock, column: int) -> list[Statement]:
         return []
@@ -157,34 +181,25 @@ class HeidenhainParser(Definitions):
             raise block.fault("polar coordinates belong to LP and CP")
         return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
-    def _straight(self, k: int, last: int, column: int, name: str) -> list[Statement]:
-        block = self.blocks[k]
+    def _straight(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
         before, after, machine = self._codes(block, given)
-        lines: list[Statement] = list(before)
-        if name == "LP":
+        lines: list[Statement] = [*before, *self._side(block, given)]
+        if block.text[:column].upper() == "LP":
             found, ends = self.moves.polar_ends(block, given)
             lines += found
         else:
             ends = self._ends(block, given)
-        corner = self._corner(k + 1, last) if name == "L" and not machine else None
-        if corner is not None:
-            lines += self.moves.cut_corner(block, given, ends, corner, self._after(k + 2, last, corner[0]))
-            self.skip = True
-        else:
-            lines += self.moves.straight(block, given, ends, machine)
+        lines += self.moves.straight(block, given, ends, machine)
         return [*lines, *([looked_up(block)] if machine else []), *after]
 
-    def _corner(self, k: int, last: int) -> tuple[ConversationalBlock, Expression, bool] | None:
-        """RND or CHF in block k, with its number."""
-        if k >= last:
-            return None
-        block = self.blocks[k]
-        found = re.match(r"(RND|CHF)\b", block.text, re.IGNORECASE)
+    def _corner(self, k: int, last: int) -> list[Statement]:
+        """RND or CHF in block k, which the move before it ends with."""
+        found = re.match(r"(RND|CHF)\b", self.blocks[k].text, re.IGNORECASE) if k < last else None
         if found is None:
-            return None
+            return []
+        block, column = self.blocks[k], found.end()
         rounded = found.group().upper() == "RND"
-        column = found.end()
         if rounded and (radius := re.match(r"\s*R(?=\s*[-+.\dQ])", block.text[column:], re.IGNORECASE)):
             column += radius.end()
         number, column = value(block, column)
@@ -192,32 +207,36 @@ class HeidenhainParser(Definitions):
             raise block.fault(
                 "nothing may follow the number of RND and CHF; write the feed into the next block", column
             )
-        return block, number, rounded
-
-    def _after(self, k: int, last: int, corner: ConversationalBlock) -> dict[str, Expression]:
-        """Where the straight move behind a corner leads."""
-        block = self.blocks[k] if k < last else corner
-        found = _FUNCTION.match(block.text)
-        if found is None or found.group().upper() != "L":
-            raise corner.fault("RND and CHF stand between two straight moves (L); write other corners out")
-        given = items(block, found.end())
-        place = {"X": CORNER[0], "Y": CORNER[1], "Z": Z}
-        return {
-            axis: plus(place[axis], end) if relative else end for axis, (end, relative) in given.axes.items()
-        }
+        kind = Number(float(CORNERS.index("RND" if rounded else "CHR")))
+        return [Made(block.place, "corner", (("kind", kind), ("size", number)))]
 
     def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        raise block.fault("RND and CHF stand between two straight moves (L); write other corners out")
+        raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
 
     def _arc(self, block: ConversationalBlock, column: int) -> list[Statement]:
         name = block.text[:column].upper()
         given = items(block, column)
         before, after, _ = self._codes(block, given)
+        before += self._side(block, given)
+        if name == "CTP":
+            found, ends = self.moves.polar_ends(block, given)
+            return [*before, *found, *self.moves.tangent_arc(block, given, ends), *after]
         if name == "CP":
             return [*before, *self.moves.polar_arc(block, given), *after]
         refuse_arc_axes(block, given)
         how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
         return [*before, *how(block, given, self._ends(block, given)), *after]
+
+    def _side(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+        return side_rows(block, given) if self.compensates else []
+
+    def _approach(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        rows, given = approach_rows(block, column, self.moves.automatic)
+        before, after, _ = self._codes(block, given)
+        return [*before, *rows, *after]
+
+    def _datum(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        return datum_rows(block, column)
 
     def _pole(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
@@ -248,8 +267,10 @@ class HeidenhainParser(Definitions):
                         (word("M", block.byte(column), spindle), word("M", block.byte(column), Number(8.0))),
                     )
                 )
-            elif code in (89, 92, *_TILTED):
+            elif code in _REFUSED:
                 raise block.fault(f"M{code} is not read: it changes how the axes move; {_REMEDY}", column)
+            elif code in _AT_END and self.file:
+                after.append(Return(block.place))
             elif code in (0, 1, 5, 9, *_AT_END):
                 after.append(row)
             else:
@@ -280,6 +301,13 @@ class HeidenhainParser(Definitions):
 
 
 _REMEDY = "let the CAM system write the moves out as L, C and CC"
+_WHY = {
+    "LN": "moves with a normal of the surface need compensation in space, or axes that turn",
+    **dict.fromkeys(
+        ("FL", "FLT", "FC", "FCT", "FPOL", "FSELECT"), "free contours (FK) are completed by the control"
+    ),
+    **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
+}
 _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Statement]]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
@@ -287,12 +315,15 @@ _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Sta
         ("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing
     ),
     "TOOL CALL": HeidenhainParser._tool,
-    **dict.fromkeys(("L", "LP"), HeidenhainParser._nothing),
-    **dict.fromkeys(("C", "CR", "CT", "CP"), HeidenhainParser._arc),
+    **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
+    **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),
+    **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
+    "TRANS DATUM": HeidenhainParser._datum,
     "CC": HeidenhainParser._pole,
     **dict.fromkeys(("RND", "CHF"), HeidenhainParser._lonely_corner),
     "LBL": HeidenhainParser._label_here,
     "CALL LBL": HeidenhainParser._call,
+    "CALL PGM": HeidenhainParser._call_program,
     "Q": HeidenhainParser._parameter,
     "FN": HeidenhainParser._fn,
     **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), HeidenhainParser._define),

@@ -44,6 +44,7 @@ LANGUAGE = Language(
         ("FRAC", 1): "({0}-trunc({0}))",
         ("LOG", 1): "log10({0})",
         ("MIN", 2): "min({0},{1})",
+        ("MAX", 2): "max({0},{1})",
         ("UP", 1): "float(ceil({0}))",
     },
     conditions=frozenset(("EQ", "NE", "GT", "GE", "LT", "LE")),

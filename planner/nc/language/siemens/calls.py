@@ -107,6 +107,6 @@ class Calls(Commands):
         self.body.append(Return(reader.place))
 
 
-def files(name: str) -> frozenset[str]:
+def siemens_files(name: str) -> frozenset[str]:
     """What the file of a subprogram may be called, in small letters: NAME.SPF, NAME.MPF, and as controls save them, NAME_SPF."""
     return frozenset(name + ending for ending in (".spf", ".mpf", "_spf", "_mpf", ""))

@@ -6,7 +6,7 @@ from __future__ import annotations
 PLAIN_LETTERS = "NGXYZIJKFSM"
 # G codes with the same meaning.
 RETURNS = (2, 17, 30)  # M codes that end a subprogram
-SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 40, 54, 55, 56, 57, 90, 91, 94)
+SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 54, 55, 56, 57, 90, 91, 94)
 # G codes of Siemens that are others here; an empty tuple changes nothing.
 CODES: dict[int, tuple[float, ...]] = {
     9: (),  # exact stop of one block; a full stop is added behind it
@@ -29,8 +29,8 @@ IDLE = frozenset((
 ))  # fmt: skip
 # The same with arguments or a value behind them.
 IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "SPOS", "LIMS"))
-# Commands that turn, mirror or scale, and arcs that are not read.
+# Commands that tilt or bend the coordinates.
 REFUSED = (
-    "ROT", "AROT", "ROTS", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "TRAORI", "TRANSMIT", "TRACYL", "CIP", "CT",
+    "ROTS", "AROTS", "CROTS", "TRAORI", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
 )  # fmt: skip
 REMEDY = "let the CAM system write the moves out"

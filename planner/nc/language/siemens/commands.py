@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 
-from planner.nc.language.siemens import codes, drilling, patterns
+from planner.nc.language.frames import ADDED, SIEMENS
+from planner.nc.language.siemens import codes, cycles, drilling, patterns
 from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
-from planner.nc.language.tree import ZERO, Expression, Line, Message, Number, Parameter, Statement, Word
+from planner.nc.language.tree import ZERO, Expression, Line, Made, Message, Number, Statement, Word
 
 TYPES = frozenset(("REAL", "INT", "BOOL"))
 
@@ -19,6 +20,7 @@ class Commands(SiemensControl):
     absolute : G90 is in force
     unit     : mm per unit of the program
     cycle    : of MCALL, which follows every row that moves
+    compensates : the file has G41 or G42
     """
 
     def __init__(self) -> None:
@@ -27,6 +29,7 @@ class Commands(SiemensControl):
         self.absolute = True
         self.unit = 1.0
         self.cycle: list[Statement] | None = None
+        self.compensates = False
 
     def _cycle(self, reader: TokenReader, name: str) -> None:
         place = reader.place
@@ -43,10 +46,30 @@ class Commands(SiemensControl):
             self.body += self._drilled(reader, name, given)
 
     def _drilled(self, reader: TokenReader, name: str, given: list[Expression | None]) -> list[Statement]:
+        """A cycle, and what it keeps as it was. Raises ProgramFault."""
+        place = reader.place
+        known = (cycles.ARGUMENTS | drilling.ARGUMENTS)[name]
+        for k, more in enumerate(given[len(known) :]):
+            if more not in (None, ZERO, Number(-0.0)):
+                raise reader.fault(
+                    f"argument {len(known) + k + 1} of {name}, of later controls, is not read; leave it out",
+                    0,
+                )
         try:
-            return drilling.drilled_rows(reader.place, name, given, self.unit)
+            rows = (
+                [
+                    Made(
+                        place,
+                        name,
+                        tuple((k, v) for k, v in zip(known, given, strict=False) if v is not None),
+                    )
+                ]
+                if name in cycles.ARGUMENTS
+                else drilling.drilled_rows(place, name, given, self.unit)
+            )
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
+        return [Made(place, "keep"), *rows, Made(place, "bring back", (("feed", ZERO),))]
 
     def _arguments(self, reader: TokenReader) -> list[Expression | None]:
         """What stands in the brackets behind a cycle; None for what is left out or a text."""
@@ -82,38 +105,29 @@ class Commands(SiemensControl):
             return
         name = reader.peek()
         reader.next += 1
-        if name not in drilling.ARGUMENTS:
-            raise reader.fault(f"MCALL {name} is not read; read are {', '.join(drilling.ARGUMENTS)}", 0)
+        known = [one for one in drilling.ARGUMENTS | cycles.ARGUMENTS if one not in cycles.POCKETS]
+        if name not in known:
+            raise reader.fault(f"MCALL {name} is not read; read are {', '.join(known)}", 0)
         self.cycle = self._drilled(reader, name, self._arguments(reader))
 
-    def _shift(self, reader: TokenReader) -> None:
-        """TRANS: an origin; ATRANS: one beside the one before."""
-        more = reader.peek(-1) == "ATRANS"
-        place = reader.place
-        ends = {axis: variable(f"_t{axis.lower()}") for axis in "XYZ"}
+    def _frame(self, reader: TokenReader) -> None:
+        """TRANS, ROT, SCALE, MIRROR: a frame; ATRANS and the others: one beside the one before."""
+        name, place = reader.peek(-1), reader.place
+        kind = SIEMENS.index(name.removeprefix("A")) + (ADDED if name.startswith("A") else 0)
         given: dict[str, Expression] = {}
         while not reader.ended:
             token, at = reader.tokens[reader.next], reader.at()
             reader.next += 1
-            letter = token.text[0]
-            if letter not in ends or not (
-                token.kind == "word" or (len(token.text) == 1 and reader.peek() == "=")
-            ):
-                raise reader.fault(f"TRANS takes X, Y and Z; {token.text} comes", token.at)
+            letter = "RPL" if token.text == "RPL" and name.endswith("ROT") else token.text[0]
+            single = token.kind == "word" or len(token.text) == len(letter)
+            if letter not in ("X", "Y", "Z", "RPL") or not single:
+                raise reader.fault(f"{name} takes X, Y and Z; {token.text} comes", token.at)
             value = Number(float(token.text[1:])) if token.kind == "word" else self._given(reader, letter, at)
             if value is None:
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
-        assigned: list[tuple[Parameter, Expression]] = [
-            (ends[axis], operation("+", ends[axis], given.get(axis, ZERO)) if more else given.get(axis, ZERO))
-            for axis in ends
-        ]
-        self.body.append(Line(place, (), tuple(assigned)))
-        words = [
-            as_word("G", place.at, Number(52.0)),
-            *(as_word(axis, place.at, ends[axis]) for axis in ends),
-        ]
-        self.body.append(Line(place, tuple(words)))
+        self.body.append(Made(place, "siemens frame", (("kind", Number(float(kind))), *given.items())))
+        self.body.append(Made(place, "frame in force"))
 
     def _define(self, reader: TokenReader) -> None:
         kind = reader.peek()

@@ -41,6 +41,7 @@ class SiemensControl:
     main, body : statements of the program, and where the next one goes
     open       : control statements whose end has not come, the outermost first
     labels     : their numbers in the tree, by name
+    lines      : the statements of lines with labels
     counters   : how many sections are repeated by their labels
     """
 
@@ -50,6 +51,7 @@ class SiemensControl:
         self.open: list[_Open] = []
         self.labels: dict[str, int] = {}
         self.counters = 0
+        self.lines: dict[str, list[Statement]] = {}
 
     def _label(self, name: str, place: SourcePlace) -> None:
         self.body.append(Label(place, self._number_of(name)))
@@ -155,6 +157,24 @@ class SiemensControl:
         ]
         end: list[Statement] = [Line(place, (), ((counter, ZERO),))]
         self.body.append(If(place, ((operation("<", counter, times), again),), end))
+
+    def _repeat_block(self, reader: TokenReader) -> None:
+        """REPEATB label P=n: the line of the label, n times more."""
+        label = reader.peek()
+        reader.next += 1
+        if label not in self.lines:
+            raise reader.fault(f"there is no label {label} above this line", 0)
+        times: Expression = ONE
+        if reader.take("P"):
+            reader.expect("=")
+            times = reader.expression()
+        counter = variable(f"_count{self.counters}")
+        self.counters += 1
+        place = reader.place
+        step = Line(place, (), ((counter, operation("+", counter, ONE)),))
+        self.body.append(Line(place, (), ((counter, ZERO),)))
+        body = [*self.lines[label], step]
+        self.body.append(Loop(place, "while", f"REPEATB {place.at}", operation("<", counter, times), body))
 
     def _until(self, reader: TokenReader) -> None:
         closed = self._close("REPEAT", reader)

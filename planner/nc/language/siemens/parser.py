@@ -1,15 +1,16 @@
 """A Sinumerik program as statements.
 
-    words      G0-G3 G9 G17-G19 G33 G40 G53-G57 G60 G64 G641-G645 G70 G71 G90 G91 G94 G500 G700 G710, G4 F,
-               X Y Z I J K with = AC() IC(), CR= TURN= F S T D M, N
-    language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n
-    commands   SUPA, TRANS and ATRANS, MSG, MCALL and CYCLE81 82 83, CYCLE832 (tolerance), CYCLE800() (no tilt), and those that do not
-               move anything (`codes.IDLE`)
+    words      G0-G3 G9 G17-G19 G33 G40-G42 G53-G57 G60 G64 G641-G645 G70 G71 G90 G91 G94 G450 G500 G700 G710, G4 F,
+               X Y Z I J K with = AC() IC(), CR= TURN= F S T D M, N, CIP CT RND= CHR= CHF= (`block_words`)
+    language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
+               REPEATB label P=n
+    commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 82 83 (`drilling`), CYCLE84 to 89, 840,
+               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`codes.IDLE`)
 
 Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line, for AC and IC.
 
-Refused with their line: tilted and turned frames (ROT, CYCLE800 with angles, TRAORI), mirrors and scales, RND and CHF, CIP and CT,
-subprograms in other files, pockets and other cycles.
+Refused with their line: tilted frames (ROT X, CYCLE800 with angles, TRAORI), KONT, G451, RNDM, G331, polar coordinates (AP, RP), SLOT1,
+LONGHOLE and other cycles.
 """
 
 from __future__ import annotations
@@ -19,36 +20,33 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.base.units import MM_PER_INCH
-from planner.nc.language.siemens import codes, drilling, patterns
-from planner.nc.language.siemens.calls import Calls
-from planner.nc.language.siemens.commands import as_word
-from planner.nc.language.siemens.text import TokenReader, operation, variable
+from planner.nc.language.frames import SIEMENS
+from planner.nc.language.siemens import codes, patterns
+from planner.nc.language.siemens.block_words import BlockWords
+from planner.nc.language.siemens.text import TokenReader, variable
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
-    ONE,
     ZERO,
-    Expression,
     Line,
-    Number,
-    Parameter,
     PlainRows,
     Procedure,
     ProgramFault,
     SourcePlace,
-    Word,
 )
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
+_COMPENSATES = re.compile(rb"G4[12]\b")
+_TARGETS = re.compile(rb"(?:GOTO[BFC]?|REPEATB?)\s+N(\d{1,9})\b", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
-class SiemensParser(Calls):
+class SiemensParser(BlockWords):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
         super().__init__()
         self.source = source
+        self.compensates = bool(_COMPENSATES.search(source.words.data))
         self.faults: list[ProgramFault] = []
 
     def parse(self) -> list[Procedure]:
@@ -72,7 +70,6 @@ class SiemensParser(Calls):
         for left in self.open[:1]:
             self.faults.append(ProgramFault(left.place, f"this {left.kind} has no end"))
         own = ["_depth", "_step", *(f"_count{k}" for k in range(self.counters))]
-        own += [] if self.source.file else ["_tx", "_ty", "_tz"]
         first = Line(start, (), tuple((variable(name), ZERO) for name in own))
         return [Procedure("file" if self.source.file else "", start, [first, *self.main])]
 
@@ -83,11 +80,15 @@ class SiemensParser(Calls):
         same = np.isin(letter, [ord(c) for c in codes.PLAIN_LETTERS])
         same &= (letter != ord("G")) | np.isin(value, codes.SAME_CODES)
         same &= (letter != ord("M")) | ~np.isin(value, codes.RETURNS if self.source.file else (17,))
+        targets = [int(label) for label in _TARGETS.findall(words.data)]
+        same &= ~((letter == ord("N")) & np.isin(value, targets))
         found = np.unique(np.searchsorted(words.first, np.flatnonzero(~same), side="right") - 1)
         return [int(row) for row in found if letter[words.first[row]] != ord("%")]
 
     def _plain(self, first: int, last: int) -> None:
         """Rows of plain words; while a cycle is modal, each that moves is followed by it."""
+        if self.circular:
+            self._check_motion(first, last)
         for run in self.source.plain(first, last):
             self._follow_modes(run)
             if self.cycle is None:
@@ -100,6 +101,20 @@ class SiemensParser(Calls):
                 if np.isin(self.source.words.letter[span], (ord("X"), ord("Y"))).any():
                     self.body += self.cycle
             return
+
+    def _check_motion(self, first: int, last: int) -> None:
+        """Plain rows behind CIP or CT: a motion code comes before coordinates. Raises ProgramFault."""
+        words = self.source.words
+        for row in range(first, last):
+            span = slice(int(words.first[row]), int(words.first[row + 1]))
+            letter, value = words.letter[span], words.value[span]
+            if ((letter == ord("G")) & np.isin(value, (0, 1, 2, 3))).any():
+                self.circular = False
+                return
+            if np.isin(letter, (ord("X"), ord("Y"), ord("Z"))).any():
+                found = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
+                self.faults.append(ProgramFault(self.source.line(row).place, found))
+                return
 
     def _follow_modes(self, run: PlainRows) -> None:
         """G90 and G91 of plain rows, the last one counts."""
@@ -118,12 +133,21 @@ class SiemensParser(Calls):
         if text.lstrip().startswith("/"):
             at = text.index("/") + 1  # the lexer has left out skipped lines
         number = _NUMBER.match(text, at)
+        labels = []
         if number:
             at = number.end()
-            self._label(f"N{int(number.group(1))}", line.place)
+            labels.append(f"N{int(number.group(1))}")
         while label := _LABEL.match(text, at):
-            self._label(label.group(1).upper(), line.place)
+            labels.append(label.group(1).upper())
             at = label.end()
+        for name in labels:
+            self._label(name, line.place)
+        body, first = self.body, len(self.body)
+        self._statement(text, at, line)
+        if self.body is body:
+            self.lines.update((name, body[first:]) for name in labels)
+
+    def _statement(self, text: str, at: int, line: SourceLine) -> None:
         reader = TokenReader(" " * at + text[at:], line.place, line.start, self.names)
         if reader.ended:
             return
@@ -137,130 +161,6 @@ class SiemensParser(Calls):
             self._call(reader)
         else:
             self._words(reader)
-
-    # --- words ------------------------------------------------------------------------------------------------------------------
-
-    def _words(self, reader: TokenReader) -> None:
-        """A row of words, commands that move nothing, and assignments."""
-        words: list[Word] = []
-        assigned: list[tuple[Parameter, Expression]] = []
-        found: set[float] = set()
-        wait: list[Word] = []
-        stops = moved = False
-        while not reader.ended:
-            token, at = reader.tokens[reader.next], reader.at()
-            reader.next += 1
-            if token.kind not in ("name", "word"):
-                reader.next -= 1
-                raise reader.fault(f"{token.text} starts neither a word nor a command")
-            name = token.text
-            if name == "SUPA":
-                words.append(as_word("G", at, Number(53.0)))
-            elif name in drilling.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
-                self._cycle(reader, name)
-            elif name in codes.IDLE or (name in codes.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
-                _skip(reader)
-            elif reader.peek() == "=" and (name in self.names or re.fullmatch(r"R\d+", name)):
-                reader.next += 1
-                target = reader.parameter(token)
-                assert target is not None
-                assigned.append((target, reader.expression()))
-            elif name == "R" and reader.peek() == "[":
-                target = reader.parameter(token)
-                reader.expect("=")
-                assert target is not None
-                assigned.append((target, reader.expression()))
-            else:
-                for word in self._word(reader, name, at):
-                    letter = chr(word.letter)
-                    if letter == "G" and isinstance(word.value, Number):
-                        found.add(word.value.value)
-                        stops |= word.value.value == 9.0
-                        if word.value.value == 9.0:
-                            continue
-                    moved |= letter in "XY"
-                    words.append(word)
-        if 4.0 in found:
-            wait = [word for word in words if chr(word.letter) in "FS"]
-            words = [word for word in words if chr(word.letter) not in "FS"]
-            words += [Word(ord("P"), word.at, word.value) for word in wait if chr(word.letter) == "F"]
-            if not any(chr(word.letter) == "P" for word in words):
-                raise reader.fault(
-                    "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
-                )
-        returns = (17.0, *(codes.RETURNS if self.source.file else ()))
-        ended = [
-            word
-            for word in words
-            if chr(word.letter) == "M" and isinstance(word.value, Number) and word.value.value in returns
-        ]
-        words = [word for word in words if word not in ended]
-        words += [as_word("M", word.at, Number(30.0)) for word in ended if not self.source.file]
-        if words or assigned:
-            self.body.append(Line(reader.place, tuple(words), tuple(assigned)))
-        if stops:
-            self.body.append(
-                Line(
-                    reader.place,
-                    (as_word("G", reader.place.at, Number(4.0)), as_word("P", reader.place.at, ZERO)),
-                )
-            )
-        if moved and self.cycle is not None:
-            self.body += self.cycle
-        if ended and self.source.file:
-            self._return(reader)
-
-    def _word(self, reader: TokenReader, name: str, at: int) -> list[Word]:
-        """The words of RS274NGC for one word. Raises ProgramFault."""
-        number = float(name[1:]) if reader.tokens[reader.next - 1].kind == "word" else None
-        letter = name[0] if number is not None else re.sub(r"\d+\Z", "", name)
-        if letter == "G" and number is not None and number == int(number):
-            return self._code(reader, int(number), at)
-        if name in ("CR", "TURN", "ADIS"):
-            reader.expect("=")
-            value = reader.expression()
-            return [
-                as_word(
-                    {"CR": "R", "TURN": "P", "ADIS": "P"}[name],
-                    at,
-                    operation("+", value, ONE) if name == "TURN" else value,
-                )
-            ]
-        if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
-            raise reader.fault(f"{name} is not read; {codes.REMEDY}", at - reader.start)
-        given = Number(number) if number is not None else self._given(reader, letter, at)
-        # Offsets D belong to the control: lengths come from [tools]. A tool by its name has no number.
-        return [] if given is None or letter == "D" else [as_word(letter, at, given)]
-
-    def _code(self, reader: TokenReader, code: int, at: int) -> list[Word]:
-        if code in (90, 91):
-            self.absolute = code == 90
-            if reader.peek() == "(":
-                raise reader.fault(f"G{code}(...) is not read")
-        if code in (70, 71, 700, 710):
-            self.unit = MM_PER_INCH if code in (70, 700) else 1.0
-        if code == 9:
-            return [as_word("G", at, Number(9.0))]
-        if code == 641:
-            return [as_word("G", at, Number(64.0))]
-        if code in codes.CODES:
-            return [as_word("G", at, Number(one)) for one in codes.CODES[code]]
-        if code in (*codes.SAME_CODES, 4):
-            return [as_word("G", at, Number(float(code)))]
-        raise reader.fault(f"G{code} of Siemens is not read; {codes.REMEDY}", at - reader.start)
-
-
-def _skip(reader: TokenReader) -> None:
-    """Go past what stands in brackets behind a command, or behind its equals sign."""
-    if reader.take("="):
-        reader.expression()
-        return
-    depth = 0
-    while reader.peek() in ("(", "[") or depth:
-        if reader.ended:
-            raise reader.fault(") is missing")
-        depth += (reader.peek() in ("(", "[")) - (reader.peek() in (")", "]"))
-        reader.next += 1
 
 
 def _without_comment(text: str) -> str:
@@ -279,9 +179,10 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
     "FOR": SiemensParser._for,
     "ENDFOR": SiemensParser._end_for,
     "REPEAT": SiemensParser._repeat,
+    "REPEATB": SiemensParser._repeat_block,
     "UNTIL": SiemensParser._until,
     **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
-    **dict.fromkeys(("TRANS", "ATRANS"), SiemensParser._shift),
+    **dict.fromkeys((*SIEMENS, *(f"A{name}" for name in SIEMENS)), SiemensParser._frame),
     "MCALL": SiemensParser._modal_call,
     **dict.fromkeys(patterns.ARGUMENTS, SiemensParser._pattern),
     "MSG": SiemensParser._message,

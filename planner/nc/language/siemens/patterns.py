@@ -17,7 +17,7 @@ ARGUMENTS = {
     "HOLES1": ("SPCA", "SPCO", "STA1", "FDIS", "DBH", "NUM"),
     "HOLES2": ("CPA", "CPO", "RAD", "STA1", "INDA", "NUM"),
 }
-_TURN = Number(360.0)
+_TURN = Number(360.0)  # [degrees]
 
 
 def pattern_rows(

@@ -102,12 +102,9 @@ def position(axis: str) -> Numbered:
     return Numbered(Number(float(FIRST_POSITION + "XYZ".index(axis))))
 
 
-_FRAME = frozenset(("_tx", "_ty", "_tz"))  # of TRANS, which subprograms do not reset
-
-
 def variable(name: str) -> Named:
-    """A variable of the program, or of the reader's own: each call has its own ones, but for those of TRANS."""
-    return Named(name.lower(), name.lower() in _FRAME)
+    """A variable of the program, or of the reader's own: each call has its own ones."""
+    return Named(name.lower(), False)
 
 
 def handed_over(number: int) -> Named:

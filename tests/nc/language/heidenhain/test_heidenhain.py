@@ -71,6 +71,12 @@ def test_tangent_arcs_go_on_in_the_direction_before() -> None:
     found = read("L X+0 Y+0 FMAX\nL X+10 F500\nCT X+20 Y+10\nCT X+30 Y+20\nL Y+30")
     np.testing.assert_allclose(found.arc_center[:, :2], [[10, 10], [30, 10]], atol=1e-9)
     np.testing.assert_allclose(found.arc_sweep, [np.pi / 2, -np.pi / 2], atol=1e-9)
+    found = read("CC X+3 Y+0\nL X+13 Y-10 FMAX\nL Y+0 F500\nCTP PR+10 PA+90")
+    np.testing.assert_allclose(found.end[-1, :2], [3, 10], atol=1e-9)
+    np.testing.assert_allclose(found.arc_center[0, :2], [3, 0], atol=1e-9)
+    found = read("L X+0 Y+0 FMAX\nCR X+10 Y+10 R+10 DR+ F500\nCT X+0 Y+20\nCT X-10 Y+10")
+    np.testing.assert_allclose(found.arc_center[:, :2], [[0, 10]] * 3, atol=1e-9)
+    np.testing.assert_allclose(found.arc_sweep, np.pi / 2, atol=1e-9)
 
 
 @pytest.mark.parametrize("turn", [30.0, 90.0, 150.0, -60.0])
@@ -187,21 +193,26 @@ def test_tolerance_datum_shift_and_inches() -> None:
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        ("L X+1 RL F100", "<text>:2:7: .*radius compensation"),
         ("L X+1 A+3 F100", "<text>:2:7: .*axis A is not planned"),
         ("L X+1 F100 M128", "<text>:2:12: .*M128 is not read"),
-        ("CYCL DEF 251 POCKET", "<text>:2:.*cycle 251 is not read"),
-        ("APPR LT X+1", "<text>:2:1: .*APPR of the conversational language is not read"),
+        ("CYCL DEF 256 STUD", "<text>:2:.*cycle 256 is not read"),
+        ("APPR LT X+1", "<text>:2:1: .*APPR LT needs its length"),
+        (
+            "LN X+1 NX+0 NY+0 NZ+1 F100",
+            "<text>:2:1: .*LN of the conversational language is not read .*normal",
+        ),
+        ("FL X+1 AN+30", "FL of the conversational .*free contours"),
+        ("L X+1 F100 M103 F20", "M103 is not read"),
         ("C X+1 Y+1", "direction: DR"),
-        ("RND R3", "between two straight moves"),
-        ("L X+1 F100\nRND R3\nCC X+1 Y+1", "<text>:3:.*between two straight moves"),
+        ("RND R3", "stand behind a move"),
+        ("L X+1 F100\nRND R3\nCC X+1 Y+1", "rounding or chamfer of line 3 needs"),
         ("Q1 = 3 *", "the formula ends too early"),
         ("Q1 = SIN (3", r"\) is missing"),
         ("L X+Q2000 F100", "Q0 to Q1999"),
         ("CALL LBL 7", "there is no LBL 7"),
         ("Q1 = 1 / 0\nL X+Q1 F100", "<text>:2:1: .*division by zero"),
         ("L X+1 FAUTO", "the tool call before has no F"),
-        ("CYCL CALL", "no drilling cycle"),
+        ("CYCL CALL", "no drilling or milling cycle"),
         ("TOOL CALL 1 X", "tool axis X"),
         ("LBL 1\nFN 9: IF +1 EQU +1 GOTO LBL 1", "does this loop end"),
     ],

@@ -1,0 +1,274 @@
+"""Cycles of conversational programs whose rows are made while the program runs.
+
+    202 boring               Q208 feed out, Q214 direction in which the tool leaves the wall by 0.2 mm
+    203, 205 pecking         Q202 infeed, less by Q212 each time but at least Q205; Q256 retract to break the chip, Q208 feed out;
+                             203: Q213 breaks of the chip before a retract; 205: Q257 depth between breaks, Q258 and Q259 how far
+                             above the ground rapid speed ends
+    206, 207, 209 tapping    at Q206; with the lead Q239; breaking the chip each Q257, back by Q256 leads (0: out of the hole)
+    208 bore milling         Q335 diameter, Q334 infeed per turn
+    251 rectangular pocket   Q218 Q219 sides, Q220 corners, Q224 turned by, Q367 where the tool stands in it
+    252 circular pocket      Q223 diameter
+    253 slot                 Q218 length, Q219 width, Q374 turned by, Q367 where the tool stands in it
+    254 slot on a circle     Q219 width, Q375 diameter, Q216 Q217 centre, Q376 start, Q248 opening, Q377 slots every Q378
+        Q215 0 all, 1 roughing, 2 finishing; Q368 Q369 allowances; Q202 infeed, Q338 for finishing; Q207 Q206 Q385 feeds; Q351 1 climb,
+        -1 conventional; Q370 times the tool's radius between two paths
+
+In all of them Q200 clearance, Q201 depth, Q203 surface, Q204 second clearance, Q211 dwell.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from planner.nc.language.holes import BREAK, HolePlan, Pecks, dwell, go, milled, pecked, tapped
+from planner.nc.language.making import Maker, Making, Row, steps
+from planner.nc.language.milling import PocketPlan, pocket_rows
+from planner.nc.pocket_shapes import ArcSlot, PocketShape, RoundedRectangle
+
+_HOLE = (200, 201, 203, 204, 211)
+_POCKET = (200, 201, 202, 203, 204, 206, 207, 215, 338, 351, 366, 368, 369, 370, 385)
+PARAMETERS: dict[int, tuple[int, ...]] = {
+    202: (*_HOLE, 206, 208, 214),
+    203: (*_HOLE, 202, 205, 206, 208, 210, 212, 213, 256),
+    205: (*_HOLE, 202, 205, 206, 208, 212, 256, 257, 258, 259, 379),
+    206: (*_HOLE, 206),
+    207: (*_HOLE, 239),
+    208: (*_HOLE, 206, 334, 335, 342, 351),
+    209: (*_HOLE, 239, 256, 257),
+    251: (*_POCKET, 218, 219, 220, 224, 367),
+    252: (*_POCKET, 223, 367),
+    253: (*_POCKET, 218, 219, 367, 374),
+    254: (*_POCKET, 216, 217, 219, 248, 367, 375, 376, 377, 378),
+}
+_AWAY = {1: (-1, 0), 2: (0, -1), 3: (1, 0), 4: (0, 1)}  # directions of Q214
+_AWAY_BY = 0.2  # mm
+_OVERLAP = 1.0  # of the tool's radius between two paths, where Q370 is 0
+_CORNERS = {
+    0: 0j,
+    1: -1 - 1j,
+    2: 1 - 1j,
+    3: 1 + 1j,
+    4: -1 + 1j,
+}  # where the tool stands (Q367), in half sides
+
+
+def _hole(given: Mapping[str, float], feed: float = 0.0) -> HolePlan:
+    top = given["Q203"]
+    found = HolePlan(
+        top + given["Q200"],
+        top,
+        top - abs(given["Q201"]),
+        top + max(given["Q200"], given["Q204"]),
+        feed,
+        given["Q211"],
+    )
+    found.check()
+    return found
+
+
+def _end(hole: HolePlan) -> Iterator[Row]:
+    if hole.retract > hole.clear:
+        yield go(hole.retract)
+
+
+def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole, (x, y, _) = _hole(given, given["Q206"]), making.here()
+    yield go(hole.clear)
+    yield go(hole.bottom, hole.feed)
+    yield from dwell(hole.dwell)
+    yield [("M", 5.0)]
+    if given["Q214"]:
+        if given["Q214"] not in _AWAY:
+            raise ValueError(f"Q214 {given['Q214']:g}, the direction of disengaging, is none of 0 to 4")
+        dx, dy = _AWAY[round(given["Q214"])]
+        away = _AWAY_BY / making.unit
+        yield [("G", 1.0), ("X", x + away * dx), ("Y", y + away * dy)]
+    yield go(hole.clear, given["Q208"] or given["Q206"])
+    yield from _end(hole)
+    yield [("G", 0.0), ("X", x), ("Y", y)]
+
+
+def _universal(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
+    pecks = Pecks(
+        infeed=given["Q202"],
+        less=given["Q212"],
+        least=given["Q205"],
+        back=given["Q256"] or gap,
+        ahead=(gap, gap),
+        breaks=round(given["Q213"]),
+        above=given["Q210"],
+    )
+    yield from pecked(hole, pecks)
+    yield go(hole.clear, given["Q208"] or None)
+    yield from _end(hole)
+
+
+def _pecking(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    if given["Q379"]:
+        raise ValueError("Q379, a starting point that is drilled already, is not read")
+    hole = _hole(given, given["Q206"])
+    pecks = Pecks(
+        infeed=given["Q202"],
+        less=given["Q212"],
+        least=given["Q205"],
+        back=given["Q256"] or BREAK / making.unit,
+        ahead=(given["Q258"], given["Q259"]),
+        chip=given["Q257"],
+    )
+    yield from pecked(hole, pecks)
+    yield go(hole.clear, given["Q208"] or None)
+    yield from _end(hole)
+
+
+def _tapped(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole, speed = _hole(given), making.interpreter.state.spindle.speed
+    lead = given["Q239"] if "Q239" in given else (given["Q206"] / speed if speed else 0.0)
+    yield from tapped(making, hole, lead, speed)
+    yield from _end(hole)
+
+
+def _tapped_by_breaks(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole, lead, speed = _hole(given), given["Q239"], making.interpreter.state.spindle.speed
+    depth = hole.top - hole.bottom
+    count = steps(depth, given["Q257"])
+    for k in range(1, count + 1):
+        deep = min(k * given["Q257"], depth) if given["Q257"] else depth
+        back = given["Q256"] * abs(lead)
+        last = k == count
+        up = hole.clear if last or back == 0.0 else min(hole.top - deep + back, hole.clear)
+        one = replace(hole, bottom=hole.top - deep)
+        yield from tapped(making, one, lead, speed, up=up, start=k == 1)
+    yield from _end(hole)
+
+
+def _milled(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    if given["Q342"]:
+        raise ValueError("Q342, the diameter of a bore that is there already, is not read")
+    hole = _hole(given, given["Q206"])
+    yield from milled(making, hole, given["Q335"], given["Q334"], _turning(making, given))
+    yield go(hole.clear)
+    yield from _end(hole)
+
+
+def _turning(making: Making, given: Mapping[str, float]) -> int:
+    """Climb milling inside goes round counter-clockwise with M3; a mirror image does not turn it round."""
+    if given["Q351"] not in (1.0, -1.0, 0.0):
+        raise ValueError(f"Q351 {given['Q351']:g} is none of 1 (climb) and -1 (conventional)")
+    turn = -1 if given["Q351"] < 0.0 else 1
+    if making.interpreter.state.spindle.turning < 0:
+        turn = -turn
+    return -turn if making.travel.mirrored else turn
+
+
+def _plan(making: Making, given: Mapping[str, float]) -> PocketPlan:
+    kind, radius = round(given["Q215"]), making.tool_radius()
+    if kind not in (0, 1, 2):
+        raise ValueError(f"Q215 {given['Q215']:g} is none of 0 (all), 1 (roughing) and 2 (finishing)")
+    if given["Q366"]:
+        making.note(
+            "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
+        )
+    making.note("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
+    top = given["Q203"]
+    return PocketPlan(
+        clear=top + given["Q200"],
+        top=top,
+        bottom=top - abs(given["Q201"]),
+        retract=top + max(given["Q204"], given["Q200"]),
+        radius=radius,
+        infeed=given["Q202"],
+        step=(given["Q370"] or _OVERLAP) * radius,
+        feed=given["Q207"],
+        plunge_feed=given["Q206"],
+        finish_feed=(given["Q385"] or given["Q207"]),
+        turning=_turning(making, given),
+        side=given["Q368"],
+        floor=given["Q369"],
+        rough=kind in (0, 1),
+        walls=kind != 1 and given["Q368"] > 0.0,
+        base=kind != 1 and given["Q369"] > 0.0,
+        finish_infeed=given["Q338"],
+    )
+
+
+def _place(
+    making: Making, given: Mapping[str, float], half: complex, angle: float, names: dict[int, complex]
+) -> complex:
+    """The middle of a pocket whose half sides are given, from where the tool stands in it."""
+    stands = names.get(round(given["Q367"]))
+    if stands is None:
+        raise ValueError(f"Q367 {given['Q367']:g}, where the tool stands in the pocket, is not read")
+    x, y, _ = making.here()
+    return complex(x, y) - complex(stands.real * half.real, stands.imag * half.imag) * cmath.rect(
+        1.0, math.radians(angle)
+    )
+
+
+def _cut(
+    making: Making, shape: PocketShape, given: Mapping[str, float], at: complex, angle: float
+) -> Iterator[Row]:
+    plan = _plan(making, given)
+    yield from pocket_rows(shape, plan, at, angle)
+
+
+def _rectangle(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
+    if min(a, b) <= 0.0:
+        raise ValueError("Q218 and Q219, the sides of the pocket, are to be above 0")
+    corner = max(given["Q220"], making.tool_radius())
+    if given["Q220"] > min(a, b):
+        raise ValueError("Q220, the radius of the corners, is more than half a side")
+    shape = RoundedRectangle(a, b, min(corner, a, b))
+    return _cut(
+        making, shape, given, _place(making, given, complex(a, b), given["Q224"], _CORNERS), given["Q224"]
+    )
+
+
+def _circle(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    size = given["Q223"] / 2.0
+    if size <= 0.0:
+        raise ValueError("Q223, the diameter of the pocket, is to be above 0")
+    return _cut(
+        making, RoundedRectangle(size, size, size), given, _place(making, given, 0j, 0.0, {0: 0j}), 0.0
+    )
+
+
+def _slot(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
+    if not 0.0 < b <= a:
+        raise ValueError("a slot has a width Q219 above 0 and a length Q218 of at least that")
+    ends = {0: 0j, 1: -1 + 0j, 2: complex(b / a - 1.0), 3: complex(1.0 - b / a), 4: 1 + 0j}
+    at = _place(making, given, complex(a, b), given["Q374"], ends)
+    return _cut(making, RoundedRectangle(a, b, b), given, at, given["Q374"])
+
+
+def _slots_on_circle(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    if given["Q367"]:
+        raise ValueError("Q367 of cycle 254 other than 0 is not read; give the centre as Q216 and Q217")
+    radius, b, sweep = given["Q375"] / 2.0, given["Q219"] / 2.0, math.radians(given["Q248"])
+    if not 0.0 < b < radius or not 0.0 < abs(sweep) < 2.0 * math.pi:
+        raise ValueError(
+            "a slot on a circle has a width above 0 and below the diameter, and an opening below 360 degrees"
+        )
+    shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])
+    for k in range(max(1, steps(given["Q377"], 1.0))):
+        yield from _cut(making, shape, given, at, k * given["Q378"])
+
+
+MAKERS: dict[str, Maker] = {
+    "cycle 202": _bored,
+    "cycle 203": _universal,
+    "cycle 205": _pecking,
+    "cycle 206": _tapped,
+    "cycle 207": _tapped,
+    "cycle 208": _milled,
+    "cycle 209": _tapped_by_breaks,
+    "cycle 251": _rectangle,
+    "cycle 252": _circle,
+    "cycle 253": _slot,
+    "cycle 254": _slots_on_circle,
+}

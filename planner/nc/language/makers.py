@@ -1,0 +1,199 @@
+"""The makers of rows by their names in `tree.Made`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc.arcs import IN_PLANE
+from planner.nc.language import frames
+from planner.nc.language.approach import KINDS, Approach, Departure
+from planner.nc.language.corner_moves import KINDS as CORNERS
+from planner.nc.language.heidenhain import cycles as heidenhain_cycles
+from planner.nc.language.making import Maker, Making, Row
+from planner.nc.language.siemens import cycles as siemens_cycles
+from planner.nc.language.travel_rows import at_place, in_plane
+from planner.nc.program import Kind
+
+
+def compensate(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """Radius compensation: side 1 left, -1 right, 0 off."""
+    making.travel.compensate(round(given["side"]))
+    return []
+
+
+def approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """APPR of a kind (index in KINDS), with X Y Z of the first contour point, LEN, R, CCA, F and side."""
+    unit, first = making.unit, np.array(making.here())
+    for axis, letter in enumerate("XYZ"):
+        first[axis] = given.get(letter, first[axis])
+    found = Approach(
+        kind=KINDS[round(given["kind"])],
+        line=making.line,
+        at=making.at,
+        frame=making.frame,
+        length=given.get("LEN", 0.0) * unit,
+        radius=given.get("R", 0.0) * unit,
+        angle=given.get("CCA", 0.0),
+        feed=given.get("F"),
+        first=first * unit,
+        side=round(given["side"]) or -1,
+        compensated=given["side"] != 0.0,
+    )
+    found.check("APPR")
+    making.travel.approach(found)
+    return []
+
+
+def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """A rounding or chamfer at the end of the next move: kind (index in corner_moves.KINDS) and size."""
+    if given["size"] < 0.0:
+        raise ValueError("a rounding or chamfer is not negative")
+    making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit, making.line)
+    return []
+
+
+def direction(making: Making) -> complex:
+    """Unit tangent of the last move at its end, in the program's plane. Raises ValueError where there is none."""
+    travel, interpreter = making.travel, making.interpreter
+    if travel.compensated:
+        raise ValueError(
+            "CT while cutter radius compensation is on is not read; write the arc with CR= or I and J"
+        )
+    store, normal = interpreter.store, interpreter.state.normal
+    k = store.blocks - 1
+    if k < 0 or store.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):
+        raise ValueError("CT goes on in the direction of the move before it, and there is none")
+    end, begin = store.block.end[k], store.block.end[k - 1] if k else np.zeros(3)
+    if store.block.kind[k] == Kind.ARC:
+        _, centre, about, sweep = store.arcs[-1]
+        spoke = in_plane(end, normal) - in_plane(centre, normal)
+        way = spoke * (1j if sweep > 0 else -1j) * (1.0 if about == normal else 0.0)
+    else:
+        way = in_plane(end, normal) - in_plane(begin, normal)
+    back = travel.unmapped(at_place(way, np.zeros(3), normal) + travel.shift)
+    found = in_plane(back, normal)
+    if abs(found) == 0.0:
+        raise ValueError("CT goes on in the direction of the move before it, which is not in the plane")
+    return found / abs(found)
+
+
+def _target(making: Making, given: Mapping[str, float]) -> FloatArray:
+    """(3,) coordinates in the program's unit, where the command leads."""
+    end = np.array(making.here())
+    for axis, letter in enumerate("XYZ"):
+        end[axis] = given.get(letter, end[axis])
+    return end
+
+
+def _arc_row(making: Making, given: Mapping[str, float], centre: complex, left: bool) -> list[Row]:
+    normal, here = making.interpreter.state.normal, np.array(making.here())
+    to = at_place(centre, here, normal) - here
+    row: Row = [("G", 3.0 if left else 2.0)]
+    row += [(letter, given[letter]) for letter in "F" if letter in given]
+    end = _target(making, given)
+    row += [("XYZ"[a], float(end[a])) for a in range(3)]
+    return [[("G", 90.0)], [*row, *(("IJK"[a], float(to[a])) for a in IN_PLANE[normal])]]
+
+
+def tangent_arc(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """CT: the arc to X Y Z that goes on in the direction of the last move. Raises ValueError."""
+    normal = making.interpreter.state.normal
+    t, here = direction(making), in_plane(np.array(making.here()), normal)
+    v = in_plane(_target(making, given), normal) - here
+    left = 1j * t
+    along = 2.0 * (v.conjugate() * left).real
+    if abs(along) <= _FLAT * abs(v):
+        raise ValueError("the end of CT lies straight ahead or behind: that is no arc; write G1")
+    radius = abs(v) ** 2 / along
+    yield from _back(making, _arc_row(making, given, here + radius * left, radius > 0))
+
+
+def arc_through(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """CIP: the arc to X Y Z through X1 Y1 Z1. Raises ValueError."""
+    normal, start, end = making.interpreter.state.normal, np.array(making.here()), _target(making, given)
+    middle = np.array([given.get(f"{letter}1", start[k]) for k, letter in enumerate("XYZ")])
+    if abs(middle[normal] - start[normal]) > _FLAT or abs(end[normal] - start[normal]) > _FLAT:
+        raise ValueError("a CIP out of its plane (G17, G18, G19) is not read; write it with lines")
+    a, b, c = (in_plane(point, normal) for point in (start, middle, end))
+    turn = ((b - a).conjugate() * (c - a)).imag
+    if abs(turn) <= _FLAT * max(abs(b - a), abs(c - a)) ** 2:
+        raise ValueError("the three points of CIP lie on a line: that is no arc; write G1")
+    u, w = b - a, c - a
+    centre = a + (abs(u) ** 2 * w - abs(w) ** 2 * u) * 1j / (2.0 * (u.conjugate() * w).imag) * -1.0
+    yield from _back(making, _arc_row(making, given, centre, turn > 0))
+
+
+def _back(making: Making, rows: list[Row]) -> list[Row]:
+    """The rows, and G91 behind them where it was in force."""
+    absolute = making.travel.absolute if making.travel.active else making.interpreter.state.absolute
+    return rows[1:] if absolute else [*rows, [("G", 91.0)]]
+
+
+def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """DEP of a kind (index in KINDS), with X Y Z, LEN, R, CCA and F."""
+    unit, end = making.unit, np.array(making.here())
+    for axis, letter in enumerate("XYZ"):
+        end[axis] = given.get(letter, end[axis])
+    found = Departure(
+        kind=KINDS[round(given["kind"])],
+        line=making.line,
+        at=making.at,
+        frame=making.frame,
+        length=given.get("LEN", 0.0) * unit,
+        radius=given.get("R", 0.0) * unit,
+        angle=given.get("CCA", 0.0),
+        feed=given.get("F"),
+        end=end * unit,
+        raised="Z" in given,
+    )
+    found.check("DEP")
+    if found.kind == "LCT" and not {"X", "Y"} & set(given):
+        raise ValueError("DEP LCT needs its end as X and Y")
+    making.travel.depart(found)
+    return []
+
+
+def keep(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """Before a cycle: keep G90 or G91, the motion code and the feed, and switch to G90."""
+    state, travel, shared = making.interpreter.state, making.travel, making.shared
+    absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
+    shared[_KEPT[0]], shared[_KEPT[1]] = float(absolute), float(motion)
+    shared[_KEPT[2]] = (
+        state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
+    )
+    return [] if absolute else [[("G", 90.0)]]
+
+
+def bring_back(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """Behind a cycle: what `keep` kept; the feed where `feed` is 1."""
+    absolute, motion, feed = (making.shared[name] for name in _KEPT)
+    if not absolute:
+        yield [("G", 91.0)]
+    if motion in (0.0, 1.0) and motion != making.interpreter.state.motion:
+        yield [("G", motion)]
+    if given["feed"] and feed > 0.0:
+        yield [("F", feed)]
+
+
+_KEPT = ("_kept absolute", "_kept motion", "_kept feed")
+_FLAT = 1e-9  # relative, below which three points are on a line
+
+MAKERS: dict[str, Maker] = {
+    "compensate": compensate,
+    "approach": approach,
+    "depart": depart,
+    "siemens frame": frames.siemens,
+    "heidenhain frame": frames.heidenhain,
+    "keep": keep,
+    "bring back": bring_back,
+    **siemens_cycles.MAKERS,
+    **heidenhain_cycles.MAKERS,
+    "corner": corner,
+    "tangent arc": tangent_arc,
+    "arc through": arc_through,
+    "frame in force": frames.in_force,
+}

@@ -1,0 +1,69 @@
+"""What makers of rows get and give.
+
+A maker is a function of the running program's state and the values of a command; it gives rows of words in the program's coordinates
+and units, each a list of letters and numbers, and raises ValueError for values that make no sense.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from planner.nc.interpreter import Interpreter
+from planner.nc.language.travel import Travel
+
+Row = list[tuple[str, float]]
+Maker = Callable[["Making", Mapping[str, float]], Iterable[Row]]
+ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
+
+
+@dataclass(frozen=True)
+class Making:
+    """interpreter, travel : of the running program
+    shared             : its variables that all calls share
+    line, at, frame    : line, byte offset and call of the command
+    """
+
+    interpreter: Interpreter
+    travel: Travel
+    shared: dict[str, float]
+    line: int
+    at: int
+    frame: int
+
+    @property
+    def unit(self) -> float:
+        """mm per unit of the program."""
+        return self.interpreter.state.unit
+
+    def here(self) -> tuple[float, float, float]:
+        """The position in the program's coordinates and unit."""
+        x, y, z = self.travel.position() / self.unit
+        return float(x), float(y), float(z)
+
+    def tool_radius(self) -> float:
+        """Radius of the loaded tool in the program's unit. Raises ValueError where the machine file gives no diameter."""
+        found = self.travel.radius()
+        if found == 0.0:
+            number = self.interpreter.state.tool_loaded
+            raise ValueError(
+                f"the cycle needs the diameter of tool {number}; write it into [tools] of the machine file"
+            )
+        return found / self.unit
+
+    def note(self, text: str) -> None:
+        """Keep a note of the command's line."""
+        self.interpreter.note(text, self.line)
+
+
+def steps(whole: float, most: float) -> int:
+    """The number of equal steps of at most `most` that a length is divided into; 1 where `most` is 0. Raises ValueError."""
+    if whole <= 0.0 or most <= 0.0:
+        return 1
+    count = whole / most
+    if count > ROWS_MAX:
+        raise ValueError(f"{most:g} is too small an infeed for {whole:g}: more than {ROWS_MAX:,} passes")
+    return max(1, -int(-(count - _ROUNDING) // 1))
+
+
+_ROUNDING = 1e-9  # of a number of steps

@@ -1,0 +1,189 @@
+"""Pockets and slots as rows: depth passes, paths from inside to outside, plunging, finishing.
+
+Roughing divides the depth, less the allowance at the bottom, into equal passes; each plunges where the core begins and clears the
+pocket from inside to outside up to the allowance at the walls. Finishing runs along the walls, which it meets and leaves on quarter
+circles, and clears the bottom in one pass.
+
+Manuals tell the dimensions, the passes and that pockets are cut from inside to outside; the single paths are this reader's own. Two
+paths s apart have corners s sqrt(2) apart. A point between them on the diagonal, t inside the outer path, is t from its sides and
+(s - t) sqrt(2) from the inner corner; both are more than the tool's radius r somewhere if s > (1 + 1/sqrt(2)) r. So that is the most.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from planner.nc.language.making import Row, steps
+from planner.nc.pocket_shapes import Path, PocketLeg, PocketShape, backwards, loops
+
+CORNERS_CLEAR = 1.0 + math.sqrt(0.5)  # tool radii between two paths at most (module text)
+RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
+
+
+@dataclass(frozen=True)
+class PocketPlan:
+    """How a pocket is cut; lengths in the program's unit, feeds per minute.
+
+    clear, top, bottom, retract : z of the clearance, the surface, the bottom, and the end
+    radius           : of the tool
+    infeed           : most per pass, 0 for one pass
+    step             : most between two paths
+    side, floor      : allowances
+    rough            : cut up to the allowances
+    walls, base      : finish them
+    feed, plunge_feed, finish_feed
+    finish_infeed    : most per pass along the walls, 0 for one pass
+    turning          : 1 counter-clockwise, -1 clockwise
+    plunge           : RAPID, STRAIGHT or HELIX, with the radius and the pitch of the helix
+    """
+
+    clear: float
+    top: float
+    bottom: float
+    retract: float
+    radius: float
+    infeed: float
+    step: float
+    feed: float
+    plunge_feed: float
+    finish_feed: float
+    turning: int
+    side: float = 0.0
+    floor: float = 0.0
+    rough: bool = True
+    walls: bool = False
+    base: bool = False
+    finish_infeed: float = 0.0
+    plunge: int = STRAIGHT
+    helix: tuple[float, float] = (0.0, 0.0)
+
+    def check(self) -> None:
+        """Raises ValueError for values that make no sense."""
+        if self.bottom >= self.top:
+            raise ValueError("the bottom of the pocket lies at or above its surface")
+        if self.top - self.bottom <= self.floor:
+            raise ValueError("the finishing allowance at the bottom is the whole depth")
+        if min(self.side, self.floor, self.infeed, self.step, self.finish_infeed) < 0.0:
+            raise ValueError("an infeed or allowance of the pocket is negative")
+        for name, feed in (("in the plane", self.feed), ("of plunging", self.plunge_feed)):
+            if not feed > 0.0 and not (name == "of plunging" and self.plunge == RAPID):
+                raise ValueError(f"the feed {name} of the pocket is not given")
+
+
+def pocket_rows(shape: PocketShape, plan: PocketPlan, at: complex, angle: float) -> Iterator[Row]:
+    """The rows of a pocket whose zero is at a place, turned by an angle [degrees]. Raises ValueError."""
+    plan.check()
+    cut = _Cutting(plan, at, cmath.rect(1.0, math.radians(angle)) if angle else 1 + 0j)
+    step = min(plan.step or math.inf, CORNERS_CLEAR * plan.radius)
+    start, _ = shape.core()
+    yield cut.rapid(z=max(plan.clear, plan.retract))
+    yield cut.rapid(start)
+    yield cut.rapid(z=plan.clear)
+    if plan.rough:
+        paths = loops(shape, plan.radius + plan.side, step, plan.turning)
+        yield from _passes(cut, shape, paths, plan.bottom + plan.floor, plan.infeed, plan.feed)
+    if plan.walls:
+        paths = [(start, shape.to_wall()), _wall(shape, plan)]
+        yield from _passes(cut, shape, paths, plan.bottom, plan.finish_infeed, plan.finish_feed)
+    if plan.base:
+        paths = loops(shape, plan.radius, step, plan.turning)
+        yield from _passes(cut, shape, paths, plan.bottom, 0.0, plan.finish_feed)
+    yield cut.rapid(z=max(plan.clear, plan.retract))
+
+
+def _wall(shape: PocketShape, plan: PocketPlan) -> Path:
+    """Along the walls, with quarter circles to and from them."""
+    loops(shape, plan.radius, plan.radius, plan.turning)  # is there room?
+    width = shape.room - plan.radius
+    if width <= _NARROW * shape.room:
+        return shape.core()
+    start, legs = shape.loop(plan.radius, plan.turning)
+    first = legs[0]
+    way = first.end - start if not first.turning else 1j * first.turning * (start - first.centre)
+    tangent = way / abs(way)
+    size = min(plan.radius, width) / 2.0
+    centre = start + 1j * plan.turning * tangent * size
+    come, go = centre - size * tangent, centre + size * tangent
+    return come, [PocketLeg(start, centre, plan.turning), *legs, PocketLeg(go, centre, plan.turning)]
+
+
+_NARROW = 1e-9  # relative room beside the tool below which there is none
+
+
+class _Cutting:
+    """Rows of words of one pocket."""
+
+    def __init__(self, plan: PocketPlan, at: complex, turned: complex):
+        self.plan, self.at, self.turned = plan, at, turned
+
+    def rapid(self, point: complex | None = None, z: float | None = None) -> Row:
+        return [("G", 0.0), *self._ends(point, z)]
+
+    def line(self, feed: float, point: complex | None = None, z: float | None = None) -> Row:
+        return [("G", 1.0), ("F", feed), *self._ends(point, z)]
+
+    def legs(self, start: complex, legs: list[PocketLeg], feed: float) -> Iterator[Row]:
+        place = start
+        for leg in legs:
+            if leg.turning:
+                to = (leg.centre - place) * self.turned
+                code = 3.0 if leg.turning > 0 else 2.0
+                yield [("G", code), ("F", feed), *self._ends(leg.end, None), ("I", to.real), ("J", to.imag)]
+            else:
+                yield self.line(feed, leg.end)
+            place = leg.end
+
+    def plunge(self, start: complex, begin: float, z: float) -> Iterator[Row]:
+        """Down to z at a place, from `begin`."""
+        plan = self.plan
+        if plan.plunge == RAPID:
+            yield self.rapid(z=z)
+        elif plan.plunge == STRAIGHT:
+            yield self.line(plan.plunge_feed, z=z)
+        else:
+            size, pitch = plan.helix
+            count = steps(begin - z, pitch)
+            side = start + size
+            yield self.line(plan.plunge_feed, side)
+            to = -size * self.turned
+            code = 3.0 if plan.turning > 0 else 2.0
+            for k in range(1, count + 2):  # and once round on the ground
+                deep = z if k >= count else begin + (z - begin) * k / count
+                yield [
+                    ("G", code), ("F", plan.plunge_feed), *self._ends(side, deep), ("I", to.real), ("J", to.imag)
+                ]  # fmt: skip
+            yield self.line(plan.feed, start)
+
+    def _ends(self, point: complex | None, z: float | None) -> Row:
+        found: Row = []
+        if point is not None:
+            place = self.at + self.turned * point
+            found = [("X", place.real), ("Y", place.imag)]
+        return found if z is None else [*found, ("Z", z)]
+
+
+def _passes(
+    cut: _Cutting, shape: PocketShape, paths: list[Path], bottom: float, infeed: float, feed: float
+) -> Iterator[Row]:
+    """Passes of equal depth down to the bottom, each along all paths and back to the start, and up at the end."""
+    plan, start = cut.plan, paths[0][0]
+    out = shape.to_wall()
+    back = backwards(start, out)
+    count = steps(plan.top - bottom, infeed)
+    begin = plan.clear
+    yield cut.rapid(z=plan.clear)
+    yield cut.rapid(start)
+    for k in range(1, count + 1):
+        z = bottom if k == count else plan.top + (bottom - plan.top) * k / count
+        yield from cut.plunge(start, begin, z)
+        for first, legs in paths:
+            if legs:
+                yield cut.line(feed, first)
+            yield from cut.legs(first, legs, feed)
+        yield cut.line(feed, out[-1].end if out else start)
+        yield from cut.legs(out[-1].end if out else start, back, feed)
+        begin = z
+    yield cut.rapid(z=plan.clear)

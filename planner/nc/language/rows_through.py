@@ -1,0 +1,295 @@
+"""Between the rows of a program and the interpreter: the programmed frame, and radius compensation as Heidenhain and Siemens have it.
+
+A point p of the program is at
+
+    q = A p + t,      A (3, 3), t (3,),
+
+in the coordinates of the work system. Arcs stay arcs where A turns, mirrors and scales their plane evenly; where it mirrors the plane,
+their direction and the side of compensation change. Rows come out with absolute coordinates (G90), with centres as I J K, so that the
+expanded program needs neither frames nor compensation. Rows that only switch something pass.
+
+With no frame and no compensation in force rows pass as they are. All lengths here are in mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from planner.nc.arcs import IN_PLANE
+from planner.nc.interpreter import Interpreter
+from planner.nc.language.approach import Approach
+from planner.nc.language.coordinates import Coordinates
+from planner.nc.language.corner_moves import CornerMove
+from planner.nc.language.offset_moves import OffsetMoves
+from planner.nc.language.travel_rows import (
+    AXES,
+    CENTRES,
+    TURNS,
+    G,
+    M,
+    Move,
+    TravelRow,
+    other_words,
+    rows_of,
+    words_of,
+)
+from planner.nc.language.tree import ProgramFault, SourcePlace
+from planner.nc.lexer import Words
+
+_PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
+_ENDS = (2.0, 30.0)
+# G codes behind which the position is asked of the interpreter.
+_PLACING = frozenset((43.0, 43.1, 49.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3))
+# G codes that leave the position and the coordinates as they are.
+_NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0, 96.0, 97.0))
+_EVEN = 1e-9  # relative error of a frame that still counts as even
+
+
+class RowsThrough(Coordinates):
+    """The frame and the compensation in force.
+
+    active : rows are looked at
+    place  : (3,) the programmed position [mm], while active
+    moves  : how many moves have been taken
+    absolute, motion : G90 is in force, and the motion code, while active
+    """
+
+    def __init__(self, interpreter: Interpreter):
+        super().__init__()
+        self.interpreter = interpreter
+        self.active = False
+        self.place = np.zeros(3)
+        self.moves = 0
+        self._mapped = np.zeros(3)  # `place` in the work system
+        self._beside = False  # the tool is not at `place`: compensation has just ended
+        self._offset: OffsetMoves | None = None
+        self._approach: Approach | None = None
+        self._coming: CornerMove | None = None  # of the next move
+        self._corner: CornerMove | None = None  # of the last move, which waits for the next one
+        self._between: list[TravelRow] = []  # rows without a move behind it
+        self.absolute, self.motion = True, 0
+        self._ahead: list[TravelRow] = []  # rows that come before the next ones
+
+    @property
+    def compensated(self) -> bool:
+        """Whether compensation is on, or waits for its approach."""
+        return self._offset is not None or self._approach is not None
+
+    # --- rows -----------------------------------------------------------------------------------------------------------------
+
+    def through(self, words: Words) -> Iterator[Words]:
+        """The rows to execute instead, in pieces; each is executed before the next is asked for. Raises ProgramFault."""
+        self._data, self._files = words.data, words.files
+        if not self.active:
+            yield words
+            return
+        out = self._taken()
+        if self._idle():
+            out += self._restored(words)
+            if out:
+                yield words_of(out, words.data, words.files)
+            self.active = False
+            yield words
+            return
+        for one in rows_of(words):
+            try:
+                foreign = self._take(one, out)
+            except ProgramFault:
+                raise
+            except ValueError as fault:
+                raise self._fault(one, str(fault)) from fault
+            if foreign:
+                yield words_of(out, words.data, words.files)
+                out = []
+                self._look()
+        if out:
+            yield words_of(out, words.data, words.files)
+
+    def end(self) -> list[TravelRow]:
+        """What is left to execute when the program has ended without M2 or M30. Raises ValueError."""
+        self._no_corner()
+        if self._approach is not None:
+            raise ValueError("APPR is followed by no contour")
+        if self._offset is not None:
+            self._leave()
+        return self._taken()
+
+    def _taken(self) -> list[TravelRow]:
+        out, self._ahead = self._ahead, []
+        return out
+
+    def _fault(self, row: TravelRow, message: str) -> ProgramFault:
+        at = row.words[0][2] if row.words else 0
+        return ProgramFault(SourcePlace(sum(begin <= at for begin, _ in self._files), row.line, at), message)
+
+    def _take(self, row: TravelRow, out: list[TravelRow]) -> bool:
+        """Take a row; True if the position is to be asked of the interpreter behind it."""
+        codes = {value for letter, value, _ in row.words if letter == G}
+        own = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
+        for code in codes & {90.0, 91.0}:
+            self.absolute = code == 90.0
+        for code in codes & {0.0, 1.0, 2.0, 3.0}:
+            self.motion = int(code)
+        for code in own & _PLANES.keys():
+            if self.compensated and _PLANES[code] != self.normal:
+                raise ValueError("the plane changes while cutter radius compensation is on")
+            self.normal = _PLANES[code]
+        if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
+            raise ValueError("the unit changes while a frame or compensation is in force")
+        moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
+        kept = [
+            word
+            for word in row.words
+            if not (word[0] == G and word[1] in (90.0, 91.0))
+        ]  # fmt: skip
+        foreign = own - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
+        ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
+        changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
+        if foreign or changes:
+            self._no_corner()
+        if (foreign or changes) and self.compensated:
+            what = "a tool change" if changes else f"G{min(foreign):g}"
+            raise ValueError(f"{what} while cutter radius compensation is on; switch it off before (R0, G40)")
+        if foreign - _PLACING:
+            raise ValueError(f"G{min(foreign - _PLACING):g} while a frame is in force is not read")
+        if foreign:
+            out.append(TravelRow(kept, row.line, row.frame))
+            return True
+        if moved and 4.0 not in own:
+            self._move(TravelRow(kept, row.line, row.frame), out)
+        elif kept:
+            self._pass(TravelRow(kept, row.line, row.frame), out, last=ends)
+            return changes
+        return False
+
+    def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
+        """A row without a move."""
+        if last and self._approach is not None:
+            raise ValueError("APPR is followed by no contour")
+        if self._corner is not None:
+            if last:
+                self._no_corner()
+            self._between.append(row)
+            return
+        if self._offset is None:
+            out.append(row)
+            return
+        if last:
+            self._leave()
+            out += self._taken()
+            out.append(row)
+            return
+        out += [self._in_units(one) for one in self._offset.pass_row(row)]
+
+    def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
+        given = {
+            letter: value * (1.0 if letter == TURNS else self._unit)
+            for letter, value, _ in row.words
+            if letter != G
+        }
+        target = self.place.copy()
+        for axis, letter in enumerate(AXES):
+            if letter in given:
+                target[axis] = given[letter] + (0.0 if self.absolute else self.place[axis])
+        mapped, arc = self.mapped(target), None
+        if self.motion in (2, 3):
+            arc = self.arc(self.place, target, given, self.motion == 2, self._unit)
+        axes = [a for a in range(3) if any(AXES[b] in given and self.matrix[a, b] != 0.0 for b in range(3))]
+        if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self.normal])):
+            axes = sorted({*axes, *IN_PLANE[self.normal]})
+        if set(axes) & set(IN_PLANE[self.normal]):
+            self._beside = False
+        rest = other_words(row, arc=arc is not None)
+        at = row.words[0][2]
+        code = self.motion if arc is None else 3 if arc.sweep > 0 else 2
+        move = Move(TravelRow(rest, row.line, row.frame), at, code, self._mapped, mapped, axes, arc)
+        self.place, self._mapped = target, mapped
+        self.moves += 1
+        if self._corner is not None:
+            (one, *between), move = self._corner.joined(move, self.normal)
+            self._corner, waiting, self._between = None, self._between, []
+            self._go(one, out)
+            for row in waiting:
+                self._pass(row, out, last=False)
+            for one in between:
+                self._go(one, out)
+        if self._coming is not None:
+            self._coming.first = move
+            self._corner, self._coming = self._coming, None
+        else:
+            self._go(move, out)
+
+    def _go(self, move: Move, out: list[TravelRow]) -> None:
+        """A move whose ends are known, on to the compensation."""
+        rows: list[TravelRow] = []
+        if self._approach is not None:
+            rows, self._offset = self._approach.rows(move)
+            self._approach = None
+        rows += move.rows(self.normal) if self._offset is None else self._offset.move(move)
+        out += [self._in_units(one) for one in rows]
+
+    # --- inside -------------------------------------------------------------------------------------------------------------
+
+    def _no_corner(self) -> None:
+        waits = self._corner or self._coming
+        if waits is not None:
+            raise ValueError(
+                f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind it"
+            )
+
+    @property
+    def _unit(self) -> float:
+        return self.interpreter.state.unit
+
+    def _begin(self) -> None:
+        """Look at rows from now on."""
+        if self.active:
+            return
+        state = self.interpreter.state
+        self.active, self.absolute, self.normal = True, state.absolute, state.normal
+        self.motion = max(state.motion, 0) if state.motion <= 3 else 0
+        if state.absolute_centre:
+            raise ValueError("frames and compensation with absolute arc centres are not read")
+        self._look()
+        if not state.absolute:
+            self._ahead.append(TravelRow([(G, 90.0, 0)], 1, 0))
+
+    def _look(self) -> None:
+        """Ask the interpreter for the position."""
+        self._mapped = self.interpreter.state.programmed().copy()
+        self.place = self.unmapped(self._mapped)
+        self._beside = False
+
+    def _leave(self) -> None:
+        """Compensation ends: its moves come, and the next move in the plane leads to its programmed end."""
+        offset, self._offset = self._offset, None
+        assert offset is not None
+        self._ahead += [self._in_units(row) for row in offset.finish()]
+        self._beside = offset.started
+
+    def _idle(self) -> bool:
+        """Whether rows may pass as they are; not while a motion code that was turned round (G2, G3) may count behind."""
+        waits = self.compensated or self._beside or self._coming is not None or self._corner is not None
+        turned = self.motion in (2, 3) and self.motion != self.interpreter.state.motion
+        return self.is_plain and not (waits or turned)
+
+    def _restored(self, words: Words) -> list[TravelRow]:
+        """Rows that bring back G91 and the motion code, where rows behind them count on them."""
+        if not len(words.line):
+            return []
+        at, line, frame = int(words.at[0]), int(words.line[0]), int(words.frame[0])
+        codes = [] if self.absolute else [91.0]
+        if self.motion in (0, 1) and self.motion != self.interpreter.state.motion:
+            codes.append(float(self.motion))
+        return [TravelRow([(G, code, at)], line, frame) for code in codes]
+
+    def _in_units(self, row: TravelRow) -> TravelRow:
+        """A row of lengths in mm in the program's unit."""
+        if self._unit == 1.0:
+            return row
+        lengths = {*AXES, *CENTRES}
+        return TravelRow(
+            [(c, v / self._unit if c in lengths else v, at) for c, v, at in row.words], row.line, row.frame
+        )

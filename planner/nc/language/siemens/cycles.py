@@ -1,0 +1,218 @@
+"""Cycles of Sinumerik controls whose rows are made while the program runs.
+
+    RTP retract plane    RFP reference plane    SDIS distance above it    DP depth, or DPR below the reference plane    DTB dwell
+
+    CYCLE84, CYCLE840   tapping: SDAC, MPIT (size) or PIT (lead), SST and SST1 speed in and out;  SDR, SDAC, ENC, MPIT, PIT
+    CYCLE85             FFR in, RFF out                 CYCLE86   stopped spindle, away by RPA RPO RPAP, rapid out
+    CYCLE87, CYCLE88    spindle stop and M0 on the ground (CYCLE88: after a dwell), rapid out
+    CYCLE89             in and out at the same feed
+    POCKET3             LENG WID CRAD at PA PO, turned by STA    POCKET4    PRAD at PA PO
+        MID most per pass, FAL and FALD allowances at the walls and the bottom, FFP1 and FFD feeds in the plane and of plunging,
+        CDIR 0 climb, 1 conventional, 2 G2, 3 G3, VARI 1 roughing, 2 finishing, and 0, 10, 20: plunge at rapid speed, straight, on a
+        helix (RAD1, DP1), MIDA most between two paths (0: 0.8 tool diameters)
+
+Arguments of later controls behind these (units, modes) change the meaning of the others; they are refused where they are not 0 or left
+out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from planner.nc.language.holes import HolePlan, coarse_lead, dwell, go, tapped
+from planner.nc.language.making import Maker, Making, Row
+from planner.nc.language.milling import HELIX, RAPID, STRAIGHT, PocketPlan, pocket_rows
+from planner.nc.pocket_shapes import PocketShape, RoundedRectangle
+
+_DEPTH = ("RTP", "RFP", "SDIS", "DP", "DPR")
+_CUTTING = ("MID", "FAL", "FALD", "FFP1", "FFD", "CDIR", "VARI", "MIDA", "AP1")
+ARGUMENTS = {
+    "CYCLE84": (*_DEPTH, "DTB", "SDAC", "MPIT", "PIT", "POSS", "SST", "SST1"),
+    "CYCLE840": (*_DEPTH, "DTB", "SDR", "SDAC", "ENC", "MPIT", "PIT"),
+    "CYCLE85": (*_DEPTH, "DTB", "FFR", "RFF"),
+    "CYCLE86": (*_DEPTH, "DTB", "SDIR", "RPA", "RPO", "RPAP", "POSS"),
+    "CYCLE87": (*_DEPTH, "SDIR"),
+    "CYCLE88": (*_DEPTH, "DTB", "SDIR"),
+    "CYCLE89": (*_DEPTH, "DTB"),
+    "POCKET3": ("RTP", "RFP", "SDIS", "DP", "LENG", "WID", "CRAD", "PA", "PO", "STA", *_CUTTING, "AP2", "AD", "RAD1", "DP1"),
+    "POCKET4": ("RTP", "RFP", "SDIS", "DP", "PRAD", "PA", "PO", *_CUTTING, "AD", "RAD1", "DP1"),
+}  # fmt: skip
+POCKETS = ("POCKET3", "POCKET4")
+_OVERLAP = 0.8  # of the tool's diameter between two paths, where MIDA is 0
+_LEFT = 4.0  # SDIR, SDAC: M4
+
+
+def _required(name: str, given: Mapping[str, float], *keys: str) -> None:
+    for key in keys:
+        if key not in given:
+            raise ValueError(f"{name} needs {key}")
+
+
+def _hole(name: str, given: Mapping[str, float]) -> HolePlan:
+    _required(name, given, "RTP", "RFP", "SDIS")
+    if "DP" not in given and "DPR" not in given:
+        raise ValueError(f"{name} needs DP or DPR")
+    top = given["RFP"]
+    bottom = given["DP"] if "DP" in given else top - abs(given["DPR"])
+    found = HolePlan(top + abs(given["SDIS"]), top, bottom, given["RTP"], dwell=given.get("DTB", 0.0))
+    found.check()
+    return found
+
+
+def _lead(given: Mapping[str, float], unit: float) -> float:
+    size, lead = given.get("MPIT", 0.0), given.get("PIT", 0.0)
+    if size and lead:
+        raise ValueError("MPIT and PIT both give the lead; write one of them")
+    return lead or (coarse_lead(abs(size), unit) * (1.0 if size > 0.0 else -1.0) if size else 0.0)
+
+
+def _rigid(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole = _hole("CYCLE84", given)
+    _required("CYCLE84", given, "SST")
+    yield from tapped(making, hole, _lead(given, making.unit), given["SST"], back=given.get("SST1", 0.0))
+    yield go(hole.retract)
+
+
+def _chuck(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole = _hole("CYCLE840", given)
+    lead, speed = _lead(given, making.unit), making.interpreter.state.spindle.speed
+    if lead == 0.0 and speed > 0.0:
+        lead = making.interpreter.state.feed * 60.0 / making.unit / speed  # F and S of the program
+    yield from tapped(making, hole, lead, speed)
+    yield go(hole.retract)
+
+
+def _reamed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole = _hole("CYCLE85", given)
+    _required("CYCLE85", given, "FFR", "RFF")
+    yield go(hole.clear)
+    yield go(hole.bottom, given["FFR"])
+    yield from dwell(hole.dwell)
+    yield go(hole.clear, given["RFF"])
+    yield go(hole.retract)
+
+
+def _drilled(hole: HolePlan, given: Mapping[str, float]) -> Iterator[Row]:
+    if "SDIR" in given:
+        yield [("M", 4.0 if given["SDIR"] == _LEFT else 3.0)]
+    yield go(hole.clear)
+    yield [("G", 1.0), ("Z", hole.bottom)]
+    yield from dwell(hole.dwell)
+
+
+def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole, (x, y, _) = _hole("CYCLE86", given), making.here()
+    away = [given.get(key, 0.0) for key in ("RPA", "RPO", "RPAP")]
+    yield from _drilled(hole, given)
+    yield [("M", 5.0)]
+    yield [("G", 0.0), ("X", x + away[0]), ("Y", y + away[1]), ("Z", hole.bottom + away[2])]
+    yield go(hole.clear)
+    yield [("G", 0.0), ("X", x), ("Y", y), ("Z", hole.retract)]
+
+
+def _stopped(name: str) -> Maker:
+    def rows(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+        hole = _hole(name, given)
+        yield from _drilled(hole, given)
+        yield [("M", 5.0)]
+        yield [("M", 0.0)]
+        yield go(hole.retract)
+
+    return rows
+
+
+def _out_at_feed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    hole = _hole("CYCLE89", given)
+    yield from _drilled(hole, given)
+    yield [("G", 1.0), ("Z", hole.clear)]
+    yield go(hole.retract)
+
+
+def _pocket(name: str) -> Maker:
+    def rows(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+        _required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
+        for key in ("AP1", "AP2", "AD"):
+            if given.get(key):
+                raise ValueError(
+                    f"{key} of {name}, a pocket that is there already, is not read; leave it out"
+                )
+        if making.interpreter.state.normal != 2:
+            raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
+        radius = making.tool_radius()
+        plan = _plan(making, name, given, radius)
+        making.note(
+            f"{name}: passes and allowances are those of the cycle, the single paths this reader's own"
+        )
+        place = complex(given["PA"], given["PO"])
+        return pocket_rows(_shape(name, given, radius), plan, place, given.get("STA", 0.0))
+
+    return rows
+
+
+def _shape(name: str, given: Mapping[str, float], radius: float) -> PocketShape:
+    if name == "POCKET4":
+        _required(name, given, "PRAD")
+        size = given["PRAD"]
+        if size <= 0.0:
+            raise ValueError("PRAD, the radius of POCKET4, is to be above 0")
+        return RoundedRectangle(size, size, size)
+    _required(name, given, "LENG", "WID")
+    corner = given.get("CRAD", 0.0) or radius
+    if min(given["LENG"], given["WID"]) <= 0.0:
+        raise ValueError("LENG and WID of POCKET3 are to be above 0; dimensions from a corner are not read")
+    if corner < radius:
+        raise ValueError(f"the corners of POCKET3 have a radius of {corner:g}; the tool has {radius:g}")
+    a, b = given["LENG"] / 2.0, given["WID"] / 2.0
+    if corner > min(a, b):
+        raise ValueError(f"the corners of POCKET3 have a radius of {corner:g}: more than half its width")
+    return RoundedRectangle(a, b, corner)
+
+
+def _plan(making: Making, name: str, given: Mapping[str, float], radius: float) -> PocketPlan:
+    kind, plunge = round(given["VARI"]) % 10, round(given["VARI"]) // 10
+    if kind not in (1, 2) or plunge not in (0, 1, 2):
+        raise ValueError(f"VARI {given['VARI']:g} of {name} is not read; read are 1, 2, 11, 12, 21 and 22")
+    if plunge == 2 and not (given.get("RAD1", 0.0) > 0.0 and given.get("DP1", 0.0) > 0.0):
+        raise ValueError("plunging on a helix needs RAD1 and DP1, above 0")
+    turn = {0: 1, 1: -1, 2: -1, 3: 1}.get(round(given["CDIR"]))
+    if turn is None:
+        raise ValueError(f"CDIR {given['CDIR']:g} of {name} is none of 0, 1, 2 and 3")
+    if given["CDIR"] in (0.0, 1.0) and making.interpreter.state.spindle.turning < 0:
+        turn = -turn  # climb milling with M4
+    side = given.get("FAL", 0.0)
+    helix = (given.get("RAD1", 0.0), given.get("DP1", 0.0))
+    if plunge == 2 and helix[0] > _shape(name, given, radius).room - radius - side:
+        raise ValueError(f"the helix of RAD1 {helix[0]:g} has no room beside the tool in {name}")
+    return PocketPlan(
+        clear=given["RFP"] + abs(given["SDIS"]),
+        top=given["RFP"],
+        bottom=given["DP"],
+        retract=given["RTP"],
+        radius=radius,
+        infeed=given.get("MID", 0.0),
+        step=given.get("MIDA", 0.0) or _OVERLAP * 2.0 * radius,
+        feed=given["FFP1"],
+        plunge_feed=given.get("FFD", 0.0),
+        finish_feed=given["FFP1"],
+        turning=turn,
+        side=side,
+        floor=given.get("FALD", 0.0),
+        rough=kind == 1,
+        walls=kind == 2,
+        base=kind == 2 and given.get("FALD", 0.0) > 0.0,
+        finish_infeed=given.get("MID", 0.0),
+        plunge=(RAPID, STRAIGHT, HELIX)[plunge],
+        helix=helix,
+    )
+
+
+MAKERS: dict[str, Maker] = {
+    "CYCLE84": _rigid,
+    "CYCLE840": _chuck,
+    "CYCLE85": _reamed,
+    "CYCLE86": _bored,
+    "CYCLE87": _stopped("CYCLE87"),
+    "CYCLE88": _stopped("CYCLE88"),
+    "CYCLE89": _out_at_feed,
+    **{name: _pocket(name) for name in POCKETS},
+}

@@ -1,0 +1,93 @@
+"""What commands ask and set of the way from a program's rows to the interpreter (`rows_through`): frame, compensation, corners."""
+
+from __future__ import annotations
+
+from planner.base.arrays import FloatArray
+from planner.nc.language.approach import Approach, Departure
+from planner.nc.language.corner_moves import CornerMove
+from planner.nc.language.offset_moves import OffsetMoves
+from planner.nc.language.rows_through import RowsThrough
+
+
+class Travel(RowsThrough):
+    """The frame and the compensation in force, and the commands that change them."""
+
+    def position(self) -> FloatArray:
+        """(3,) the programmed position [mm]."""
+        return self.place.copy() if self.active else self.interpreter.state.programmed()
+
+    def radius(self) -> float:
+        """Radius of the loaded tool [mm], 0 where the machine file gives none."""
+        tool = self.interpreter.state.tools.get(self.interpreter.state.tool_loaded)
+        return 0.0 if tool is None else tool.diameter / 2.0
+
+    def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
+        """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
+        self._no_corner()
+        if self.compensated:
+            raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
+        self._begin()
+        self.matrix, self.shift = matrix, shift
+        self.place = self.unmapped(self._mapped)
+
+    def compensate(self, side: int) -> None:
+        """Switch compensation on, to the left (1) or right (-1) of the path, or off (0). Raises ValueError."""
+        self._no_corner()
+        if side == 0:
+            if self._approach is not None:
+                raise ValueError("compensation ends before the first move behind its approach")
+            if self._offset is not None:
+                self._leave()
+            return
+        side = -side if self.mirrored else side
+        if self._approach is not None:
+            return
+        if self._offset is not None:
+            if self._offset.side != side:
+                raise ValueError(
+                    "the side of compensation changes between two moves; switch it off before (R0, G40)"
+                )
+            return
+        radius = self.radius()
+        if radius == 0.0:
+            number = self.interpreter.state.tool_loaded
+            self.interpreter.note(
+                f"tool {number} has no diameter in the machine file: radius compensation does not move the path",
+                0,
+            )
+            return
+        self._begin()
+        self._offset = OffsetMoves(self._mapped, radius, side, self.normal)
+
+    def approach(self, approach: Approach) -> None:
+        """APPR: the contour begins at a point; the way to it is known with its first move. Raises ValueError."""
+        self._no_corner()
+        if self.compensated:
+            raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
+        self._begin()
+        approach.begin(self._mapped, self.mapped(approach.first), self.motion, self.radius(), self.mirrored)
+        approach.scale = self.scale()
+        self._approach = approach
+        self.place, self._mapped = approach.first.copy(), self.mapped(approach.first)
+
+    def corner(self, kind: str, size: float, line: int) -> None:
+        """A rounding or chamfer at the end of the next move, of a size in mm. Raises ValueError."""
+        if self._coming is not None:
+            raise ValueError("a second rounding or chamfer before the next move")
+        self._begin()
+        self._coming = CornerMove(kind, size * self.scale(), line)
+
+    def depart(self, departure: Departure) -> None:
+        """DEP: leave the contour; compensation is off behind it. Raises ValueError."""
+        self._no_corner()
+        if self._offset is None or not self._offset.started:
+            raise ValueError("DEP without a contour with radius compensation (RL, RR) before it")
+        offset, self._offset = self._offset, None
+        rows = offset.finish()
+        departure.scale = self.scale()
+        end = None if departure.end is None else self.mapped(departure.end)
+        out, there = departure.rows(offset, end)
+        self._ahead += [self._in_units(row) for row in (*rows, *out)]
+        self._mapped, self._beside = there, False
+        self.place = self.unmapped(there)
+        self.motion = 1

@@ -40,7 +40,7 @@ from planner.nc.language.tree import (
     Call,
     Expression,
     Line,
-    Made,
+    MadeRows,
     Number,
     Parameter,
     Procedure,
@@ -208,7 +208,7 @@ class HeidenhainParser(Definitions):
                 "nothing may follow the number of RND and CHF; write the feed into the next block", column
             )
         kind = Number(float(CORNERS.index("RND" if rounded else "CHR")))
-        return [Made(block.place, "corner", (("kind", kind), ("size", number)))]
+        return [MadeRows(block.place, "corner", (("kind", kind), ("size", number)))]
 
     def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
         raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")

@@ -1,7 +1,7 @@
 """Faults of the command line in plain words: typer's messages are for programmers, and lack the one hint that helps.
 
 A file where a command belongs (`planner part.nc`) is answered with the command; a misspelt option with the one that is near, not with
-every option that resembles it; a number that is none with what was found.
+every option that resembles it; what is missing with what its help says.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def _plain(fault: Any, options: list[str]) -> None:
         near = difflib.get_close_matches(wrong, options, n=1)
         fault.message = f"no option {wrong}" + (f"; did you mean {near[0]}?" if near else "")
         fault.possibilities = None
-    said = str(fault.message).removeprefix("Value error, ")
+    if type(fault).__name__ == "MissingParameter" and not fault.message:
+        fault.message = getattr(fault.param, "help", None) or ""
+    said = str(fault.message or "").removeprefix("Value error, ")
     if found := _NUMBER.fullmatch(said):
         kind = "a whole number" if "integer" in found.groups() else "a number"
         said = f"give {kind}"

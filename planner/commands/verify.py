@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,7 +21,6 @@ from planner.base.errors import InputError
 from planner.base.names import known_name
 from planner.commands.options import (
     DEFAULT_MACHINE,
-    Job,
     JsonOption,
     QuietOption,
     ToleranceOption,
@@ -45,7 +45,9 @@ def verify_command(
             help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote",
         ),
     ],
-    job: Job,
+    job: Annotated[
+        Path | None, typer.Argument(metavar="JOB", help="NC program (default: the one that TRAJECTORY names)")
+    ] = None,
     machine: Annotated[
         str | None,
         typer.Option(
@@ -81,12 +83,13 @@ def verify_command(
     unjudged = tuple(not_limited or ())
     for name in unjudged:
         known_name("limit", name, NOT_LIMITED_NAMES)
-    if job.suffix[1:].lower() in FORMATS and trajectory.suffix[1:].lower() not in FORMATS:
+    if job is not None and job.suffix[1:].lower() in FORMATS and trajectory.suffix[1:].lower() not in FORMATS:
         raise InputError(f"the trajectory comes first: planner verify {job} {trajectory}")
     trajectory = trajectory_file(trajectory)
     read = read_trajectory(trajectory)
     says = FileSays.of(read.metadata)
     limits, from_file = _machine(machine, trajectory, says)
+    job = says.program_at(trajectory) if job is None else job
     taken = says.tolerance if machine is None and tolerance is None else None
     as_planned = reading == AS_USUAL
     program = read_program(job, limits, says.reading if as_planned else reading)
@@ -147,12 +150,14 @@ class FileSays:
     tolerance   : the tolerance it was planned with [mm], or None
     not_limited : quantities that its plan did not limit
     reading     : how its program was read
+    program     : the file of its program; "<text>" and the like where it had none; None where the file does not say
     """
 
     machine: dict[str, Any] | None
     tolerance: float | None
     not_limited: tuple[str, ...]
     reading: Reading = AS_USUAL
+    program: str | None = None
 
     @classmethod
     def of(cls, metadata: dict[str, Any]) -> FileSays:
@@ -167,7 +172,18 @@ class FileSays:
             if isinstance(free, list)
             else (),
             reading=Reading.saved(metadata.get("reading")),
+            program=name if isinstance(name := metadata.get("program"), str) else None,
         )
+
+    def program_at(self, trajectory: Path) -> Path:
+        """Where the program is that the file names. Raises InputError if it names none, or if that is not there."""
+        from planner.report.export import program_file
+
+        found = None if self.program is None else Path(program_file(trajectory.parent, self.program))
+        if found is None or not os.path.isfile(found):
+            where = "names no program" if found is None else f"names the program {found}, which is not there"
+            raise InputError(f"{where}: planner verify {trajectory} JOB", source=str(trajectory))
+        return found
 
     def sentences(self, machine_taken: bool, tolerance_taken: bool, reading_taken: bool) -> list[str]:
         """What the file says, and whether it was used."""

@@ -98,11 +98,14 @@ def _for_linuxcnc(directory: Path, plan: Plan, tolerance: float) -> Exported:
     else:
         _write(directory / file, chosen.line, plan, LINUXCNC, chosen.mode)
         said = f"{len(chosen.line.feed):,} moves"
+    note = _no_room(plan, tolerance) if room is None else _little_room(room, plan, tolerance)
     return Exported(
         file=file,
         sentence=", ".join(part for part in (chosen.name, said, chosen.mode) if part),
         predicted={one.name: one.time for one in found if np.isfinite(one.time)},
-        note=_no_room(plan, tolerance) if room is None else _little_room(room, plan, tolerance),
+        note=note
+        if len(found) > 1
+        else None,  # a program with its own path mode is written as it is, whatever the room
     )
 
 

@@ -113,6 +113,12 @@ def program_to_keep(plan: Plan) -> dict[str, bytes]:
     return {KEPT_POINTS: points_file(plan.program)} if plan.program.source == SOURCE else {}
 
 
+def program_file(directory: Path, source: str) -> str:
+    """Where a plan's program is: its `source`, or in the plan's directory if it was given as a text or as points."""
+    kept = [directory / name for name in KEPT if (directory / name).exists()]
+    return str(kept[0]) if kept and source.startswith("<") else source
+
+
 def check_places(
     directory: Path,
     inputs: Sequence[Path],

@@ -13,8 +13,8 @@ through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(
 and the range is by `WITHIN` of it narrower and wider, and by `UNREST` of the time, by which a motion searched for again ends elsewhere.
 
 Where the programmed feed and an axis velocity hold together, more of one alone is worth nothing, as in sensitivity/prices.py; where an
-axis can follow only a part of ten per cent more feed, in the direction that the motion has, the least is that part. Where the start's
-motion stays nothing is priced.
+axis can follow only a part of ten per cent more feed, in the direction that the motion has, that part is what counts, and the least is
+twice as far below it: accelerations behind it hold the motion back, too. Where the start's motion stays nothing is priced.
 """
 
 from __future__ import annotations
@@ -119,10 +119,11 @@ class Priced(NamedTuple):
         n = POWER[self.kind]
         return -self.slope / n * (1.0 - self.ratio**-n)
 
-    def saving(self, least: float) -> Saving:
-        """The least and the most of it; of the least no more than what is given."""
-        low, high = sorted((1.0 + sign * WITHIN) * self.saved() for sign in (-1.0, 1.0))
-        return Saving(min(low, least), high)
+    def saving(self, bound: float) -> Saving:
+        """The least and the most of it, where it is at most `bound` [s]."""
+        saved = min(self.saved(), bound)
+        least = 1.0 - (2.0 if bound < self.saved() else 1.0) * WITHIN
+        return Saving(*sorted((least * saved, (1.0 + WITHIN) * saved)))
 
 
 def found_prices(

@@ -5,14 +5,13 @@ over a limit, so that a straight line there foretells a change to r L as
 
     T(r L) - T(L)  =  p (1 - 1/r),
 
-for r < 1 at least that much. For r > 1 the line is led through what 10 % more saves instead: saved (1 - 1/r) / (1 - 1/1.1).
+for r < 1 at least that much. For r > 1 what 10 % more saves is known, and more of it saves ever less where another limit takes over,
+for which the simplest curve through both is taken: with x = 1 - 1/r and d = 1 - 1/1.1
 
-Of the tolerance the price is dT/d(tolerance) = s, and what d = 10 um more save is known. More of it saves ever less, for which the
-simplest curve through both is taken,
+    saved(x)  =  x saved(d)/d (1 + c d) / (1 + c x),      c >= 0 such that its slope at 0 is -p where that is the larger one.
 
-    saved(x)  =  x saved(d)/d (1 + c d) / (1 + c x),      c >= 0 such that its slope at 0 is -s where that is the larger one,
-
-and less of it costs s times the change. Settings without a price have no forecast, and changes at once are added up.
+Of the tolerance the price is dT/d(tolerance) = s, and what d = 10 um more save is known: the same curve in x, so much more of it, and
+less costs s times the change. Settings without a price have no forecast, and changes at once are added up.
 """
 
 from __future__ import annotations
@@ -67,7 +66,15 @@ def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: fl
     share = 1.0 - 1.0 / ratio
     if ratio <= 1.0 or name not in prices.ranges:
         return Forecast(price * share, price * share)
-    part = share / (1.0 - 1.0 / (1.0 + MORE_LIMIT))
+    return _beyond(prices, name, price, share, 1.0 - 1.0 / (1.0 + MORE_LIMIT))
+
+
+def _beyond(prices: PriceList, name: str, slope: float, x: float, known: float) -> Forecast:
+    """By the curve of the module's text, with the slope dT/dx at 0 and what is saved at x = `known`."""
+    saved = prices.saved[name]
+    bend = max(-slope * known / saved - 1.0, 0.0) if saved > 0.0 else 0.0  # c d
+    part = x / known
+    part *= (1.0 + bend) / (1.0 + bend * part)
     least, most = prices.ranges[name]
     return Forecast(-most * part, -least * part)
 
@@ -85,9 +92,4 @@ def _of_tolerance(prices: PriceList, more: float) -> Forecast | None:
     straight = prices.tolerance * more
     if more <= 0.0 or TOLERANCE not in prices.ranges:
         return Forecast(straight, straight)
-    saved = prices.saved[TOLERANCE]
-    bend = max(-prices.tolerance * MORE_TOLERANCE / saved - 1.0, 0.0) if saved > 0.0 else 0.0  # c d
-    part = more / MORE_TOLERANCE
-    part *= (1.0 + bend) / (1.0 + bend * part)
-    least, most = prices.ranges[TOLERANCE]
-    return Forecast(-most * part, -least * part)
+    return _beyond(prices, TOLERANCE, prices.tolerance, more, MORE_TOLERANCE)

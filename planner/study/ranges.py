@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from planner.study.settings import Setting, known_setting, parse_value, unit_of
 LINEAR, LOG = "lin", "log"
 POINTS_MAX = 1_000_000  # of a grid: a slip of the keyboard, not a sweep
 DIGITS = 9  # significant, of a value between the ends: 0.05 rather than 0.05000000000000001
+
+
+_DASHED = re.compile(r"\s*[\d.]+\s*(-|\.\.)\s*[\d.]+\s*")  # a range as one might write it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +44,8 @@ def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
         )
     name = known_setting(name.strip(), machine)
     unit = unit_of(name, machine)
+    if _DASHED.fullmatch(said):
+        raise InputError(f"{text}: for a range write FIRST:LAST:COUNT, for single values A,B,C")
     if ":" not in said:
         values = [parse_value(name, value, machine, tolerance) for value in said.split(",")]
         return Varied(name=name, values=tuple(dict.fromkeys(values)), unit=unit)

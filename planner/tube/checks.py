@@ -76,6 +76,18 @@ def _of_limits(keeps, r, h, v, a, j):
     return max(worst, np.sqrt(max(best, _at(v, a, j, at)[0])) / keeps.feed[r])
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def normal_shares(keeps, leg, h, state, jerk):
+    """(N,) the largest share of the normal acceleration's limit in every step; leg (N,), h (N,), state (N+1, 3, A), jerk (N, A)."""
+    shares = np.zeros(len(leg))
+    for i in range(len(leg)):
+        for n in range(PLACES):
+            square, _, across = _at(state[i, 1], state[i, 2], jerk[i], h[i] * n / (PLACES - 1))
+            if square > 0.0 and across > 0.0:
+                shares[i] = max(shares[i], np.sqrt(across / square) / keeps.normal[leg[i]])
+    return shares
+
+
 @njit(cache=True, error_model="numpy")
 def _apart(c, point, tangent, far):
     """Distance of c (A,) from the point (A,) `far` along a tangent (A,) from another."""
@@ -153,7 +165,7 @@ def _of_line(keeps, r, c, s0, end, known, budgets, work):
     return worst, s
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def worst_shares(keeps, leg, h, state, jerk, place):
     """The largest share of a limit, and of the tolerance, in N steps.
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
@@ -31,6 +32,32 @@ LONGEST, MOST_FOR_LENGTH = 8.0, 30
 ARC_STEP = 0.8
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
+
+
+class Cut(Protocol):
+    """A motion cut into steps: what is read of a `Guess` and of what becomes of it."""
+
+    @property
+    def leg(self) -> Array:
+        """(N,) leg of each step."""
+        ...
+
+    @property
+    def h(self) -> FloatArray:
+        """(N,) duration [s]."""
+        ...
+
+    @property
+    def state(self) -> FloatArray:
+        """(N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]."""
+        ...
+
+    @property
+    def place(self) -> FloatArray:
+        """(N, 4) places of the control points along the run [mm]."""
+        ...
+
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

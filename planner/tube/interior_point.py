@@ -31,10 +31,9 @@ FREEZE, FROZEN = 1.5, 1e4
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two starts of the bracket all
 # of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
 PREDICTED = 0.3
-# By how much a row may be broken at the end [-], and how far the slack of an active one (z > s) may be off: limits are narrowed by more
-# than that (problem.py). Slacks of the others follow no more closely than the tangents that are kept.
-MISSED = 1e-6
-OFF = 1e-10  # largest gap of the kinematics at the end, in mean steps [-]: hundreds of steps add theirs up, and velocity to position
+# Largest gap of the kinematics at the end, in mean steps, against what rows may be missed by [-]: hundreds of steps add theirs up, and
+# velocity to position.
+OFF = 1e-4
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 100  # 20 to 60 are the rule
 
@@ -45,6 +44,9 @@ class Tuning(NamedTuple):
     pull: float  # weight of ((h - guess)/guess)^2, against a mean step's time
     prox: float  # the same of the change in one iteration
     gap: float  # complementarity at the end, share of the time
+    # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off: limits are narrowed by more
+    # than that (problem.py). Slacks of the others follow no more closely than the tangents that are kept.
+    missed: float
 
 
 class Slacks(NamedTuple):
@@ -109,7 +111,7 @@ def _predicted(on, slacks, along, dual, second):
     return left
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def solve(legs, limits, x, u, place, tuning):
     """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns whether it has been
     reached, the iterations, and the multipliers (N, R) of the rows, in units of time."""
@@ -148,7 +150,7 @@ def solve(legs, limits, x, u, place, tuning):
         settled = settled or products <= 2.0 * tuning.gap * time
         if settled:
             prox = min(prox * FREEZE, FROZEN)
-            if max(broken, missed) <= MISSED and np.abs(gap).max() <= OFF:
+            if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF * tuning.missed:
                 return True, iteration, z
         if not products <= LOST * time or not factorise(
             x, u, legs, limits, lin, z, ratio, tuning.pull + prox, factor

@@ -45,6 +45,8 @@ class TubeSolution:
     sentence   : the same for a reader, with what to do about a failure
     iterations : of the solver
     solve_time : [s]
+    windows    : into which the own solver cut the run, joins included; 0 of other solvers
+    solved     : of these, how many converged and kept everything without being divided
     steps      : the motion, exact and within all limits
     place      : (N+1,) places of the nodes along the run [mm]
     kept       : (N,) steps that stand for the motion of the start, which stays there; None for none
@@ -56,6 +58,8 @@ class TubeSolution:
     sentence: str
     iterations: int
     solve_time: float
+    windows: int = 0
+    solved: int = 0
     steps: Steps | None = None
     place: FloatArray | None = None
     kept: Array | None = None

@@ -1,22 +1,25 @@
 """The free optimum by an own solver: window by window along a run, each by the interior-point method of interior_point.py.
 
-A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join exactly. They overlap:
-each begins inside the one before, where that has found its optimum. A window that does not converge, that breaks something when its
-steps are integrated and looked at exactly (checks.py) is divided; what is left of that keeps the motion that the search began with, and
-is said.
+A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join exactly. The first windows
+lie end to end; those of the second sweep each reach over one join, from inside one window to inside the next, where these have found
+their optimum. Windows of a sweep have no step in common: they are searched side by side, and what they find is the same for any number
+of threads. A window that does not converge, that breaks something when its steps are integrated and looked at exactly (checks.py) is
+divided; what is left of that keeps the motion that the search began with, and is said.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
-from planner.tube.checks import Keeps, worst_shares
+from planner.tube.checks import Keeps, normal_shares, worst_shares
 from planner.tube.guess import Guess
 from planner.tube.interior_point import Tuning, solve
 from planner.tube.motion import Steps, closed, integrated
@@ -27,15 +30,21 @@ from planner.tube.problem import Window, window_of
 from planner.tube.rows import Legs
 from planner.tube.run import TubeRun
 
-# Steps of a window, of its overlap with the next one, and of the smallest part that one which fails is divided into.
-WINDOW, OVERLAP, LEAST = 1000, 150, 60
+# Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
+# divided into.
+WINDOW, OVERLAP, LEAST = 1500, 120, 60
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
 JOIN_WITHIN = 40
 # What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do not converge with the
-# first do with the second (pentagon on mill), and the other way round.
-PROX = 0.1, 1.0
+# first do with the second (pentagon on mill), and the other way round. By how much rows may be missed at the end [-]: on some windows
+# with arcs they keep trembling by 1e-5.
+TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
+# Normal acceleration is watched in two places of a step only. Where it is above its limit between them, the limit is lowered by what it
+# was above, and a little more [-], at most so many times.
+TIGHTENED, TIGHTER = 3, 1.002
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
+Tries = tuple[tuple[float, float], ...]
 KEPT = "no faster motion was found there"
 FOUND = "the best motion near its start, geometry and feed together"
 
@@ -61,14 +70,18 @@ class TubeOwn:
                 sentence="the search did not end faster than its start",
                 iterations=search.iterations,
                 solve_time=took,
+                windows=search.windows,
+                solved=search.solved,
             )
-        share = float(search.guess.h[search.kept].sum() / guess.h.sum())
+        share = float(guess.h[search.kept].sum() / guess.h.sum())
         sentence = FOUND if not share else f"{FOUND}; on {share:.2g} of the time {KEPT}"
         return TubeSolution(
             status=Status.ACCEPTABLE if share else Status.OPTIMAL,
             sentence=sentence,
             iterations=search.iterations,
             solve_time=took,
+            windows=search.windows,
+            solved=search.solved,
             steps=search.steps(),
             place=search.places(),
             kept=search.kept,
@@ -76,27 +89,43 @@ class TubeOwn:
         )
 
 
+class _Cut:
+    """The steps of a guess (guess.py) while they are searched: arrays that windows write into, each its own steps."""
+
+    def __init__(self, guess: Guess):
+        self.leg, self.h, self.state, self.place = (
+            guess.leg,
+            guess.h.copy(),
+            guess.state.copy(),
+            guess.place.copy(),
+        )
+
+    def __len__(self) -> int:
+        return len(self.h)
+
+
 class _Search:
     """A run on its way from a guess to the optimum near it."""
 
     def __init__(self, settings: TubeOwn, run: TubeRun, guess: Guess):
-        self.settings, self.run, self.guess = settings, run, guess
+        self.settings, self.run, self.guess = settings, run, _Cut(guess)
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
         self.price = np.zeros((len(guess), columns(len(run.axis))))
-        self.iterations = 0
+        self.iterations, self.windows, self.solved = 0, 0, 0
         self._keeps = keeps_of(run)
         self._strain = _strain(run, guess)
+        self._stopped = False
 
     def sweep(self) -> None:
-        """All windows, one after the other."""
-        lo, steps = 0, len(self.guess)
-        while True:
-            hi = steps if steps - lo <= WINDOW + OVERLAP else self._join(lo + WINDOW)
-            self._improve(lo, hi)
-            if hi == steps:
-                return
-            lo = self._join(hi - OVERLAP)
+        """All windows, and then all joins."""
+        steps = len(self.guess)
+        even = np.linspace(0, steps, max(int(np.ceil(steps / WINDOW)), 1) + 1).astype(int)
+        joins = [self._join(int(near)) for near in even[1:-1]]
+        self._side_by_side([0, *joins], [*joins, steps])
+        self._side_by_side(
+            [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
+        )
 
     def steps(self) -> Steps:
         """The steps; those that are kept as they were guessed."""
@@ -107,55 +136,90 @@ class _Search:
         """(N+1,) of the nodes along the run [mm]."""
         return np.append(self.guess.place[:, 0], self.run.offset[-1])
 
+    def _side_by_side(self, begin: list[int], end: list[int]) -> None:
+        """The windows from `begin` to `end`, no two of which have a step in common."""
+
+        def improve(lo: int, hi: int, count: list[int]) -> None:
+            count[0] = self._improve(lo, hi, count)
+
+        counts = [[0, 0] for _ in begin]  # of windows: solved at once, iterations
+        work = [partial(improve, *one) for one in zip(begin, end, counts, strict=True)]
+        if len(work) > 1:
+            side_by_side(work, self._stop, lambda: None)
+        else:
+            for one in work:
+                one()
+        self.windows += len(counts)
+        self.solved += sum(count[0] for count in counts)
+        self.iterations += sum(count[1] for count in counts)
+
+    def _stop(self) -> None:
+        """Begin no other window."""
+        self._stopped = True
+
     def _join(self, near: int) -> int:
         """A node to join windows at."""
-        begin = near - JOIN_WITHIN
+        begin = max(near - JOIN_WITHIN, 0)
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
-    def _improve(self, lo: int, hi: int, costs: tuple[float, ...] = PROX) -> None:
-        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found."""
-        if self._improved(lo, hi, costs) or hi - lo < 2 * LEAST:
-            return
+    def _improve(self, lo: int, hi: int, count: list[int], tries: Tries = TRIES) -> bool:
+        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found.
+        Whether it did not fail; count[1] takes the iterations."""
+        if self._improved(lo, hi, count, tries):
+            return True
+        if hi - lo < 2 * LEAST:
+            return False
         middle = (lo + hi) // 2
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
         middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
         before = float(self.guess.h[lo:hi].sum())
-        self._improve(lo, middle, PROX[:1])
-        self._improve(middle, hi, PROX[:1])
+        self._improve(lo, middle, count, TRIES[:1])
+        self._improve(middle, hi, count, TRIES[:1])
         if self.guess.h[lo:hi].sum() < before:
-            self._improved(lo, hi, costs)
-
-    def _improved(self, lo: int, hi: int, costs: tuple[float, ...]) -> bool:
-        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `costs` (PROX); if it is faster it takes their
-        place."""
-        for prox in costs:
-            window = window_of(self.run, self.guess, lo, hi)
-            x, u, place = window.x, window.u, window.place
-            tuning = Tuning(PULL, prox, self.settings.gap)
-            done, iterations, z = solve(window.legs, window.limits, x, u, place, tuning)
-            self.iterations += iterations
-            if done and self._taken(lo, hi, window):
-                self.price[lo:hi] = step_prices(window, z)
-                return True
+            self._improved(lo, hi, count, tries)
         return False
 
-    def _taken(self, lo: int, hi: int, window: Window) -> bool:
-        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place."""
-        run, axes = self.run, len(self.run.axis)
+    def _improved(self, lo: int, hi: int, count: list[int], tries: Tries) -> bool:
+        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it takes their place."""
+        watched = bool(np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any())
+        for prox, missed in tries:
+            tight = np.ones(hi - lo)
+            for _ in range(TIGHTENED if watched else 1):
+                if self._stopped:
+                    return False
+                window = window_of(self.run, self.guess, lo, hi, missed, tight)
+                tuning = Tuning(PULL, prox, self.settings.gap, missed)
+                done, iterations, z = solve(
+                    window.legs, window.limits, window.x, window.u, window.place, tuning
+                )
+                count[1] += iterations
+                if not done:
+                    break
+                if self._taken(lo, hi, window, tight):
+                    self.price[lo:hi] = step_prices(window, z)
+                    return True
+                if not (tight > 1.0).any():
+                    break
+        return False
+
+    def _taken(self, lo: int, hi: int, window: Window, tight: FloatArray) -> bool:
+        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place.
+        Where their normal acceleration is above its limit, `tight` (hi - lo,) grows."""
+        run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
-        state, leg = self.guess.state[lo : hi + 1], self.guess.leg[lo:hi]
+        state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
         jerk = closed(state[0], state[-1], h, window.u[:, :axes] * (window.length / window.second**3))
         found = integrated(state[0], h, jerk)
         found[-1] = state[-1]
         place = window.place * window.length
         limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
         if not (limit <= 1.0 + ROUNDING and tube <= 1.0):
+            across = normal_shares(self._keeps, leg, h, found, jerk)
+            tight *= np.where(across > 1.0, across * TIGHTER, 1.0)
             return False
-        if h.sum() < self.guess.h[lo:hi].sum():
-            along, whole_h, whole = (getattr(self.guess, name).copy() for name in ("place", "h", "state"))
-            along[lo:hi, :3] = place + run.offset[leg][:, None]
-            whole_h[lo:hi], whole[lo : hi + 1], self.jerk[lo:hi] = h, found, jerk
-            self.guess = replace(self.guess, h=whole_h, state=whole, place=along)
+        if h.sum() < guess.h[lo:hi].sum():
+            guess.place[lo:hi, :3] = place + run.offset[leg][:, None]
+            guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False
         return True
 

@@ -8,14 +8,14 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.tube import rows
-from planner.tube.guess import Guess
+from planner.tube.guess import Cut
 from planner.tube.nlp import LONGER, LONGER_WATCHED
 from planner.tube.numbers import ROUNDING, pace
 from planner.tube.rows import Legs, StepLimits
 from planner.tube.run import TubeRun
 
-# Limits are narrowed by this fraction [-], so that what a row may be missed by and the closing jerks stay inside them.
-NARROWED = 2e-6
+# Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks stay inside them.
+NARROWED = 2.0
 # Of the largest length of a step on an arc [-]: h (v + a h/2) stands for it, which leaves out h3 j/6.
 STEP_SHARE = 0.95
 
@@ -32,8 +32,14 @@ class Window(NamedTuple):
     length: float  # unit of length [mm]
 
 
-def window_of(run: TubeRun, guess: Guess, lo: int, hi: int) -> Window:
-    """The steps lo .. hi - 1 of a guess, in the units of their mean."""
+def window_of(
+    run: TubeRun, guess: Cut, lo: int, hi: int, missed: float, tight: FloatArray | None = None
+) -> Window:
+    """The steps lo .. hi - 1 of a guess, in the units of their mean.
+
+    missed : by how much rows may be missed at the end [-]
+    tight  : (hi - lo,) by what the limit of the normal acceleration is divided [-], >= 1; None for 1
+    """
     part, leg = slice(lo, hi), guess.leg[lo:hi]
     state, h = guess.state[lo : hi + 1], guess.h[part]
     second = float(h.mean())
@@ -53,7 +59,7 @@ def window_of(run: TubeRun, guess: Guess, lo: int, hi: int) -> Window:
     place = (guess.place[part, :3] - run.offset[leg][:, None]) / length
     return Window(
         legs=legs,
-        limits=_limits(run, guess, lo, hi, (second, length)),
+        limits=_limits(run, guess, lo, hi, (second, length), (missed, tight)),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
         place=np.ascontiguousarray(place),
@@ -62,8 +68,15 @@ def window_of(run: TubeRun, guess: Guess, lo: int, hi: int) -> Window:
     )
 
 
-def _limits(run: TubeRun, guess: Guess, lo: int, hi: int, units: tuple[float, float]) -> StepLimits:
-    """What the steps lo .. hi - 1 keep, in the units of time [s] and length [mm]."""
+def _limits(
+    run: TubeRun,
+    guess: Cut,
+    lo: int,
+    hi: int,
+    units: tuple[float, float],
+    narrow: tuple[float, FloatArray | None],
+) -> StepLimits:
+    """What the steps lo .. hi - 1 keep, in the units of time [s] and length [mm]; narrowed as in `window_of`."""
     second, length = units
     speed, acc, jerk = length / second, length / second**2, length / second**3
     leg = guess.leg[lo:hi]
@@ -77,7 +90,9 @@ def _limits(run: TubeRun, guess: Guess, lo: int, hi: int, units: tuple[float, fl
     fastest, strongest = np.linalg.norm(run.velocity), np.linalg.norm(run.acceleration)
     feed = np.minimum(run.feed[leg], fastest)
     normal = np.minimum(run.across_max[leg], strongest)
-    inside = 1.0 - NARROWED
+    inside = 1.0 - NARROWED * narrow[0]
+    if narrow[1] is not None:
+        normal = normal / narrow[1]
     axes = np.stack([run.jerk / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed])
     h = guess.h[lo:hi] / second
     longer = LONGER_WATCHED if np.isfinite(run.across_max[leg]).any() else LONGER

@@ -25,6 +25,8 @@ JOB = "G21 F3000\nG1 X10\nY5\n"
         (["verify", "part.nc", "t.csv"], "the trajectory comes first: planner verify t.csv part.nc"),
         (["verify", "nowhere", "part.nc"], "nowhere: trajectory file not found"),
         (["export", "nowhere", "--for", "pvt", "-o", "x"], "nowhere: trajectory file not found"),
+        (["pulses", "nowhere"], "Missing option '--steps'. "),
+        (["sweep", "part.nc", "-o", "x"], "Missing option '--vary'. "),
         (["report", "nowhere"], "nowhere: give the directory that 'plan -o' wrote"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -59,8 +61,14 @@ def test_commands_of_trajectories_take_the_directory_of_a_plan(tmp_path: Path) -
     assert run("plan", tmp_path / "part.nc", "--method", "stop", "-o", out).exit_code == 0
     assert "passed" in run("verify", out, tmp_path / "part.nc").output
     assert run("pulses", out, "--steps", "x=100,y=100").exit_code == 0
+    alone = run("verify", out)
+    assert alone.exit_code == 0, alone.output
+    (tmp_path / "part.nc").unlink()
+    lost = run("verify", out)
+    assert lost.exit_code == 2
+    assert "which is not there: planner verify" in lost.output
     (tmp_path / "empty").mkdir()
-    done = run("verify", tmp_path / "empty", tmp_path / "part.nc")
+    done = run("verify", tmp_path / "empty", out / "planned.ngc")
     assert done.exit_code == 2
     assert "no trajectory in this directory" in done.output
 

@@ -148,6 +148,7 @@ def test_a_path_mode_of_the_program_stays(mode: str, tmp_path: Path) -> None:
     assert made.sentence == "program as it is, with its own path mode, its own geometry and words"
     assert (tmp_path / "linuxcnc.ngc").read_bytes() == text.encode()
     assert made.predicted == {}
+    assert made.note is None
 
 
 def test_programs_of_another_dialect_are_written_as_moves(tmp_path: Path) -> None:

@@ -59,6 +59,7 @@ def test_commands_take_the_directory(kind: str, tmp_path: Path) -> None:
     for words in (
         ["report", out],
         ["verify", out, kept],
+        ["verify", out],
         ["info", kept],
         ["export", out, "--for", "klipper", "-o", tmp_path / "klipper", "--tolerance", "0.05"],
         ["export", out, "--for", "linuxcnc", "-o", tmp_path / "linuxcnc"],

@@ -70,6 +70,8 @@ def test_values(text: str, name: str, values: tuple[float, ...]) -> None:
     [
         ("tolerance", "write a name and a range"),
         ("tolerance=1:2", "write FIRST:LAST:COUNT"),
+        ("tolerance=0.01-0.05", "for a range write FIRST:LAST:COUNT"),
+        ("tolerance=0.01..0.05", "for a range write FIRST:LAST:COUNT"),
         ("tolerance=1:2:3:4", "write FIRST:LAST:COUNT"),
         ("tolerance=1:2:0", "'0' values"),
         ("tolerance=0:2:3:log", "must be positive"),

@@ -7,14 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks import never_slower, problems
+from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
 from planner.methods.optimal import OptimalMethod
 from planner.methods.tube import TubeMethod
 from planner.motion.vertex_times import passing_times
 from planner.nc.reader import parse_program
 from planner.tube import own, rows
-from planner.tube.checks import worst_shares
+from planner.tube.checks import normal_shares, worst_shares
 from planner.tube.guess import Guess, guess_from
 from planner.tube.motion import integrated
 from planner.tube.nlp import TubeNLP
@@ -29,6 +30,7 @@ CORNER = problems.polyline([[0, 0], [4, 0], [4, 4]])
 ARCS = parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n")
 # Both solvers leave a share of 1e-5 to 1e-4 of complementarity, and ipopt keeps the feed at Bezier ordinates of the velocity [-].
 SAME = {"corner": 2e-4, "arcs": 2e-4, "pentagon": 2e-4}
+MISSED = own.TRIES[0][1]
 
 
 @cache
@@ -68,7 +70,7 @@ def linear_of(window, x, u):
 @pytest.mark.parametrize("name", ["corner", "arcs"])
 def test_slopes_are_the_differences_of_the_rows(name):
     """Of all rows whose vector is what moves; the radii of the feed are kept, and so are the tangents of order and arcs."""
-    window = window_of(*begun(name), 0, len(begun(name)[1]))
+    window = window_of(*begun(name), 0, len(begun(name)[1]), MISSED)
     x, u = window.x.copy(), window.u.copy()
     rng = np.random.default_rng(2)
     dx, du = 1e-6 * rng.normal(size=x.shape), 1e-6 * rng.normal(size=u.shape)
@@ -87,7 +89,7 @@ def test_slopes_are_the_differences_of_the_rows(name):
 
 def test_rows_of_the_feed_are_its_bernstein_coefficients():
     """|y| <= r where the coefficient of the squared feed is no more than F^2: their differences agree."""
-    window = window_of(*begun("corner"), 0, len(begun("corner")[1]))
+    window = window_of(*begun("corner"), 0, len(begun("corner")[1]), MISSED)
     axes = window.u.shape[1] - 1
     rng = np.random.default_rng(3)
     for _ in range(20):
@@ -109,7 +111,7 @@ def test_rows_of_the_feed_are_its_bernstein_coefficients():
 
 def test_the_recursion_solves_the_system_of_all_steps():
     """Against the dense system of optimality conditions, with the last node's gap weighted as in the recursion."""
-    window = window_of(*begun("corner"), 0, 12)
+    window = window_of(*begun("corner"), 0, 12, MISSED)
     x, u, limits = window.x, window.u, window.limits
     (steps, controls), states = u.shape, x.shape[1]
     lin, rng = linear_of(window, x, u), np.random.default_rng(4)
@@ -187,13 +189,14 @@ def test_ipopt_finds_the_same(name):
 def test_windows_find_what_the_whole_run_finds(monkeypatch):
     run, guess = begun("pentagon")
     whole = TubeOwn().solve(run, guess)
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 3)
-    monkeypatch.setattr(own, "OVERLAP", len(guess) // 8)
+    monkeypatch.setattr(own, "WINDOW", len(guess) // 2)
+    monkeypatch.setattr(own, "OVERLAP", len(guess) // 5)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     parts = TubeOwn().solve(run, guess)
+    assert (whole.windows, parts.windows) == (1, 3)  # two, and the join
     assert parts.steps is not None
     assert whole.steps is not None
-    assert parts.steps.h.sum() == pytest.approx(whole.steps.h.sum(), rel=5e-4)
+    assert parts.steps.h.sum() == pytest.approx(whole.steps.h.sum(), rel=2e-4)
     for name, tiny in (("position", 1e-9), ("velocity", 1e-8), ("acceleration", 1e-6)):  # joins do not jump
         found = parts.steps
         state = np.stack([found.position, found.velocity, found.acceleration], axis=1)
@@ -202,6 +205,45 @@ def test_windows_find_what_the_whole_run_finds(monkeypatch):
         )
         column = ("position", "velocity", "acceleration").index(name)
         np.testing.assert_allclose(ends[:-1, column], state[1:, column], atol=tiny)
+
+
+def test_any_number_of_threads_finds_the_same_bytes(monkeypatch):
+    run, guess = begun("pentagon")
+    monkeypatch.setattr(own, "WINDOW", len(guess) // 3)
+    monkeypatch.setattr(own, "OVERLAP", len(guess) // 7)
+    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
+    found = []
+    for count in (1, 3):
+        use_threads(count)
+        try:
+            found.append(TubeOwn().solve(run, guess))
+        finally:
+            use_threads(None)
+    one, three = found
+    assert one.windows == 5
+    assert (one.iterations, one.solved) == (three.iterations, three.solved)
+    for name in ("h", "position", "velocity", "acceleration", "jerk"):
+        assert getattr(one.steps, name).tobytes() == getattr(three.steps, name).tobytes()
+
+
+def test_normal_acceleration_between_its_places_is_lowered_and_solved_again(monkeypatch):
+    """Watched in the middle and at the nodes alone it is too large between them; what is taken then keeps it everywhere."""
+    program, machine = never_slower.job(40)
+    toolpath = toolpath_from_program(program, machine)
+    (run,) = tube_runs_of(toolpath, machine)
+    assert np.isfinite(run.across_max).any()
+    seen = OptimalMethod(corner="bezier").plan(program, machine).trajectory
+    times = np.maximum.accumulate(passing_times(seen, toolpath))
+    times[-1] = seen.t[-1]
+    guess = guess_from(run, seen, times[run.first])
+    again = TubeOwn().solve(run, guess)
+    monkeypatch.setattr(own, "TIGHTENED", 1)
+    once = TubeOwn().solve(run, guess)
+    assert (once.solved, again.solved) == (0, 1)
+    found = again.steps
+    state = np.stack([found.position, found.velocity, found.acceleration], axis=1)
+    state = np.concatenate([state, [[run.vertex[-1], np.zeros(len(run.axis)), np.zeros(len(run.axis))]]])
+    assert normal_shares(own.keeps_of(run), guess.leg, found.h, state, found.jerk).max() <= 1.0
 
 
 def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):

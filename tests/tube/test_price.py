@@ -23,10 +23,11 @@ from planner.tube.shares import shares
 MACHINE = problems.machine()
 PROGRAMS = {
     "line": problems.polyline([[0, 0], [4, 0]], feed=1e4),
+    "long line": problems.polyline([[0, 0], [20, 0]], feed=1e4),
     "corner": problems.polyline([[0, 0], [4, 0], [4, 4]]),
     "arcs": parse_program("G21 G17 G90 F4800\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n"),
 }
-LENGTH, VELOCITY, ACCELERATION, JERK = 4.0, 100.0, 2000.0, 2e5  # of the line and of problems.machine [mm, s]
+VELOCITY, ACCELERATION, JERK = 100.0, 2000.0, 2e5  # of problems.machine [mm, s]
 
 
 class Searched(NamedTuple):
@@ -63,17 +64,25 @@ def searched(name: str) -> Searched:
     return found(run, first.guess.slower(1.03))  # from where the searches with other limits begin, too
 
 
-def test_a_line_at_full_acceleration_has_the_prices_of_its_closed_form():
-    """T = a/j + sqrt((a/j)^2 + 4 L/a) from rest to rest where velocity does not limit: dT/d(ln j) and dT/d(ln a)."""
-    ramp, root = ACCELERATION / JERK, np.sqrt((ACCELERATION / JERK) ** 2 + 4 * LENGTH / ACCELERATION)
-    one = searched("line")
-    assert one.time == pytest.approx(ramp + root, rel=2e-4)
-    by_jerk = -ramp - ramp**2 / root
-    by_acceleration = ramp + (ramp**2 - 2 * LENGTH / ACCELERATION) / root
-    np.testing.assert_allclose(
-        one.of_axes()[:, 0], [by_jerk, by_acceleration, 0.0], rtol=5e-3, atol=1e-5 * one.time
-    )
-    assert abs(one.of(price.ROOM)) < 1e-5 * one.time
+@pytest.mark.parametrize("name", ["line", "long line"])
+def test_lines_have_the_prices_of_their_closed_forms(name):
+    """From rest to rest: T = a/j + sqrt((a/j)^2 + 4 L/a) where velocity does not limit, T = L/v + v/a + a/j where it does."""
+    v, a, j = VELOCITY, ACCELERATION, JERK
+    root = np.sqrt((a / j) ** 2 + 4 * 4.0 / a)
+    time, by_jerk, by_acceleration, by_velocity = {
+        "line": (
+            a / j + root,
+            -(a / j) - (a / j) ** 2 / root,
+            a / j + ((a / j) ** 2 - 2 * 4.0 / a) / root,
+            0.0,
+        ),
+        "long line": (20.0 / v + v / a + a / j, -a / j, a / j - v / a, v / a - 20.0 / v),
+    }[name]
+    one = searched(name)
+    assert one.time == pytest.approx(time, rel=2e-4)
+    told = one.of_axes()[:, 0]
+    np.testing.assert_allclose(told, [by_jerk, by_acceleration, by_velocity], rtol=5e-3, atol=1e-4 * time)
+    assert abs(one.of(price.ROOM)) < 1e-5 * time
 
 
 @pytest.mark.parametrize("name", PROGRAMS)

@@ -35,7 +35,7 @@ KINDS = ("LT", "LN", "CT", "LCT")
 
 
 @dataclass
-class Way:
+class ContourWay:
     """What an APPR or DEP block gives.
 
     kind          : one of KINDS
@@ -111,7 +111,7 @@ class Way:
 
 
 @dataclass
-class Approach(Way):
+class Approach(ContourWay):
     """APPR, waiting for the first move of its contour.
 
     first       : (3,) the first contour point, in the program's coordinates [mm]
@@ -165,7 +165,7 @@ class Approach(Way):
 
 
 @dataclass
-class Departure(Way):
+class Departure(ContourWay):
     """DEP. end : (3,) of LCT and of the tool axis in the program's coordinates [mm], or None; raised : its Z was given."""
 
     end: FloatArray | None = None

@@ -34,7 +34,7 @@ from planner.nc.language.tree import (
     Language,
     Line,
     Loop,
-    Made,
+    MadeRows,
     Message,
     Modes,
     Named,
@@ -294,7 +294,7 @@ class _Function:
         place = tuple(turning.place)
         self.blocks.put(f"run.turning({turning.action!r},{turning.letters!r},{place!r})", turning.place)
 
-    def _made(self, made: Made) -> None:
+    def _made(self, made: MadeRows) -> None:
         given = "".join(f"({name!r},{self.say.value(value)})," for name, value in made.given)
         self.blocks.put(f"run.made({made.maker!r},({given}),{tuple(made.place)!r})", made.place)
 
@@ -313,5 +313,5 @@ _WRITE: dict[type, Callable[..., None]] = {
     Message: _Function._message,
     Modes: _Function._modes,
     Turning: _Function._turning,
-    Made: _Function._made,
+    MadeRows: _Function._made,
 }

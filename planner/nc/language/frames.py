@@ -26,7 +26,7 @@ from planner.nc.language.making import Making, Row
 
 AXES = "XYZ"
 SIEMENS = ("TRANS", "ROT", "SCALE", "MIRROR")  # by `kind`; + ADDED for A...
-ADDED = 10
+ADDED = 10  # more than the indices in SIEMENS
 
 
 def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.language.making import Making, Row, steps
+from planner.nc.language.making import Making, Row, equal_steps
 
 _COARSE = {
     3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 7: 1.0, 8: 1.25, 9: 1.25, 10: 1.5, 11: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5,
@@ -47,7 +47,7 @@ def go(z: float, feed: float | None = None) -> Row:
     return [("G", 0.0), ("Z", z)] if feed is None else [("G", 1.0), ("F", feed), ("Z", z)]
 
 
-def dwell(seconds: float) -> Iterator[Row]:
+def dwell_rows(seconds: float) -> Iterator[Row]:
     """A dwell, if it is one."""
     if seconds > 0.0:
         yield [("G", 4.0), ("P", seconds)]
@@ -114,7 +114,7 @@ class Pecks:
         least = self.least if self.less > 0.0 else step
         if least <= 0.0:
             raise ValueError("the least of decreasing infeeds is to be above 0")
-        steps(depth, least)
+        equal_steps(depth, least)
         found: list[float] = []
         while not found or found[-1] < depth:
             found.append(min((found[-1] if found else 0.0) + step, depth))
@@ -129,7 +129,7 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
     yield go(hole.clear)
     broken, done = 0, 0.0
     for k, deep in enumerate(depths):
-        for part in range(1, steps(deep - done, pecks.chip)):
+        for part in range(1, equal_steps(deep - done, pecks.chip)):
             yield go(hole.top - done - part * pecks.chip, hole.feed)
             yield go(hole.top - done - part * pecks.chip + pecks.back)
         yield go(hole.top - deep, hole.feed)
@@ -142,10 +142,10 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
             continue
         broken = 0
         yield go(hole.clear)
-        yield from dwell(pecks.above)
+        yield from dwell_rows(pecks.above)
         gap = pecks.ahead[0] + (pecks.ahead[1] - pecks.ahead[0]) * k / max(len(depths) - 2, 1)
         yield go(min(hole.top - deep + gap, hole.clear))
-    yield from dwell(hole.dwell)
+    yield from dwell_rows(hole.dwell)
 
 
 def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turning: int) -> Iterator[Row]:
@@ -160,7 +160,7 @@ def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turni
             f"a helix of radius {size:.6g} leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
         )
     x, y, _ = making.here()
-    count = steps(hole.top - hole.bottom, infeed)
+    count = equal_steps(hole.top - hole.bottom, infeed)
     yield go(hole.clear)
     yield [("G", 1.0), ("F", hole.feed), ("X", x + size), ("Y", y)]
     yield go(hole.top, hole.feed)

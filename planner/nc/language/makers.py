@@ -1,4 +1,4 @@
-"""The makers of rows by their names in `tree.Made`."""
+"""The makers of rows by their names in `tree.MadeRows`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def compensate(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     return []
 
 
-def approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """APPR of a kind (index in KINDS), with X Y Z of the first contour point, LEN, R, CCA, F and side."""
     unit, first = making.unit, np.array(making.here())
     for axis, letter in enumerate("XYZ"):
@@ -56,7 +56,7 @@ def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     return []
 
 
-def direction(making: Making) -> complex:
+def _direction(making: Making) -> complex:
     """Unit tangent of the last move at its end, in the program's plane. Raises ValueError where there is none."""
     travel, interpreter = making.travel, making.interpreter
     if travel.compensated:
@@ -102,7 +102,7 @@ def _arc_row(making: Making, given: Mapping[str, float], centre: complex, left: 
 def tangent_arc(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """CT: the arc to X Y Z that goes on in the direction of the last move. Raises ValueError."""
     normal = making.interpreter.state.normal
-    t, here = direction(making), in_plane(np.array(making.here()), normal)
+    t, here = _direction(making), in_plane(np.array(making.here()), normal)
     v = in_plane(_target(making, given), normal) - here
     left = 1j * t
     along = 2.0 * (v.conjugate() * left).real
@@ -184,7 +184,7 @@ _FLAT = 1e-9  # relative, below which three points are on a line
 
 MAKERS: dict[str, Maker] = {
     "compensate": compensate,
-    "approach": approach,
+    "approach": _approach,
     "depart": depart,
     "siemens frame": frames.siemens,
     "heidenhain frame": frames.heidenhain,

@@ -56,7 +56,7 @@ class Making:
         self.interpreter.note(text, self.line)
 
 
-def steps(whole: float, most: float) -> int:
+def equal_steps(whole: float, most: float) -> int:
     """The number of equal steps of at most `most` that a length is divided into; 1 where `most` is 0. Raises ValueError."""
     if whole <= 0.0 or most <= 0.0:
         return 1

@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.language.making import Row, steps
+from planner.nc.language.making import Row, equal_steps
 from planner.nc.pocket_shapes import Path, PocketLeg, PocketShape, backwards, loops
 
 CORNERS_CLEAR = 1.0 + math.sqrt(0.5)  # tool radii between two paths at most (module text)
@@ -145,7 +145,7 @@ class _Cutting:
             yield self.line(plan.plunge_feed, z=z)
         else:
             size, pitch = plan.helix
-            count = steps(begin - z, pitch)
+            count = equal_steps(begin - z, pitch)
             side = start + size
             yield self.line(plan.plunge_feed, side)
             to = -size * self.turned
@@ -172,7 +172,7 @@ def _passes(
     plan, start = cut.plan, paths[0][0]
     out = shape.to_wall()
     back = backwards(start, out)
-    count = steps(plan.top - bottom, infeed)
+    count = equal_steps(plan.top - bottom, infeed)
     begin = plan.clear
     yield cut.rapid(z=plan.clear)
     yield cut.rapid(start)

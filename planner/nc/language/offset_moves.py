@@ -21,7 +21,7 @@ from planner.nc.language.travel_rows import (
     arc_words,
     at_place,
     in_plane,
-    split_words,
+    stops_apart,
 )
 from planner.nc.program import Kind
 from planner.nc.state import State
@@ -141,7 +141,7 @@ class OffsetMoves:
                 yield item
                 continue
             move, first, last = item
-            before, stops = split_words(move.rest)
+            before, stops = stops_apart(move.rest)
             for block in range(first, last):
                 end = self._store.block.end[block].copy()
                 axes = [

@@ -32,12 +32,13 @@ from planner.nc.language.travel_rows import (
     Move,
     TravelRow,
     other_words,
-    rows_of,
+    travel_rows_of,
     words_of,
 )
 from planner.nc.language.tree import ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 
+# G codes of planes with their normals, and M codes that end the program.
 _PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
 _ENDS = (2.0, 30.0)
 # G codes behind which the position is asked of the interpreter.
@@ -93,7 +94,7 @@ class RowsThrough(Coordinates):
             self.active = False
             yield words
             return
-        for one in rows_of(words):
+        for one in travel_rows_of(words):
             try:
                 foreign = self._take(one, out)
             except ProgramFault:

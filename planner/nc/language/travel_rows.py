@@ -93,7 +93,7 @@ def arc_words(arc: Arc, begin: FloatArray, normal: int, at: int) -> list[tuple[i
     return [*words, (TURNS, float(more), at)] if more > 1 else words
 
 
-def split_words(row: TravelRow) -> tuple[list[tuple[int, float, int]], list[tuple[int, float, int]]]:
+def stops_apart(row: TravelRow) -> tuple[list[tuple[int, float, int]], list[tuple[int, float, int]]]:
     """The words that act before the moves of a row, and the stops behind them."""
     stops = [word for word in row.words if word[0] == M and word[1] in _STOPS]
     return [word for word in row.words if word not in stops], stops
@@ -113,7 +113,7 @@ def at_place(place: complex, others: FloatArray, normal: int) -> FloatArray:
     return point
 
 
-def rows_of(words: Words) -> Iterator[TravelRow]:
+def travel_rows_of(words: Words) -> Iterator[TravelRow]:
     """The rows of words that the interpreter would take."""
     letter, value, at, first = (
         column.tolist() for column in (words.letter, words.value, words.at, words.first)

@@ -180,7 +180,7 @@ class Turning(NamedTuple):
     letters: str = ""
 
 
-class Made(NamedTuple):
+class MadeRows(NamedTuple):
     """Rows that Python makes of values while the program runs: a pocket, a change of frame (`makers.MAKERS`)."""
 
     place: SourcePlace
@@ -189,7 +189,7 @@ class Made(NamedTuple):
 
 
 Statement = (
-    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning | Made
+    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning | MadeRows
 )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from planner.machine import machine_from_dict
 from planner.nc.points import are_points
 from planner.nc.reader import load, parse_program
 from planner.nc.reading import Reading
-from planner.report.export import KEPT
+from planner.report.export import program_file
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
 from planner.verify import verify
@@ -39,7 +39,7 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
     read = read_trajectory(files[0])
     if read.metadata.get("run_id") != summary.get("run_id"):
         raise InputError("the trajectory and the summary are of two runs; plan again", source=str(directory))
-    source = _program_file(directory, summary["program"])
+    source = program_file(directory, summary["program"])
     text = load(source)
     machine = machine_from_dict(read.metadata["machine"], source=f"{files[0]} (its own machine)")
     reading = Reading.saved(read.metadata.get("reading"))
@@ -72,12 +72,6 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         timings=summary["timings_s"],
     )
     return plan, summary, None if are_points(text) else text
-
-
-def _program_file(directory: Path, source: str) -> str:
-    """Where the program of a plan is: where it was read, or in the directory itself if it was given as a text or as points."""
-    kept = [directory / name for name in KEPT if (directory / name).exists()]
-    return str(kept[0]) if kept and source.startswith("<") else source
 
 
 _KEYS = (

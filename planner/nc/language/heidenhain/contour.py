@@ -14,7 +14,7 @@ from dataclasses import replace
 from planner.nc.language.approach import KINDS
 from planner.nc.language.heidenhain.items import POSITION, Items, absolute, items, looked_up
 from planner.nc.language.heidenhain.text import ConversationalBlock, value
-from planner.nc.language.tree import ZERO, Expression, Line, Made, Number, Statement
+from planner.nc.language.tree import ZERO, Expression, Line, MadeRows, Number, Statement
 
 _KIND = re.compile(r"\s*(P?)(LT|LN|CT|LCT)\b", re.IGNORECASE)
 _EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
@@ -33,7 +33,7 @@ def side_rows(block: ConversationalBlock, given: Items) -> list[Statement]:
     """What RL, RR or R0 of a block does before its move."""
     if given.side is None:
         return []
-    return [Made(block.place, "compensate", (("side", Number(float(given.side))),))]
+    return [MadeRows(block.place, "compensate", (("side", Number(float(given.side))),))]
 
 
 def approach_rows(
@@ -71,9 +71,9 @@ def approach_rows(
     if departs:
         if found.side:
             raise block.fault("DEP switches radius compensation off; RL and RR do not belong to it", column)
-        return [Made(block.place, "depart", tuple(given)), looked_up(block)], found
+        return [MadeRows(block.place, "depart", tuple(given)), looked_up(block)], found
     given.append(("side", Number(float(found.side or 0))))
-    rows: list[Statement] = [Made(block.place, "approach", tuple(given))]
+    rows: list[Statement] = [MadeRows(block.place, "approach", tuple(given))]
     rows.append(Line(block.place, (), tuple((POSITION[axis], end) for axis, end in ends.items())))
     return rows, found
 
@@ -83,7 +83,7 @@ def frame_rows(
 ) -> list[Statement]:
     """A part of the frame; the position is asked for behind it, since it has other coordinates then."""  # fmt: skip
     values = (("cycle", Number(float(cycle))), *given)
-    return [Made(block.place, "heidenhain frame", values), Made(block.place, "frame in force"), looked_up(block)]  # fmt: skip
+    return [MadeRows(block.place, "heidenhain frame", values), MadeRows(block.place, "frame in force"), looked_up(block)]  # fmt: skip
 
 
 def datum_rows(block: ConversationalBlock, column: int) -> list[Statement]:

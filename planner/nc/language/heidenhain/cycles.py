@@ -23,11 +23,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from planner.nc.language.holes import BREAK, HolePlan, Pecks, dwell, go, milled, pecked, tapped
-from planner.nc.language.making import Maker, Making, Row, steps
+from planner.nc.language.holes import BREAK, HolePlan, Pecks, dwell_rows, go, milled, pecked, tapped
+from planner.nc.language.making import Maker, Making, Row, equal_steps
 from planner.nc.language.milling import PocketPlan, pocket_rows
 from planner.nc.pocket_shapes import ArcSlot, PocketShape, RoundedRectangle
 
+# Q parameters of all cycles (module text), and of all pockets.
 _HOLE = (200, 201, 203, 204, 211)
 _POCKET = (200, 201, 202, 203, 204, 206, 207, 215, 338, 351, 366, 368, 369, 370, 385)
 PARAMETERS: dict[int, tuple[int, ...]] = {
@@ -78,7 +79,7 @@ def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     hole, (x, y, _) = _hole(given, given["Q206"]), making.here()
     yield go(hole.clear)
     yield go(hole.bottom, hole.feed)
-    yield from dwell(hole.dwell)
+    yield from dwell_rows(hole.dwell)
     yield [("M", 5.0)]
     if given["Q214"]:
         if given["Q214"] not in _AWAY:
@@ -134,7 +135,7 @@ def _tapped(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 def _tapped_by_breaks(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     hole, lead, speed = _hole(given), given["Q239"], making.interpreter.state.spindle.speed
     depth = hole.top - hole.bottom
-    count = steps(depth, given["Q257"])
+    count = equal_steps(depth, given["Q257"])
     for k in range(1, count + 1):
         deep = min(k * given["Q257"], depth) if given["Q257"] else depth
         back = given["Q256"] * abs(lead)
@@ -255,7 +256,7 @@ def _slots_on_circle(making: Making, given: Mapping[str, float]) -> Iterable[Row
             "a slot on a circle has a width above 0 and below the diameter, and an opening below 360 degrees"
         )
     shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])
-    for k in range(max(1, steps(given["Q377"], 1.0))):
+    for k in range(max(1, equal_steps(given["Q377"], 1.0))):
         yield from _cut(making, shape, given, at, k * given["Q378"])
 
 

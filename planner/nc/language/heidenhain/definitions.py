@@ -16,7 +16,7 @@ from planner.nc.language.tree import (
     Expression,
     If,
     Line,
-    Made,
+    MadeRows,
     Message,
     Number,
     Parameter,
@@ -152,18 +152,19 @@ class Definitions(Flow):
 
     def _one_cycle(self, block: ConversationalBlock, cycle: int) -> list[Statement]:
         """A cycle at the present place, and the feed as it was before."""
-        keep, back = Made(block.place, "keep"), Made(block.place, "bring back", (("feed", ONE),))
+        keep, back = MadeRows(block.place, "keep"), MadeRows(block.place, "bring back", (("feed", ONE),))
         if cycle in drilling.CYCLES:
             return [keep, *drilling.drilled(block, cycle, self.moves, self.unit), back]
         given: list[tuple[str, Expression]] = [
             (f"Q{q}", self.moves.scaled(parameter(q)) if q in _FEEDS else parameter(q))
             for q in cycles.PARAMETERS[cycle]
         ]
-        return [keep, Made(block.place, f"cycle {cycle}", tuple(given)), back, looked_up(block)]
+        return [keep, MadeRows(block.place, f"cycle {cycle}", tuple(given)), back, looked_up(block)]
 
 
 READ = (*drilling.CYCLES, *cycles.PARAMETERS, *patterns.PATTERNS)
 _FEEDS = (206, 207, 208, 385)  # Q parameters, in tenths of an inch per minute in inch programs
+# Q parameters that are read where they are 0 only.
 _REFUSED = {
     365: "Q365 1, moves between the places on the circle, is not read; write 0",
     439: "Q439, another reference of the feed, is not read; write 0",

@@ -40,7 +40,7 @@ from planner.nc.language.tree import (
     Expression,
     If,
     Line,
-    Made,
+    MadeRows,
     Number,
     Parameter,
     Statement,
@@ -161,7 +161,7 @@ class Moves:
         words = [(chr(one.letter), one.value) for one in self.feed_words(block, given)]
         assigned: list[tuple[Parameter, Expression]] = [(POSITION[axis], end) for axis, end in ends.items()]
         looked: list[Statement] = [
-            Made(block.place, "tangent arc", (*ends.items(), *words)), Line(block.place, (), tuple(assigned))
+            MadeRows(block.place, "tangent arc", (*ends.items(), *words)), Line(block.place, (), tuple(assigned))
         ]  # fmt: skip
         return [If(block.place, ((of("EQ", length, ZERO), looked),), known)]
 

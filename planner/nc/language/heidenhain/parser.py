@@ -1,6 +1,6 @@
 """A conversational program as statements.
 
-    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP RND CHF    LBL, CALL LBL [REP], CALL PGM    Q1 = formula, FN 0-14
+    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP CTP RND CHF    LBL, CALL LBL [REP], CALL PGM    Q1 = .., FN 0-14
     RL RR R0, APPR, DEP (`contour`)    CYCL DEF 7 8 10 11 26, TRANS DATUM (`contour`)    9 (dwell) 32 (tolerance)
     CYCL DEF 1 200 201 240 (`drilling`) 202 to 209, 251 to 254 (`cycles`) 220 221 (`patterns`)    CYCL CALL [POS], M99    STOP, M codes
 
@@ -40,7 +40,7 @@ from planner.nc.language.tree import (
     Call,
     Expression,
     Line,
-    Made,
+    MadeRows,
     Number,
     Parameter,
     Procedure,
@@ -52,14 +52,14 @@ from planner.nc.language.tree import (
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
-    r"PLANE RESET|RND|CHF|LN|LP|CP|CC|CR|CT|C|L|"
+    r"PLANE RESET|RND|CHF|LN|LP|CP|CC|CR|CTP|CT|C|L|"
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
 # M codes that follow or leave the tilt of the tool; small steps and open corners of contours; feeds of plunging and per turn; M140
 # retracts the tool.
 _REFUSED = (89, 92, 97, 98, 103, 114, 115, 128, 129, 136, 140, 144)
-_MOVES = ("L", "LP", "C", "CR", "CT", "CP")  # that RND and CHF may follow
+_MOVES = ("L", "LP", "C", "CR", "CT", "CP", "CTP")  # that RND and CHF may follow
 _AT_END = (2, 30)  # M codes that end the program
 
 
@@ -208,7 +208,7 @@ class HeidenhainParser(Definitions):
                 "nothing may follow the number of RND and CHF; write the feed into the next block", column
             )
         kind = Number(float(CORNERS.index("RND" if rounded else "CHR")))
-        return [Made(block.place, "corner", (("kind", kind), ("size", number)))]
+        return [MadeRows(block.place, "corner", (("kind", kind), ("size", number)))]
 
     def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
         raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
@@ -218,6 +218,9 @@ class HeidenhainParser(Definitions):
         given = items(block, column)
         before, after, _ = self._codes(block, given)
         before += self._side(block, given)
+        if name == "CTP":
+            found, ends = self.moves.polar_ends(block, given)
+            return [*before, *found, *self.moves.tangent_arc(block, given, ends), *after]
         if name == "CP":
             return [*before, *self.moves.polar_arc(block, given), *after]
         refuse_arc_axes(block, given)
@@ -313,7 +316,7 @@ _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Sta
     ),
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
-    **dict.fromkeys(("C", "CR", "CT", "CP"), HeidenhainParser._arc),
+    **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),
     **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
     "TRANS DATUM": HeidenhainParser._datum,
     "CC": HeidenhainParser._pole,

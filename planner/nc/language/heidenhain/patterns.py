@@ -21,7 +21,8 @@ from planner.nc.language.heidenhain.text import (
 )
 from planner.nc.language.tree import ONE, TWO, ZERO, Expression, If, Line, Loop, Named, Number, Statement
 
-PATTERNS = (220, 221)
+PATTERNS = (220, 221)  # cycles
+# A full turn [degrees], and what a computed whole number may be short of.
 _TURN, _WHOLE = Number(360.0), Number(1e-9)
 
 

@@ -22,12 +22,13 @@ from planner.nc.language.tree import (
     ZERO,
     Expression,
     Line,
-    Made,
+    MadeRows,
     Number,
     Parameter,
     Word,
 )
 
+# G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
 _ARCS = {"CIP": "arc through", "CT": "tangent arc"}
 
@@ -45,7 +46,7 @@ class BlockWords(Calls):
         found: set[float] = set()
         wait: list[Word] = []
         stops = moved = False
-        made: list[Made] = []  # corners and compensation, before the row
+        made: list[MadeRows] = []  # corners and compensation, before the row
         arc, through = "", {}
         while not reader.ended:
             token, at = reader.tokens[reader.next], reader.at()
@@ -59,7 +60,7 @@ class BlockWords(Calls):
             elif name in CORNERS:
                 reader.expect("=")
                 kind = Number(float(CORNERS.index(name)))
-                made.append(Made(reader.place, "corner", (("kind", kind), ("size", reader.expression()))))
+                made.append(MadeRows(reader.place, "corner", (("kind", kind), ("size", reader.expression()))))
             elif name in ("I1", "J1", "K1") and arc == "CIP":
                 axis = "XYZ"["IJK".index(name[0])]
                 value = self._given(reader, axis, at)
@@ -89,7 +90,7 @@ class BlockWords(Calls):
                     if letter == "G" and isinstance(word.value, Number):
                         if word.value.value in _SIDES:
                             side = Number(_SIDES[int(word.value.value)])
-                            made.insert(0, Made(reader.place, "compensate", (("side", side),)))
+                            made.insert(0, MadeRows(reader.place, "compensate", (("side", side),)))
                             continue
                         self.circular &= word.value.value not in (0.0, 1.0, 2.0, 3.0)
                         found.add(word.value.value)
@@ -145,7 +146,7 @@ class BlockWords(Calls):
                 given[chr(word.letter)] = self._absolute(chr(word.letter), word.value)
             elif chr(word.letter) == "F":
                 given["F"] = word.value
-        self.body.append(Made(reader.place, _ARCS[arc], tuple(given.items())))
+        self.body.append(MadeRows(reader.place, _ARCS[arc], tuple(given.items())))
         return [word for word in words if chr(word.letter) not in "XYZF"]
 
     def _absolute(self, axis: str, given: Expression) -> Expression:

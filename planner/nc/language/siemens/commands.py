@@ -8,7 +8,7 @@ from planner.nc.language.frames import ADDED, SIEMENS
 from planner.nc.language.siemens import codes, cycles, drilling, patterns
 from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import TokenReader, operation, position, variable
-from planner.nc.language.tree import ZERO, Expression, Line, Made, Message, Number, Statement, Word
+from planner.nc.language.tree import ZERO, Expression, Line, MadeRows, Message, Number, Statement, Word
 
 TYPES = frozenset(("REAL", "INT", "BOOL"))
 
@@ -58,7 +58,7 @@ class Commands(SiemensControl):
         try:
             rows = (
                 [
-                    Made(
+                    MadeRows(
                         place,
                         name,
                         tuple((k, v) for k, v in zip(known, given, strict=False) if v is not None),
@@ -69,7 +69,7 @@ class Commands(SiemensControl):
             )
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
-        return [Made(place, "keep"), *rows, Made(place, "bring back", (("feed", ZERO),))]
+        return [MadeRows(place, "keep"), *rows, MadeRows(place, "bring back", (("feed", ZERO),))]
 
     def _arguments(self, reader: TokenReader) -> list[Expression | None]:
         """What stands in the brackets behind a cycle; None for what is left out or a text."""
@@ -126,8 +126,8 @@ class Commands(SiemensControl):
             if value is None:
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
-        self.body.append(Made(place, "siemens frame", (("kind", Number(float(kind))), *given.items())))
-        self.body.append(Made(place, "frame in force"))
+        self.body.append(MadeRows(place, "siemens frame", (("kind", Number(float(kind))), *given.items())))
+        self.body.append(MadeRows(place, "frame in force"))
 
     def _define(self, reader: TokenReader) -> None:
         kind = reader.peek()

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from planner.nc.language.holes import HolePlan, coarse_lead, dwell, go, tapped
+from planner.nc.language.holes import HolePlan, coarse_lead, dwell_rows, go, tapped
 from planner.nc.language.making import Maker, Making, Row
 from planner.nc.language.milling import HELIX, RAPID, STRAIGHT, PocketPlan, pocket_rows
 from planner.nc.pocket_shapes import PocketShape, RoundedRectangle
@@ -87,7 +87,7 @@ def _reamed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     _required("CYCLE85", given, "FFR", "RFF")
     yield go(hole.clear)
     yield go(hole.bottom, given["FFR"])
-    yield from dwell(hole.dwell)
+    yield from dwell_rows(hole.dwell)
     yield go(hole.clear, given["RFF"])
     yield go(hole.retract)
 
@@ -97,7 +97,7 @@ def _drilled(hole: HolePlan, given: Mapping[str, float]) -> Iterator[Row]:
         yield [("M", 4.0 if given["SDIR"] == _LEFT else 3.0)]
     yield go(hole.clear)
     yield [("G", 1.0), ("Z", hole.bottom)]
-    yield from dwell(hole.dwell)
+    yield from dwell_rows(hole.dwell)
 
 
 def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:

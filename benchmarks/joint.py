@@ -100,7 +100,7 @@ def measured(program: Program, machine: Machine) -> dict[str, Any]:
             row[name] = {"sentence": str(fault)}
             continue
         kept = re.search(r"on ([0-9.e-]+) of the time no faster", plan.sentence)
-        took = re.search(r"its start, took ([0-9.e-]+) s", plan.sentence)
+        took = re.search(r"its start \(.*\) took ([0-9.e-]+) s", plan.sentence)
         row[name] = {
             "start_s": float(took[1]) if took else None,
             "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,

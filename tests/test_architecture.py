@@ -203,7 +203,6 @@ NOT_OF_A_PLAN = {
     "planner.report",
     "planner.interactive",
     "planner.control_files",
-    "planner.tube",
     "planner.nc.hpgl.plotter",
 }
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,40 +34,81 @@ START_PERIOD, START_SAMPLES = 0.02, 200_000
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
 
 
-def freed(job: Job, plan: Plan) -> Plan:
+class Freed(NamedTuple):
+    """A plan after the search.
+
+    kept : share of the time on which the motion from which it began stays [-]; 1 where there was no search
+    """
+
+    plan: Plan
+    kept: float
+
+
+def searchable(job: Job) -> bool:
+    """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no limits of one's own, no
+    range in step with the spindle."""
+    machine, toolpath = job.real
+    return (
+        machine.fir is None
+        and not machine.own
+        and not (toolpath.curve >= 0).any()
+        and not toolpath.held.any()
+    )
+
+
+def freed(job: Job, plan: Plan, steps_max: float = np.inf) -> Freed:
     """The plan with a faster motion near its own where one is found (tube/own.py), else the plan.
+
+    job       : a searchable one
+    steps_max : a motion that has more steps of constant jerk is left as it is
 
     What holds the motion, and what limits cost, is told from the search (`told`).
     """
-    filtered, curves = job.real[0].fir is not None, (job.toolpath.curve >= 0).any()
-    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed or filtered or curves:
-        return plan
-    with job.stage("solve") as report:
+    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
+        return Freed(plan, 1.0)
+    with job.stage("search") as report:
         runs = list(tube_runs_of(job.toolpath, job.machine))
-        starts, found = Starts((), job, plan), []
+        start = Start(plan, job.motion_of[plan.trajectory], job)
+        steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
+        if steps > steps_max:
+            job.tell("search", steps=steps, of=steps_max)
+            return Freed(plan, 1.0)
+        found, done = [], 0
         for k, run in enumerate(runs):
-            found.append(search(k, run, starts, TubeOwn()))
-            report((k + 1) / len(runs))
-    made, kept, why = delivered(job, starts.made[0], found)
-    job.tell(
-        "free",
-        found=made[0].cycle_time,
-        before=plan.trajectory.cycle_time,
-        kept=made[0] is not plan.trajectory,
-    )
-    if made[0] is plan.trajectory:
-        return plan
+            found.append(search(k, run, [start], TubeOwn()))
+            done += len(start.guess(k, run))
+            report(done / steps)
+    made, kept, why = delivered(job, start, found)
+    better = made[0] is not plan.trajectory
+    share = _share_kept(start, found, kept) if better else 1.0
+    job.tell("search", found=made[0].cycle_time, before=plan.trajectory.cycle_time, kept=better, steps=steps)
+    if not better:
+        return Freed(plan, share)
     tables = told(job, plan, made[0], found, kept)
-    return dataclasses.replace(
+    faster = dataclasses.replace(
         plan,
         trajectory=made[0],
         verdict=made[1],
+        rounded=None,
         grid=tables.grid,
         prices=tables.prices,
-        sentence=f"{plan.sentence}; then {said(job, starts.made[0], found, kept, why)[1]}",
+        grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
+        sentence=said(job, start, found, kept, why, "a path first, then its feed")[1],
         notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),
         timings=job.stages.timings,
     )
+    return Freed(faster, share)
+
+
+def _share_kept(start: Start, found: list[Found], kept: list[int]) -> float:
+    """Share of the time on which the start's motion stays [-]."""
+    stays = 0.0
+    for k, one in enumerate(found):
+        if k in kept or one.steps is None:
+            stays += start.lasting(k)
+        elif one.kept is not None:
+            stays += float(one.steps.h[one.kept].sum())
+    return stays / sum(start.lasting(k) for k in range(len(found)))
 
 
 class Start:
@@ -81,6 +123,7 @@ class Start:
         self.seen = joined(list(in_chunks(motion, period, np.concatenate([even, edges]))))
         self.times = passing_times(self.seen, job.toolpath)
         self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
+        self._guesses: dict[int, Guess] = {}
 
     def lasting(self, k: int) -> float:
         """Time along run k [s]."""
@@ -98,6 +141,12 @@ class Start:
 
     def guess(self, k: int, run: TubeRun) -> Guess:
         """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts of it can stay."""
+        if k not in self._guesses:
+            self._guesses[k] = self._guess(k, run)
+        return self._guesses[k]
+
+    def _guess(self, k: int, run: TubeRun) -> Guess:
+        """The same, made."""
         guess = guess_from(run, *self.window(k, run))
         inner = self.departure[k] + np.cumsum(guess.h[:-1])
         seen = self.motion.at(inner, 1.0)
@@ -124,11 +173,8 @@ class Start:
 class Starts:
     """The motions of the starting methods, made when they are asked for."""
 
-    def __init__(self, methods: tuple[Method, ...], job: Job, plan: Plan | None = None):
-        """plan : one that has been made already, whose motion is the first"""
+    def __init__(self, methods: tuple[Method, ...], job: Job):
         self.made: list[Start] = []
-        if plan is not None and plan.trajectory is not None:
-            self.made.append(Start(plan, job.motion_of[plan.trajectory], job))
         self.failed: list[Plan] = []
         self._methods, self._job = list(methods), job
 
@@ -144,11 +190,12 @@ class Starts:
             yield self.made[-1]
 
 
-def search(k: int, run: TubeRun, starts: Starts, solver: TubeSolver) -> Found:
+def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) -> Found:
     """What the search along run k leads to from one start after the other, until it is faster than the first start."""
     least, why = np.inf, []
     for start in starts:
-        least = min(least, start.lasting(k)) if start is starts.made[0] else least
+        first = not why
+        least = start.lasting(k) if first else least
         guess = start.guess(k, run)
         solution = solver.solve(run, guess)
         steps, kept = solution.steps, solution.kept
@@ -156,7 +203,7 @@ def search(k: int, run: TubeRun, starts: Starts, solver: TubeSolver) -> Found:
             why.append(solution.sentence)
             continue
         # parts of another start's motion do not join those of the first one
-        other = start is not starts.made[0] and kept is not None and kept.any()
+        other = kept is not None and kept.any() and not first
         if other or steps.h.sum() >= least:
             why.append("the search did not end faster than its start")
             continue
@@ -223,15 +270,16 @@ def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:
     }
 
 
-def said(job: Job, first: Start, found: list[Found], kept: list[int], why: str) -> tuple[Status, str]:
-    """Status and sentence: of the worst search, and where the start stays."""
+def said(
+    job: Job, first: Start, found: list[Found], kept: list[int], why: str, what: str
+) -> tuple[Status, str]:
+    """Status and sentence: of the worst search, and where the start stays. `what` the start is."""
     took = [one for k, one in enumerate(found) if k not in kept]
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
     text = worst.sentence if worst else "no motion faster than the start's was found"
     start = first.plan
     assert start.trajectory is not None
-    text += f"; {start.method}{f' with corner {start.corner}' if start.corner else ''}, its start, took "
-    text += f"{start.trajectory.cycle_time:.6g} s"
+    text += f"; its start ({what}) took {start.trajectory.cycle_time:.6g} s"
     if kept:
         run = found[kept[0]].run
         why = why or found[kept[0]].sentence

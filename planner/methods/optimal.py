@@ -1,6 +1,11 @@
-"""Method `optimal`: smoothed path, all limits with jerk, time-optimal by the interior-point kernel. The algorithm is optimal/loop.py.
+"""Method `optimal`: smoothed path, all limits with jerk, time-optimal by the interior-point kernel (optimal/loop.py); then geometry and
+feed together, without a path parameter (free.py).
 
 Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
+
+The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no round
+has reshaped. Where it leaves some of the motion as it was, or there are too many steps for it, the splines are reshaped and it begins
+there once more; the faster plan is taken. Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
 """
 
 from __future__ import annotations
@@ -8,12 +13,13 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from planner.base.names import AUTO, BEST, NORMAL, effort_name
+from planner.base.names import AUTO, NORMAL, QUICK, effort_name
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
+from planner.geometry.legs import legs_of
 from planner.job.job import Job
-from planner.job.method import Method
+from planner.job.method import Method, faster
 from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
@@ -25,6 +31,8 @@ from planner.optimal.shaped import shaped_plan
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
 # (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
 SIGMA2 = 0.94
+# Steps that a motion has on a leg at least (tube/guess.py).
+LEAST_STEPS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +41,8 @@ class OptimalMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver
-    effort : "quick", "normal" or "best": grids and rounds of reshaping (optimal/effort.py); with "best" and geometry "auto" the
-             motion is then improved without a path parameter (free.py)
+    effort : "quick", "normal" or "best": grids, rounds of reshaping, and the size up to which geometry and feed are searched together
+             (optimal/effort.py); that is with corner "auto", the own solver, no filters, no shaping, and `rounds` None
     rounds : of reshaping splines (optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (optimal/shaped.py)
     """
@@ -66,9 +74,23 @@ class OptimalMethod(Method):
         )
         if self.shaped:
             return shaped_plan(job, settings)
-        plan = fastest_plan(job, settings)
-        if self.effort != BEST or self.corner != AUTO:
-            return plan
-        from planner.methods.free import freed  # other plans need not load what it uses
+        if self.corner != AUTO or self.solver != OWN or self.rounds is not None:
+            return fastest_plan(job, settings)
+        return _freed_plan(job, settings)
 
-        return freed(job, plan)
+
+def _freed_plan(job: Job, settings: Settings) -> Plan:
+    """The plan after the search for geometry and feed together, as far as the effort goes and the search can."""
+    effort = settings.effort
+    if LEAST_STEPS * len(legs_of(job.toolpath).first) > effort.search:
+        return fastest_plan(job, settings)
+    from planner.methods.free import freed, searchable  # other plans need not load what they use
+
+    if not searchable(job):
+        return fastest_plan(job, settings)
+    on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
+    first = freed(job, fastest_plan(job, on_first), effort.search)
+    if first.kept <= effort.kept:
+        return first.plan
+    again = job.afresh()
+    return faster(freed(again, fastest_plan(again, settings), effort.search).plan, first.plan)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.errors import InputError
+from planner.base.names import QUICK
 from planner.feedrate.solution import Status
 from planner.job.job import Delivered, Job
 from planner.job.method import Method
@@ -41,7 +42,7 @@ class TubeMethod(Method):
     """
 
     starts: tuple[Method, ...] = field(
-        default_factory=lambda: (OptimalMethod(), OptimalMethod(corner="bezier"))
+        default_factory=lambda: (OptimalMethod(effort=QUICK), OptimalMethod(corner="bezier"))
     )
     solver: str | TubeSolver = "own"
 
@@ -61,7 +62,8 @@ class TubeMethod(Method):
             failed = starts.failed[0]
             return self._plan(job, None, failed.status, f"no motion to start from: {failed.sentence}", 0)
         made, kept, why = delivered(job, first, found)
-        status, sentence = said(job, first, found, kept, why)
+        corner = f" with corner {first.plan.corner}" if first.plan.corner else ""
+        status, sentence = said(job, first, found, kept, why, f"{first.plan.method}{corner}")
         grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.plan.grid_points
         tables = told(job, first.plan, made[0], found, kept)
         return self._plan(job, made, status, sentence, grid_points, tables)

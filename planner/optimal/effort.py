@@ -33,12 +33,16 @@ class Effort:
     rounds : of reshaping at most
     left   : no more of them where one promises less than this share of the time [-]
     sizes  : grids by the size of the job, ascending
+    search : steps of constant jerk that a motion may have to be searched for geometry and feed together (methods/free.py)
+    kept   : share of the time that this may leave as it was; where it leaves more it begins on reshaped splines too [-]
     """
 
     work: int
     rounds: int
     left: float
     sizes: tuple[Grids, ...]
+    search: float = 0.0
+    kept: float = 0.0
 
     def grids(self, points: int) -> Grids:
         """The grids for a job that has so many points on a grid of the resolution `COARSE`."""
@@ -56,12 +60,16 @@ EFFORTS = {
         work=150_000,
         rounds=40,
         left=1e-5,
+        search=60_000,
+        kept=0.05,
         sizes=(Grids(1_500, 2e-3, 2e-4), Grids(4_000, 8e-3, 5e-4), Grids(40_000, COARSE, 2e-3), _LARGE),
     ),
     BEST: Effort(
         work=5_000_000,
         rounds=100,
         left=1e-6,
+        search=float("inf"),
+        kept=-1.0,
         sizes=(Grids(4_000, 2e-3, 2e-4), Grids(40_000, 8e-3, 5e-4), Grids(400_000, COARSE, 2e-3), _LARGE),
     ),
 }

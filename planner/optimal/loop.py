@@ -10,6 +10,9 @@
   deliver   setpoints at the interpolation period, judged by the verifier                         job/job.py, verify/
   compare   full stops, fir corners, method kinematic, where they may be faster                   compare_plans.py
 
+From the motion that this ends with, method `optimal` searches geometry and feed together (methods/free.py); where it does, it takes the
+first splines, with no round of reshaping.
+
 Methods `optimal` (third order: with jerk limits) and `second-order` (second order: without) run the same loop with another `Order`.
 
 What is tried more than once:
@@ -90,6 +93,7 @@ class Settings:
     bezier : the corner of "bezier", and where there is no spline
     effort : grids and rounds of reshaping
     rounds : of reshaping; None for those of the effort
+    priced : whether it is told what limits cost
     """
 
     method: str
@@ -98,6 +102,7 @@ class Settings:
     bezier: CornerShape = field(default_factory=BezierCorner)
     effort: Effort = EFFORTS[NORMAL]
     rounds: int | None = None
+    priced: bool = True
 
 
 def fastest_plan(job: Job, settings: Settings) -> Plan:
@@ -137,7 +142,7 @@ def plan_on_path(job: Job, settings: Settings) -> Plan:
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
         made = _delivered(job, motion, () if settings.order.jerk_limited else ("jerk",))
-        if settings.order.jerk_limited:
+        if settings.order.jerk_limited and settings.priced:
             with job.stage("report"):
                 prices = prices_of(best, job.machine)
     else:

@@ -8,12 +8,22 @@ import pytest
 from benchmarks import problems
 from planner import plan
 from planner.base.errors import InputError
-from planner.base.names import BEST, NORMAL
 from planner.base.names import EFFORTS as NAMES
+from planner.constraints.own import PathLimit
 from planner.machine import load_machine
+from planner.machine.parts import Fir
 from planner.optimal.effort import EFFORTS
 
 MACHINE = load_machine("mill")
+
+
+class Slow(PathLimit):
+    """A limit of one's own on the speed along the path."""
+
+    name = "slow"
+
+    def velocity(self, at):
+        return 50.0
 
 
 def test_every_name_has_an_effort_and_more_points_a_coarser_grid():
@@ -33,18 +43,35 @@ def test_more_effort_is_never_slower(program):
     assert best.verdict.passed
     assert normal.trajectory.cycle_time <= quick.trajectory.cycle_time * (1 + 1e-4)
     assert best.trajectory.cycle_time <= normal.trajectory.cycle_time * (1 + 1e-4)
-    assert quick.grid_points < normal.grid_points
-    assert "geometry and feed together" in best.sentence
-    assert best.grid.share.sum() == pytest.approx(1.0)
-    assert best.prices is not normal.prices
+    for made in (normal, best):
+        assert "geometry and feed together" in made.sentence
+        assert made.grid.share.sum() == pytest.approx(1.0)
+        assert made.prices is not None
+    assert "geometry and feed together" not in quick.sentence
     np.testing.assert_allclose(best.trajectory.position[-1], best.toolpath.end[-1], atol=1e-9)
 
 
-def test_where_jerk_is_what_limits_the_best_effort_finds_what_rounds_do_not():
+def test_where_jerk_is_what_limits_rounds_do_not_find_what_the_default_finds():
     """On mill, a/j = 40 ms: rounds end 2 % later than ipopt's free optimum, 2.8357 s for 50 legs."""
-    normal, best = (plan(problems.zigzag(6), MACHINE, effort=name) for name in (NORMAL, BEST))
-    assert best.verdict.passed
-    assert best.trajectory.cycle_time < normal.trajectory.cycle_time * (1 - 1e-2)
+    rounds, default = plan(problems.zigzag(6), MACHINE, rounds=40), plan(problems.zigzag(6), MACHINE)
+    assert default.verdict.passed
+    assert default.trajectory.cycle_time < rounds.trajectory.cycle_time * (1 - 1e-2)
+
+
+@pytest.mark.parametrize(
+    "why",
+    [
+        {"machine": MACHINE.with_own((Slow(),))},
+        {"machine": MACHINE.model_copy(update={"fir": Fir(time_constants=(0.004,))})},
+        {"geometry": "spline"},
+        {"rounds": 1},
+    ],
+    ids=["a limit of one's own", "filters", "splines asked for", "rounds asked for"],
+)
+def test_what_the_search_does_not_know_is_planned_by_rounds(why):
+    made = plan(problems.zigzag(4), **({"machine": MACHINE} | why))
+    assert made.verdict.passed
+    assert "geometry and feed together" not in made.sentence
 
 
 def test_an_unknown_effort_and_one_for_another_method():

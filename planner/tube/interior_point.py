@@ -1,6 +1,6 @@
 """The free optimum inside the tolerance near a motion, by a primal-dual interior-point method with slacks (Mehrotra 1992).
 
-    minimise    sum of h + pull sum ((h - guess)/guess)^2
+    minimise    sum of h + pull sum ((h - guess)/guess)^2 + smooth sum h (jerk/limit)^2, h as it was guessed
     subject to  the kinematics (recursion.py) and g <= 0 for every row (rows.py), with slacks s and multipliers z
 
 from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. Kinematics and rows are linearised
@@ -44,6 +44,7 @@ class Tuning(NamedTuple):
     pull: float  # weight of ((h - guess)/guess)^2, against a mean step's time
     prox: float  # the same of the change in one iteration
     gap: float  # complementarity at the end, share of the time
+    smooth: float  # weight of (jerk/limit)^2 of every axis, against a step's time
     # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off: limits are narrowed by more
     # than that (problem.py). Slacks of the others follow no more closely than the tangents that are kept.
     missed: float
@@ -153,7 +154,7 @@ def solve(legs, limits, x, u, place, tuning):
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF * tuning.missed:
                 return True, iteration, z
         if not products <= LOST * time or not factorise(
-            x, u, legs, limits, lin, z, ratio, tuning.pull + prox, factor
+            x, u, legs, limits, lin, z, ratio, tuning.pull + prox, tuning.smooth, factor
         ):
             return False, iteration, z
         second[:] = 0.0
@@ -166,7 +167,7 @@ def solve(legs, limits, x, u, place, tuning):
                 for r in range(R):
                     if on[i, r]:
                         q[i, r] = (aim - second[i, r] + z[i, r] * missing[i, r]) / s[i, r]
-            forces(limits, lin, q, tuning.pull, u[:, axes], w)
+            forces(limits, lin, q, tuning.pull, tuning.smooth, u, w)
             direction(x, u, gap, w, end, factor, dx, du, after)
             slopes(limits, lin, dx, du, slope)
             _directions(on, slacks, slope, aim, second)

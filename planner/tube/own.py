@@ -23,7 +23,7 @@ from planner.tube.checks import Keeps, normal_shares, worst_shares
 from planner.tube.guess import Guess
 from planner.tube.interior_point import Tuning, solve
 from planner.tube.motion import Steps, closed, integrated
-from planner.tube.nlp import PULL
+from planner.tube.nlp import PULL, SMOOTH
 from planner.tube.outcome import TubeSolution
 from planner.tube.price import columns, step_prices
 from planner.tube.problem import Window, window_of
@@ -188,7 +188,7 @@ class _Search:
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(PULL, prox, self.settings.gap, missed)
+                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed)
                 done, iterations, z = solve(
                     window.legs, window.limits, window.x, window.u, window.place, tuning
                 )

@@ -152,9 +152,9 @@ def _times_transposed(M, h, axes, out):
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(x, u, legs, limits, lin, z, ratio, pull, factor):
-    """The recursion into `factor`, with multipliers z (N, R), z/s (N, R), and `pull`, the weight of (dh/limits.h)^2. False where it
-    breaks down."""
+def factorise(x, u, legs, limits, lin, z, ratio, pull, smooth, factor):
+    """The recursion into `factor`, with multipliers z (N, R), z/s (N, R), and the weights `pull` of (dh/limits.h)^2 and `smooth` of
+    limits.h (j/limit)^2. False where it breaks down."""
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
     size, R = S + C, lin.g.shape[1]
@@ -170,6 +170,8 @@ def factorise(x, u, legs, limits, lin, z, ratio, pull, factor):
         h, own = u[i, axes], P[i + 1]
         _model(W, G, legs, lin, limits, i, z[i], ratio[i], of, axes)
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
+        for k in range(axes):
+            W[S + k, S + k] += 2.0 * smooth * limits.h[i] / limits.box[0, k] ** 2
         step_of_h(x[i], u[i], axes, by_h)
         # P is symmetric: (P A)' = A'P
         _times_transposed(own, h, axes, PA)  # A'P, (S, S)
@@ -244,8 +246,8 @@ def factorise(x, u, legs, limits, lin, z, ratio, pull, factor):
 
 
 @njit(cache=True, error_model="numpy")
-def forces(limits, lin, q, pull, h, w):
-    """w (N, 4 A + 1) = the gradient of time and pull, and the sum of q (N, R) grad g."""
+def forces(limits, lin, q, pull, smooth, u, w):
+    """w (N, 4 A + 1) = the gradient of time, pull and smoothness, and the sum of q (N, R) grad g."""
     N, axes = len(w), lin.n.shape[2]
     R, more = lin.g.shape[1], 8 * axes
     of = np.array([vector_of(r, axes) for r in range(R)])
@@ -253,7 +255,9 @@ def forces(limits, lin, q, pull, h, w):
     for i in range(N):
         F[:] = 0.0
         w[i] = 0.0
-        own = 1.0 + 2.0 * pull * (h[i] - limits.h[i]) / limits.h[i] ** 2
+        own = 1.0 + 2.0 * pull * (u[i, axes] - limits.h[i]) / limits.h[i] ** 2
+        for k in range(axes):
+            w[i, 3 * axes + k] = 2.0 * smooth * limits.h[i] * u[i, k] / limits.box[0, k] ** 2
         for r in range(R):
             if not limits.on[i, r]:
                 continue

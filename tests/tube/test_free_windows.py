@@ -123,9 +123,9 @@ def test_the_recursion_solves_the_system_of_all_steps():
         np.zeros((steps, controls, controls)),
         np.zeros((steps + 1, states, states)),
     )
-    assert factorise(x, u, window.legs, limits, lin, z, ratio, 0.5, factor)
+    assert factorise(x, u, window.legs, limits, lin, z, ratio, 0.5, 0.1, factor)
     w, gap = np.zeros((steps, states + controls)), np.zeros((steps, states))
-    forces(limits, lin, q, 0.5, u[:, -1].copy(), w)
+    forces(limits, lin, q, 0.5, 0.1, u, w)
     gaps(x, u, gap)
     gap += 1e-3 * rng.normal(size=gap.shape)
 

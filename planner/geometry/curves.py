@@ -241,11 +241,12 @@ def _parameter(p0, p1, p2, p3, w1, w2, length, x):
 
 
 @njit(cache=True, error_model="numpy")
-def curve_point(p0, p1, p2, p3, w1, w2, length, x, out):
+def curve_point(points, weights, length, x, out):
     """Point [mm] and three x-derivatives of a curve at x [mm] (module text), into out (4, A).
 
-    p0, p1, p2, p3 : (A,) control points [mm]; w1, w2 : weights of the inner two
+    points : four control points (A,) [mm]; weights : of the inner two
     """
+    (p0, p1, p2, p3), (w1, w2) = points, weights
     u, u1, u2, u3 = _parameter(p0, p1, p2, p3, w1, w2, length, x)
     u1, u2, u3 = u1 / length, u2 / length**2, u3 / length**3
     v = 1.0 - u
@@ -268,8 +269,9 @@ def curve_point(p0, p1, p2, p3, w1, w2, length, x, out):
 
 
 @njit(cache=True, error_model="numpy")
-def curve_tangent(p0, p1, p2, p3, w1, w2, length, x, out):
+def curve_tangent(points, weights, length, x, out):
     """First x-derivative of a curve at x [mm], into out (A,); the others as of `curve_point`."""
+    (p0, p1, p2, p3), (w1, w2) = points, weights
     u, u1, _, _ = _parameter(p0, p1, p2, p3, w1, w2, length, x)
     v = 1.0 - u
     q1, q2 = w1 - 1.0, w2 - 1.0
@@ -286,4 +288,4 @@ def _at(points, weight, row, length, x, out):
     """`Curves.at`, into out (n, 4, A)."""
     for n in range(len(row)):
         p, w = points[row[n]], weight[row[n]]
-        curve_point(p[0], p[1], p[2], p[3], w[0], w[1], length[n], x[n], out[n])
+        curve_point((p[0], p[1], p[2], p[3]), (w[0], w[1]), length[n], x[n], out[n])

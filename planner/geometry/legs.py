@@ -114,7 +114,7 @@ def leg_point(legs, leg, x, out):
         return
     if data.curve:
         p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
-        curve_point(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
+        curve_point((p0, p1, p2, p3), (data.e2[0], data.drift[0]), data.length, x, out)
         return
     rate, radius = data.rate, data.radius
     cos, sin = np.cos(rate * x), np.sin(rate * x)
@@ -137,7 +137,7 @@ def leg_tangent(legs, leg, x, out):
         return
     if data.curve:
         p0, p1, p2, p3 = data.start, data.direction, data.center, data.e1
-        curve_tangent(p0, p1, p2, p3, data.e2[0], data.drift[0], data.length, x, out)
+        curve_tangent((p0, p1, p2, p3), (data.e2[0], data.drift[0]), data.length, x, out)
         return
     across = data.radius * data.rate
     cos, sin = across * np.cos(data.rate * x), across * np.sin(data.rate * x)

@@ -23,7 +23,7 @@ from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
 from planner.tube.guess import Guess, guess_from
 from planner.tube.own import TubeOwn
-from planner.tube.parts import Found, parts_of
+from planner.tube.parts import FoundRun, parts_of
 from planner.tube.run import TubeRun, tube_runs_of
 from planner.tube.solvers import TubeSolver
 from planner.tube.splice import Spliced, SplicedRun
@@ -100,7 +100,7 @@ def freed(job: Job, plan: Plan, steps_max: float = np.inf) -> Freed:
     return Freed(faster, share)
 
 
-def _share_kept(start: Start, found: list[Found], kept: list[int]) -> float:
+def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
     """Share of the time on which the start's motion stays [-]."""
     stays = 0.0
     for k, one in enumerate(found):
@@ -190,7 +190,7 @@ class Starts:
             yield self.made[-1]
 
 
-def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) -> Found:
+def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) -> FoundRun:
     """What the search along run k leads to from one start after the other, until it is faster than the first start."""
     least, why = np.inf, []
     for start in starts:
@@ -208,13 +208,13 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) ->
             why.append("the search did not end faster than its start")
             continue
         times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
-        return Found(
+        return FoundRun(
             run, solution.status, solution.sentence, steps, solution.place, times, kept, solution.price
         )
-    return Found(run, Status.ACCEPTABLE, why[0])
+    return FoundRun(run, Status.ACCEPTABLE, why[0])
 
 
-def delivered(job: Job, first: Start, found: list[Found]) -> tuple[Delivered, list[int], str]:
+def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered, list[int], str]:
     """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
     motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
     start = first.plan.trajectory, first.plan.verdict
@@ -240,7 +240,7 @@ def delivered(job: Job, first: Start, found: list[Found]) -> tuple[Delivered, li
     return (start[0], start[1]), kept, why
 
 
-def told(job: Job, start: Plan, trajectory: Trajectory, found: list[Found], kept: list[int]) -> Tables:
+def told(job: Job, start: Plan, trajectory: Trajectory, found: list[FoundRun], kept: list[int]) -> Tables:
     """What holds the motion that was delivered, and what limits and tolerance cost (sensitivity/found_*.py), of the search where it
     tells: not on the runs in `kept`, of which a note speaks, and not behind filters."""
     if job.real[0].fir is not None:
@@ -260,7 +260,7 @@ def told(job: Job, start: Plan, trajectory: Trajectory, found: list[Found], kept
     return Tables(grid=grid, prices=prices)
 
 
-def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:
+def _missed(job: Job, motion: MotionInTime, found: list[FoundRun]) -> set[int]:
     """The runs on which chords between samples miss vertices by more than the tolerance."""
     machine, toolpath = job.real
     _, far = missed(motion, toolpath, machine.dt)
@@ -271,7 +271,7 @@ def _missed(job: Job, motion: MotionInTime, found: list[Found]) -> set[int]:
 
 
 def said(
-    job: Job, first: Start, found: list[Found], kept: list[int], why: str, what: str
+    job: Job, first: Start, found: list[FoundRun], kept: list[int], why: str, what: str
 ) -> tuple[Status, str]:
     """Status and sentence: of the worst search, and where the start stays. `what` the start is."""
     took = [one for k, one in enumerate(found) if k not in kept]

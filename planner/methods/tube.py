@@ -28,7 +28,7 @@ from planner.job.records import NO_TABLES, Tables
 from planner.methods.free import Starts, delivered, said, search, told
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
-from planner.tube.parts import Found
+from planner.tube.parts import FoundRun
 from planner.tube.run import TubeRun, tube_runs_of
 from planner.tube.solvers import TubeSolver, tube_solver
 
@@ -53,7 +53,7 @@ class TubeMethod(Method):
         with job.stage("start"):
             starts = Starts(self.starts, job)
             first = next(iter(starts), None)
-        found: list[Found] = []
+        found: list[FoundRun] = []
         with job.stage("solve") as report:
             for k, run in enumerate(runs if first else ()):
                 found.append(search(k, run, starts, tube_solver(self.solver)))

@@ -18,7 +18,7 @@ from planner.motion.timing import MotionInTime
 from planner.sensitivity.activity import HELD, NONE, REST
 from planner.tube import price
 from planner.tube.motion import Steps
-from planner.tube.parts import Found
+from planner.tube.parts import FoundRun
 from planner.tube.shares import shares
 from planner.tube.splice import Spliced, SplicedRun
 
@@ -49,7 +49,11 @@ class _Rows:
 
 
 def found_history(
-    toolpath: Toolpath, motion: MotionInTime, found: list[Found], kept: list[int], start: GridHistory | None
+    toolpath: Toolpath,
+    motion: MotionInTime,
+    found: list[FoundRun],
+    kept: list[int],
+    start: GridHistory | None,
 ) -> GridHistory | None:
     """What holds a motion of runs `found` along a toolpath, of which the start's stays on those in `kept`; None where the start's part
     in it does not tell.
@@ -101,7 +105,7 @@ def _of_start(rows: _Rows, start: GridHistory, part: SplicedRun, begin: float) -
 
 
 def _of_steps(
-    rows: _Rows, toolpath: Toolpath, found: Found, which: tuple[int, int], at: tuple[SplicedRun, float]
+    rows: _Rows, toolpath: Toolpath, found: FoundRun, which: tuple[int, int], at: tuple[SplicedRun, float]
 ) -> None:
     """Rows of the steps lo .. hi - 1 of a run, with the standstills around them."""
     (lo, hi), (part, begin) = which, at

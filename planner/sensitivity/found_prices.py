@@ -34,7 +34,7 @@ from planner.sensitivity.places import MORE_LIMIT
 from planner.sensitivity.prices import Saving
 from planner.sensitivity.savings import more_of
 from planner.tube import price
-from planner.tube.parts import Found
+from planner.tube.parts import FoundRun
 from planner.tube.run import budgets_of
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of tube/price.py
@@ -58,7 +58,7 @@ class RunPrices:
     room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
     """
 
-    def __init__(self, toolpath: Toolpath, found: Found, step: FloatArray, place: FloatArray):
+    def __init__(self, toolpath: Toolpath, found: FoundRun, step: FloatArray, place: FloatArray):
         """step : (N, 3 A + 5) of tube/price.py; place : (N+1,) of the nodes along the run [mm]"""
         self.found, self.step, axes = found, step, len(found.run.axis)
         assert found.steps is not None
@@ -127,7 +127,7 @@ class Priced(NamedTuple):
 
 
 def found_prices(
-    toolpath: Toolpath, machine: Machine, found: list[Found], cycle_time: float
+    toolpath: Toolpath, machine: Machine, found: list[FoundRun], cycle_time: float
 ) -> PriceList | None:
     """The prices of the runs along a toolpath whose search tells them, of a motion of `cycle_time` [s]; None if there are none."""
     runs = [

@@ -14,7 +14,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.tube.rows import Legs, along_tangent, nearest_point, place_of
+from planner.tube.legs import LegFormulas, along_tangent, formula_point, nearest_point
 
 PLACES = 33
 NEWTON_STEPS = 4
@@ -25,7 +25,7 @@ PIECES = 4
 class Keeps(NamedTuple):
     """What steps on R legs with A axes have to keep."""
 
-    legs: Legs
+    legs: LegFormulas
     velocity: FloatArray  # (A,)
     acceleration: FloatArray  # (A,)
     jerk: FloatArray  # (A,)
@@ -126,9 +126,9 @@ def _of_arc(keeps, r, c, s0, end, known, budgets, work):
     point, ahead, tangent, ahead_tangent, bend, piece, s, part_of_s = work
     worst = 0.0
     s3 = end if known else max(nearest_point(legs, r, c[3], end, point, tangent), s0)
-    place_of(legs, r, s3, ahead, ahead_tangent, bend)
+    formula_point(legs, r, s3, ahead, ahead_tangent, bend)
     s[2, 0] = s3 + along_tangent(legs.length[r], c[2], s3, False, ahead, ahead_tangent)
-    place_of(legs, r, s0, ahead, ahead_tangent, bend)
+    formula_point(legs, r, s0, ahead, ahead_tangent, bend)
     s[1, 0] = s0 + along_tangent(legs.length[r], c[1], s0, True, ahead, ahead_tangent)
     s[0, 0], s[1, 0], s[2, 0], s[3, 0] = s0, min(s[1, 0], s3), max(s[2, 0], s0), s3
     if s[1, 0] > s[2, 0]:
@@ -139,7 +139,7 @@ def _of_arc(keeps, r, c, s0, end, known, budgets, work):
         _split(s, part, part_of_s)
         x = part_of_s[:, 0]
         point[:], tangent[:] = ahead, ahead_tangent
-        place_of(legs, r, x[3], ahead, ahead_tangent, bend)
+        formula_point(legs, r, x[3], ahead, ahead_tangent, bend)
         inner = max(
             _apart(piece[1], point, tangent, x[1] - x[0]),
             _apart(piece[2], ahead, ahead_tangent, x[2] - x[3]),
@@ -156,11 +156,11 @@ def _of_line(keeps, r, c, s0, end, known, budgets, work):
     """The same on a line."""
     legs, s = keeps.legs, s0
     point, tangent, bend = work[0], work[2], work[4]
-    place_of(legs, r, s, point, tangent, bend)
+    formula_point(legs, r, s, point, tangent, bend)
     worst = _apart(c[0], point, tangent, 0.0) / budgets[0]
     for m in range(1, 4):
         s = end if m == 3 and known else max(nearest_point(legs, r, c[m], s, point, tangent), s)
-        place_of(legs, r, s, point, tangent, bend)
+        formula_point(legs, r, s, point, tangent, bend)
         worst = max(worst, _apart(c[m], point, tangent, 0.0) / (budgets[1] if m == 3 else keeps.budget[r]))
     return worst, s
 

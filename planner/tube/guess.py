@@ -34,7 +34,7 @@ ARC_STEP = 0.8
 NEAREST_STEPS = 5
 
 
-class Cut(Protocol):
+class CutMotion(Protocol):
     """A motion cut into steps: what is read of a `Guess` and of what becomes of it."""
 
     @property

@@ -20,8 +20,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.tube.recursion import Factor, direction, factorise, forces, gaps
-from planner.tube.rows import VECTORS, Linear, linearise, slopes
+from planner.tube.curvature import Barrier
+from planner.tube.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
+from planner.tube.rows import VECTORS, Linear, put_rows, slopes
 
 LEAST_SLACK = 0.05  # of a start [-]
 FIRST_GAP = 0.3  # complementarity of the start, share of the time [-]
@@ -113,7 +114,7 @@ def _predicted(on, slacks, along, dual, second):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def solve(legs, limits, x, u, place, tuning):
+def solve_window(legs, limits, x, u, place, tuning):
     """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns whether it has been
     reached, the iterations, and the multipliers (N, R) of the rows, in units of time."""
     N, axes = len(u), u.shape[1] - 1
@@ -133,7 +134,7 @@ def solve(legs, limits, x, u, place, tuning):
     second, slope, q, ratio = np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many)
     gap, w, after, end = np.zeros((N, S)), np.zeros((N, S + C)), np.zeros((N, S)), np.zeros(S)
     dx, du = np.zeros((N + 1, S)), np.zeros((N, C))
-    linearise(legs, limits, x, u, lin)
+    put_rows(legs, limits, x, u, lin)
     gaps(x, u, gap)
     time = u[:, axes].sum()
     rows = _start(on, lin.g, time, slacks)
@@ -153,8 +154,8 @@ def solve(legs, limits, x, u, place, tuning):
             prox = min(prox * FREEZE, FROZEN)
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF * tuning.missed:
                 return True, iteration, z
-        if not products <= LOST * time or not factorise(
-            x, u, legs, limits, lin, z, ratio, tuning.pull + prox, tuning.smooth, factor
+        if not products <= LOST * time or not factor_steps(
+            x, u, legs, limits, lin, Barrier(z, ratio), (tuning.pull + prox, tuning.smooth), factor
         ):
             return False, iteration, z
         second[:] = 0.0
@@ -168,7 +169,7 @@ def solve(legs, limits, x, u, place, tuning):
                     if on[i, r]:
                         q[i, r] = (aim - second[i, r] + z[i, r] * missing[i, r]) / s[i, r]
             forces(limits, lin, q, tuning.pull, tuning.smooth, u, w)
-            direction(x, u, gap, w, end, factor, dx, du, after)
+            newton_step(x, u, gap, w, end, factor, NewtonStep(dx, du, after))
             slopes(limits, lin, dx, du, slope)
             _directions(on, slacks, slope, aim, second)
             along, dual = _reach(on, s, ds), _reach(on, z, dz)
@@ -176,7 +177,7 @@ def solve(legs, limits, x, u, place, tuning):
             end[k] += along * (after[N - 1, k] - end[k])
         x[1:N] += along * dx[1:N]
         u += along * du
-        linearise(legs, limits, x, u, lin)
+        put_rows(legs, limits, x, u, lin)
         gaps(x, u, gap)
         for i in range(N):
             for r in range(R):

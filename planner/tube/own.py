@@ -21,13 +21,13 @@ from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
 from planner.tube.checks import Keeps, normal_shares, worst_shares
 from planner.tube.guess import Guess
-from planner.tube.interior_point import Tuning, solve
+from planner.tube.interior_point import Tuning, solve_window
+from planner.tube.legs import LegFormulas
 from planner.tube.motion import Steps, closed, integrated
 from planner.tube.nlp import PULL, SMOOTH
 from planner.tube.outcome import TubeSolution
 from planner.tube.price import columns, step_prices
-from planner.tube.problem import Window, window_of
-from planner.tube.rows import Legs
+from planner.tube.problem import StepWindow, window_of
 from planner.tube.run import TubeRun
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
@@ -189,7 +189,7 @@ class _Search:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
                 tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed)
-                done, iterations, z = solve(
+                done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning
                 )
                 count[1] += iterations
@@ -202,7 +202,7 @@ class _Search:
                     break
         return False
 
-    def _taken(self, lo: int, hi: int, window: Window, tight: FloatArray) -> bool:
+    def _taken(self, lo: int, hi: int, window: StepWindow, tight: FloatArray) -> bool:
         """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place.
         Where their normal acceleration is above its limit, `tight` (hi - lo,) grows."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
@@ -228,7 +228,7 @@ def keeps_of(run: TubeRun) -> Keeps:
     """What the run has to keep, for the kernel."""
     names = ("length", "base", "drift", "e1", "e2", "radius", "rate")
     return Keeps(
-        legs=Legs(**{name: getattr(run, name) for name in names}),
+        legs=LegFormulas(**{name: getattr(run, name) for name in names}),
         velocity=run.velocity,
         acceleration=run.acceleration,
         jerk=run.jerk,

@@ -17,7 +17,7 @@ from planner.tube.splice import SplicedRun
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundRun:
     """How the search along a run ended.
 
     steps : None where the start stays
@@ -55,7 +55,7 @@ class Found:
         return [(lo, hi, bool(kept[lo])) for lo, hi in pairwise(edges.tolist())]
 
 
-def parts_of(toolpath: Toolpath, found: Found, start: SplicedRun) -> list[SplicedRun]:
+def parts_of(toolpath: Toolpath, found: FoundRun, start: SplicedRun) -> list[SplicedRun]:
     """The parts of the motion along a run, with the dwell before it, and the one at the end of the job.
 
     start : the motion of the start along the run
@@ -75,7 +75,7 @@ def parts_of(toolpath: Toolpath, found: Found, start: SplicedRun) -> list[Splice
     return parts
 
 
-def _motion(toolpath: Toolpath, found: Found, lo: int, hi: int) -> AxisMotion:
+def _motion(toolpath: Toolpath, found: FoundRun, lo: int, hi: int) -> AxisMotion:
     """The steps lo .. hi - 1; before the first one of the run its dwell, and after the last one that at the end of the job."""
     run, steps, place = found.run, found.steps, found.place
     assert steps is not None

@@ -21,7 +21,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.tube import rows
-from planner.tube.problem import Window
+from planner.tube.problem import StepWindow
 
 # Columns behind those of the axes (jerk, acceleration, velocity) of the prices of a step.
 FEED, NORMAL, ROOM, VERTEX, OTHER = range(5)
@@ -32,7 +32,7 @@ def columns(axes: int) -> int:
     return 3 * axes + 5
 
 
-def step_prices(window: Window, z: FloatArray) -> FloatArray:
+def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
     """(N, 3 A + 5) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a window: jerk, acceleration and
     velocity of each axis, then the feed, the normal acceleration, the room of the leg and that of the vertex that the step begins at,
     and what bounds only the steps themselves."""

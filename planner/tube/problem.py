@@ -8,10 +8,11 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.tube import rows
-from planner.tube.guess import Cut
+from planner.tube.guess import CutMotion
+from planner.tube.legs import LegFormulas
 from planner.tube.nlp import LONGER, LONGER_WATCHED
 from planner.tube.numbers import ROUNDING, pace
-from planner.tube.rows import Legs, StepLimits
+from planner.tube.rows import StepLimits
 from planner.tube.run import TubeRun
 
 # Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks stay inside them.
@@ -20,10 +21,10 @@ NARROWED = 2.0
 STEP_SHARE = 0.95
 
 
-class Window(NamedTuple):
+class StepWindow(NamedTuple):
     """The steps of a window, and where its search begins; S = 3 A, C = A + 1."""
 
-    legs: Legs
+    legs: LegFormulas
     limits: StepLimits
     x: FloatArray  # (N+1, S) position, velocity, acceleration of the nodes; the first and the last one stay
     u: FloatArray  # (N, C) jerk and duration
@@ -33,8 +34,8 @@ class Window(NamedTuple):
 
 
 def window_of(
-    run: TubeRun, guess: Cut, lo: int, hi: int, missed: float, tight: FloatArray | None = None
-) -> Window:
+    run: TubeRun, guess: CutMotion, lo: int, hi: int, missed: float, tight: FloatArray | None = None
+) -> StepWindow:
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
     missed : by how much rows may be missed at the end [-]
@@ -45,7 +46,7 @@ def window_of(
     second = float(h.mean())
     length = float(np.abs(np.diff(state[:, 0], axis=0)).sum() / len(h))
     speed, acc, jerk = length / second, length / second**2, length / second**3
-    legs = Legs(
+    legs = LegFormulas(
         length=run.length / length,
         base=run.base / length,
         drift=run.drift,
@@ -57,7 +58,7 @@ def window_of(
     x = np.concatenate([state[:, 0] / length, state[:, 1] / speed, state[:, 2] / acc], axis=1)
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
     place = (guess.place[part, :3] - run.offset[leg][:, None]) / length
-    return Window(
+    return StepWindow(
         legs=legs,
         limits=_limits(run, guess, lo, hi, (second, length), (missed, tight)),
         x=x,
@@ -70,7 +71,7 @@ def window_of(
 
 def _limits(
     run: TubeRun,
-    guess: Cut,
+    guess: CutMotion,
     lo: int,
     hi: int,
     units: tuple[float, float],

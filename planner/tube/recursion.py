@@ -23,18 +23,18 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.tube.rows import (
-    FEED_NODE,
-    FEED_ROWS,
-    NORMAL_MID,
-    NORMAL_NODE,
-    TUBE_NODE,
-    VECTOR_OF_NODE,
-    VECTORS,
-    vector_of,
-)
+from planner.tube.curvature import model_of_rows
+from planner.tube.rows import TUBE_NODE, VECTOR_OF_NODE, VECTORS, vector_of
 
 END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
+
+
+class NewtonStep(NamedTuple):
+    """Of N steps."""
+
+    dx: FloatArray  # (N+1, S)
+    du: FloatArray  # (N, C)
+    after: FloatArray  # (N, S) lambda behind every step
 
 
 class Factor(NamedTuple):
@@ -43,92 +43,6 @@ class Factor(NamedTuple):
     K: FloatArray  # (N, C, S)
     L: FloatArray  # (N, C, C) Cholesky factor of W_uu + B'PB
     P: FloatArray  # (N+1, S, S)
-
-
-@njit(cache=True, error_model="numpy")
-def _add_vector(W, axes, alpha, e, G):
-    """W += J'GJ for one vector y with dy = J d."""
-    h = 4 * axes
-    for k in range(axes):
-        along = 0.0
-        for m in range(axes):
-            along += G[k, m] * e[m]
-        W[h, h] += e[k] * along
-        for a in range(4):
-            if alpha[a] == 0.0:
-                continue
-            W[h, a * axes + k] += alpha[a] * along
-            for b in range(a + 1):
-                both = alpha[a] * alpha[b]
-                if both != 0.0:
-                    for m in range(axes):
-                        W[a * axes + k, b * axes + m] += both * G[k, m]
-
-
-@njit(cache=True, error_model="numpy")
-def _add_row(W, axes, one, other, by):
-    """W += by g g' for a row that depends on two vectors; of each alpha, e and the row's derivative (A,)."""
-    size = 4 * axes + 1
-    alpha, e, n = one
-    other_alpha, other_e, other_n = other
-    g = np.zeros(size)
-    for k in range(axes):
-        for a in range(4):
-            g[a * axes + k] = alpha[a] * n[k] + other_alpha[a] * other_n[k]
-        g[size - 1] += e[k] * n[k] + other_e[k] * other_n[k]
-    for s in range(size):
-        for t in range(s + 1):
-            W[s, t] += by * g[s] * g[t]
-
-
-@njit(cache=True, error_model="numpy")
-def _model(W, G, legs, lin, limits, i, z, ratio, of, axes):
-    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with multipliers z (R,) and z/s (R,); G (14, A, A) is overwritten."""
-    W[:] = 0.0
-    G[:] = 0.0
-    more = 8 * axes
-    for r in range(len(of)):
-        if not limits.on[i, r]:
-            continue
-        m = of[r]
-        if m < 0:
-            W[4 * axes, 4 * axes] += ratio[r] / (limits.h[i] * limits.h[i])
-            continue
-        if r < more:
-            k = r % axes
-            G[m, k, k] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, k]
-            continue
-        kind, flat = r - more, 0.0
-        c = kind - TUBE_NODE
-        if 1 <= c <= 2 and legs.radius[limits.leg[i]] > 0.0:
-            other = VECTOR_OF_NODE[c - 1]
-            own = lin.alpha[i, m], lin.e[i, m], lin.n[i, r]
-            _add_row(W, axes, own, (lin.alpha[i, other], lin.e[i, other], lin.node[i, c - 1]), ratio[r])
-        else:
-            for k in range(axes):
-                for t in range(axes):
-                    G[m, k, t] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, t]
-        if kind == FEED_NODE:
-            flat = z[r] / limits.feed_node[i] ** 2
-        elif FEED_ROWS <= kind < TUBE_NODE:
-            flat = z[r] / lin.radius[i, kind - FEED_ROWS] ** 2
-        elif 0 <= c <= 2:
-            flat = z[r] / (limits.room_node[i] ** 2 if c == 0 else limits.room[i] ** 2)
-            square = 0.0
-            for k in range(axes):
-                square += lin.tangent[i, c, k] ** 2
-            if square > 0.0:
-                for k in range(axes):
-                    for t in range(axes):
-                        G[m, k, t] -= flat * lin.tangent[i, c, k] * lin.tangent[i, c, t] / square
-        elif kind == NORMAL_NODE:
-            flat = z[r] / limits.normal_node[i] ** 2
-        elif kind == NORMAL_MID:
-            flat = z[r] / limits.normal[i] ** 2
-        for k in range(axes):
-            G[m, k, k] += flat
-    for m in range(VECTORS):
-        _add_vector(W, axes, lin.alpha[i, m], lin.e[i, m], G[m])
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,9 +66,10 @@ def _times_transposed(M, h, axes, out):
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(x, u, legs, limits, lin, z, ratio, pull, smooth, factor):
-    """The recursion into `factor`, with multipliers z (N, R), z/s (N, R), and the weights `pull` of (dh/limits.h)^2 and `smooth` of
-    limits.h (j/limit)^2. False where it breaks down."""
+def factor_steps(x, u, legs, limits, lin, barrier, weights, factor):
+    """The recursion into `factor`, with a barrier (curvature.py) and the weights of (dh/limits.h)^2 and of limits.h (j/limit)^2. False
+    where it breaks down."""
+    pull, smooth = weights
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
     size, R = S + C, lin.g.shape[1]
@@ -168,7 +83,7 @@ def factorise(x, u, legs, limits, lin, z, ratio, pull, smooth, factor):
         P[N, k, k] = END
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
-        _model(W, G, legs, lin, limits, i, z[i], ratio[i], of, axes)
+        model_of_rows(W, G, legs, limits, lin, i, barrier, of)
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
         for k in range(axes):
             W[S + k, S + k] += 2.0 * smooth * limits.h[i] / limits.box[0, k] ** 2
@@ -280,9 +195,9 @@ def forces(limits, lin, q, pull, smooth, u, w):
 
 
 @njit(cache=True, error_model="numpy")
-def direction(x, u, gap, w, end, factor, dx, du, after):
-    """The step dx (N+1, 3 A), du (N, A+1) for the gradient w (N, 4 A + 1) and the gaps (N, 3 A); end (3 A,) is lambda of the last node.
-    after (N, 3 A) is lambda behind every step."""
+def newton_step(x, u, gap, w, end, factor, step):
+    """The step for the gradient w (N, 4 A + 1) and the gaps (N, 3 A); end (3 A,) is lambda of the last node."""
+    dx, du, after = step
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
     p, rest, by_h, force = end.copy(), np.empty(S), np.empty(S), np.empty(C)

@@ -37,6 +37,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.tube.legs import Foot, Slopes, nearest_point, off_tangent
 
 # Vectors y, in this order.
 P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG, NEXT = range(14)
@@ -47,19 +48,6 @@ H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the fe
 ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC = range(9, 14)
 MORE_ROWS = 14
 VECTOR_OF_BOX = (J, A, MID, V)
-NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place of an arc, from the last one
-
-
-class Legs(NamedTuple):
-    """R legs of a run (run.py), in the units of the problem."""
-
-    length: FloatArray  # (R,)
-    base: FloatArray  # (R, A)
-    drift: FloatArray  # (R, A)
-    e1: FloatArray  # (R, A)
-    e2: FloatArray  # (R, A)
-    radius: FloatArray  # (R,)
-    rate: FloatArray  # (R,)
 
 
 class StepLimits(NamedTuple):
@@ -99,79 +87,6 @@ class Linear(NamedTuple):
 def count(axes):
     """How many rows a step of so many axes has."""
     return 8 * axes + MORE_ROWS
-
-
-@njit(cache=True, error_model="numpy")
-def nearest_point(legs, r, c, x, point, tangent):
-    """point (A,) of leg r nearest to c (A,), from the place x on arcs; its tangent (A,), and its place."""
-    axes, length = len(c), legs.length[r]
-    radius, rate = legs.radius[r], legs.rate[r]
-    steps = NEAREST_STEPS if radius > 0.0 else 1
-    if radius == 0.0:
-        x = 0.0
-    for n in range(steps + 1):
-        cos, sin = np.cos(rate * x), np.sin(rate * x)
-        miss, square = 0.0, 0.0
-        for k in range(axes):
-            circle, across = (
-                cos * legs.e1[r, k] + sin * legs.e2[r, k],
-                cos * legs.e2[r, k] - sin * legs.e1[r, k],
-            )
-            point[k] = legs.base[r, k] + legs.drift[r, k] * x + radius * circle
-            tangent[k] = legs.drift[r, k] + radius * rate * across
-            miss += (c[k] - point[k]) * tangent[k]
-            square += tangent[k] * tangent[k]
-        if n < steps:
-            x = min(max(x + miss / square, 0.0), length)
-    return x
-
-
-@njit(cache=True, error_model="numpy")
-def place_of(legs, r, x, point, tangent, bend):
-    """point (A,) of leg r at the place x, with its tangent and second derivative (A,)."""
-    radius, rate = legs.radius[r], legs.rate[r]
-    cos, sin = np.cos(rate * x), np.sin(rate * x)
-    for k in range(len(point)):
-        circle, across = cos * legs.e1[r, k] + sin * legs.e2[r, k], cos * legs.e2[r, k] - sin * legs.e1[r, k]
-        point[k] = legs.base[r, k] + legs.drift[r, k] * x + radius * circle
-        tangent[k] = legs.drift[r, k] + radius * rate * across
-        bend[k] = -radius * rate * rate * circle
-
-
-@njit(cache=True, error_model="numpy")
-def along_tangent(length, c, x, ahead, point, tangent):
-    """How far along the tangent (A,) at the place x of a leg, from its point (A,), c (A,) is: ahead of it or else behind it, and
-    within the leg."""
-    miss, square = 0.0, 0.0
-    for k in range(len(c)):
-        miss += (c[k] - point[k]) * tangent[k]
-        square += tangent[k] * tangent[k]
-    far = miss / square
-    return min(max(far, 0.0), length - x) if ahead else max(min(far, 0.0), -x)
-
-
-@njit(cache=True, error_model="numpy")
-def _of_tangent(legs, r, c, node, x, fixed, ahead, room, n, n_node, tangent):
-    """The row of an inner control point c (A,) on an arc: its distance from the tangent at the place x of the node (A,) behind or ahead
-    of it. n, n_node (A,) are its derivatives, `tangent` that of the place, 0 where that is an end of the leg. If the place is `fixed`
-    it does not move with the node. Returns the row, and the place."""
-    axes = len(c)
-    point, bend = np.empty(axes), np.empty(axes)
-    place_of(legs, r, x, point, tangent, bend)
-    far = along_tangent(legs.length[r], c, x, ahead, point, tangent)
-    square, slope, long, turned = 0.0, 0.0, 0.0, 0.0
-    inside = far > 0.0 and x + far < legs.length[r] if ahead else far < 0.0 and x + far > 0.0
-    for k in range(axes):
-        off = c[k] - point[k] - far * tangent[k]
-        square += off * off
-        slope += off * (far * bend[k] + (0.0 if inside else tangent[k]))
-        long += tangent[k] * tangent[k]
-        turned += (node[k] - point[k]) * bend[k]
-        n[k] = off / (room * room)
-    by_node = 0.0 if fixed else -slope / ((long - turned) * room * room)
-    for k in range(axes):
-        n_node[k] = by_node * tangent[k]
-    return 0.5 * (square / (room * room) - 1.0), x + far
 
 
 @njit(cache=True, error_model="numpy")
@@ -240,7 +155,7 @@ def _ball(y, vector, limit, row, g, n):
 
 
 @njit(cache=True, error_model="numpy")
-def linearise(legs, limits, x, u, lin):
+def put_rows(legs, limits, x, u, lin):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `lin`; its places are where the search on arcs begins."""
     N, axes = len(u), u.shape[1] - 1
     y, point = np.empty((VECTORS, axes)), np.empty(axes)
@@ -292,11 +207,12 @@ def linearise(legs, limits, x, u, lin):
                     if not ends:
                         place = nearest_point(legs, r, y[NEXT], lin.place[i, 2], point, lin.tangent[i, 2])
                 fixed = (ends if c == 2 else at_vertex) or place <= 0.0 or place >= legs.length[r]
-                row, slopes_of, room = more + TUBE_NODE + c, lin.node[i, c - 1], limits.room[i]
-                tangent = lin.tangent[i, c]
-                found = _of_tangent(
-                    legs, r, y[vector], y[other], place, fixed, c == 1, room, n[row], slopes_of, tangent
+                row = more + TUBE_NODE + c
+                foot, slopes_of = (
+                    Foot(place, fixed, c == 1),
+                    Slopes(n[row], lin.node[i, c - 1], lin.tangent[i, c]),
                 )
+                found = off_tangent(legs, r, y[vector], y[other], foot, limits.room[i], slopes_of)
                 g[row], lin.place[i, c] = found
         order_node, order_mid, arc = 0.0, 0.0, 0.0
         for k in range(axes):

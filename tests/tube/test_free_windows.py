@@ -16,12 +16,13 @@ from planner.motion.vertex_times import passing_times
 from planner.nc.reader import parse_program
 from planner.tube import own, rows
 from planner.tube.checks import normal_shares, worst_shares
+from planner.tube.curvature import Barrier
 from planner.tube.guess import Guess, guess_from
 from planner.tube.motion import integrated
 from planner.tube.nlp import TubeNLP
 from planner.tube.own import TubeOwn
 from planner.tube.problem import window_of
-from planner.tube.recursion import Factor, direction, factorise, forces, gaps
+from planner.tube.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.tube.run import TubeRun, tube_runs_of
 from planner.tube.solvers import SOLVERS
 
@@ -60,7 +61,7 @@ def linear_of(window, x, u):
         place=window.place.copy(),
         radius=np.zeros((steps, 3)),
     )
-    rows.linearise(window.legs, window.limits, x, u, lin)
+    rows.put_rows(window.legs, window.limits, x, u, lin)
     return lin
 
 
@@ -123,7 +124,7 @@ def test_the_recursion_solves_the_system_of_all_steps():
         np.zeros((steps, controls, controls)),
         np.zeros((steps + 1, states, states)),
     )
-    assert factorise(x, u, window.legs, limits, lin, z, ratio, 0.5, 0.1, factor)
+    assert factor_steps(x, u, window.legs, limits, lin, Barrier(z, ratio), (0.5, 0.1), factor)
     w, gap = np.zeros((steps, states + controls)), np.zeros((steps, states))
     forces(limits, lin, q, 0.5, 0.1, u, w)
     gaps(x, u, gap)
@@ -131,7 +132,7 @@ def test_the_recursion_solves_the_system_of_all_steps():
 
     def moved(gradient, off):
         dx, du, after = np.zeros((steps + 1, states)), np.zeros((steps, controls)), np.zeros((steps, states))
-        direction(x, u, off, gradient, np.zeros(states), factor, dx, du, after)
+        newton_step(x, u, off, gradient, np.zeros(states), factor, NewtonStep(dx, du, after))
         return dx, du, after
 
     dx, du, after = moved(w, gap)
@@ -248,7 +249,7 @@ def test_normal_acceleration_between_its_places_is_lowered_and_solved_again(monk
 
 def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     """The motion of the start between two windows that were found: verified, nothing jumps, and it is said."""
-    asked = own.solve
+    asked = own.solve_window
 
     def hasty(legs, limits, x, u, place, tuning):
         return (
@@ -257,7 +258,7 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
             else asked(legs, limits, x, u, place, tuning)
         )
 
-    monkeypatch.setattr(own, "solve", hasty)
+    monkeypatch.setattr(own, "solve_window", hasty)
     monkeypatch.setattr(own, "WINDOW", 60)
     monkeypatch.setattr(own, "OVERLAP", 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 10)

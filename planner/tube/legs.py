@@ -1,0 +1,113 @@
+"""The legs of a run (run.py) as kernels see them: points, tangents, nearest places, and how far a control point is from a tangent."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
+
+NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place of an arc, from the last one
+
+
+class LegFormulas(NamedTuple):
+    """R legs of a run (run.py), in the units of the problem."""
+
+    length: FloatArray  # (R,)
+    base: FloatArray  # (R, A)
+    drift: FloatArray  # (R, A)
+    e1: FloatArray  # (R, A)
+    e2: FloatArray  # (R, A)
+    radius: FloatArray  # (R,)
+    rate: FloatArray  # (R,)
+
+
+@njit(cache=True, error_model="numpy")
+def nearest_point(legs, r, c, x, point, tangent):
+    """point (A,) of leg r nearest to c (A,), from the place x on arcs; its tangent (A,), and its place."""
+    axes, length = len(c), legs.length[r]
+    radius, rate = legs.radius[r], legs.rate[r]
+    steps = NEAREST_STEPS if radius > 0.0 else 1
+    if radius == 0.0:
+        x = 0.0
+    for n in range(steps + 1):
+        cos, sin = np.cos(rate * x), np.sin(rate * x)
+        miss, square = 0.0, 0.0
+        for k in range(axes):
+            circle, across = (
+                cos * legs.e1[r, k] + sin * legs.e2[r, k],
+                cos * legs.e2[r, k] - sin * legs.e1[r, k],
+            )
+            point[k] = legs.base[r, k] + legs.drift[r, k] * x + radius * circle
+            tangent[k] = legs.drift[r, k] + radius * rate * across
+            miss += (c[k] - point[k]) * tangent[k]
+            square += tangent[k] * tangent[k]
+        if n < steps:
+            x = min(max(x + miss / square, 0.0), length)
+    return x
+
+
+@njit(cache=True, error_model="numpy")
+def formula_point(legs, r, x, point, tangent, bend):
+    """point (A,) of leg r at the place x, with its tangent and second derivative (A,)."""
+    radius, rate = legs.radius[r], legs.rate[r]
+    cos, sin = np.cos(rate * x), np.sin(rate * x)
+    for k in range(len(point)):
+        circle, across = cos * legs.e1[r, k] + sin * legs.e2[r, k], cos * legs.e2[r, k] - sin * legs.e1[r, k]
+        point[k] = legs.base[r, k] + legs.drift[r, k] * x + radius * circle
+        tangent[k] = legs.drift[r, k] + radius * rate * across
+        bend[k] = -radius * rate * rate * circle
+
+
+@njit(cache=True, error_model="numpy")
+def along_tangent(length, c, x, ahead, point, tangent):
+    """How far along the tangent (A,) at the place x of a leg, from its point (A,), c (A,) is: ahead of it or else behind it, and
+    within the leg."""
+    miss, square = 0.0, 0.0
+    for k in range(len(c)):
+        miss += (c[k] - point[k]) * tangent[k]
+        square += tangent[k] * tangent[k]
+    far = miss / square
+    return min(max(far, 0.0), length - x) if ahead else max(min(far, 0.0), -x)
+
+
+class Foot(NamedTuple):
+    """Where the tangent touches an arc to which an inner control point belongs: at the place x of a node, behind the point or ahead of
+    it. A place that is `fixed` does not move with the node."""
+
+    x: float
+    fixed: bool
+    behind: bool
+
+
+class Slopes(NamedTuple):
+    """Derivatives of a row."""
+
+    n: FloatArray  # (A,) by the control point
+    node: FloatArray  # (A,) by the node
+    tangent: FloatArray  # (A,) of the leg where the control point belongs to
+
+
+@njit(cache=True, error_model="numpy")
+def off_tangent(legs, r, c, node, foot, room, slopes):
+    """The row of an inner control point c (A,) on an arc, (d2/room2 - 1)/2 with its distance d from the tangent at a foot, and the
+    place on the leg; its derivatives into `slopes`."""
+    axes, x = len(c), foot.x
+    point, bend, tangent = np.empty(axes), np.empty(axes), slopes.tangent
+    formula_point(legs, r, x, point, tangent, bend)
+    far = along_tangent(legs.length[r], c, x, foot.behind, point, tangent)
+    square, slope, long, turned = 0.0, 0.0, 0.0, 0.0
+    inside = far > 0.0 and x + far < legs.length[r] if foot.behind else far < 0.0 and x + far > 0.0
+    for k in range(axes):
+        off = c[k] - point[k] - far * tangent[k]
+        square += off * off
+        slope += off * (far * bend[k] + (0.0 if inside else tangent[k]))
+        long += tangent[k] * tangent[k]
+        turned += (node[k] - point[k]) * bend[k]
+        slopes.n[k] = off / (room * room)
+    by_node = 0.0 if foot.fixed else -slope / ((long - turned) * room * room)
+    for k in range(axes):
+        slopes.node[k] = by_node * tangent[k]
+    return 0.5 * (square / (room * room) - 1.0), x + far

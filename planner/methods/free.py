@@ -192,7 +192,8 @@ class Starts:
 
 def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) -> FoundRun:
     """What the search along run k leads to from one start after the other, until it is faster than the first start."""
-    least, why = np.inf, []
+    least: float = np.inf
+    why: list[str] = []
     for start in starts:
         first = not why
         least = start.lasting(k) if first else least

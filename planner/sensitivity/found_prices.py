@@ -46,6 +46,7 @@ POWER = {
 # How far a change foretold to 10 % more of a limit may be off [-], and by how much a plan made again is faster or slower for no other
 # reason [share of the time] (benchmarks/found_prices.py).
 WITHIN, UNREST = 0.1, 2e-4
+ROUNDING = 1e-9  # of sums over steps [-]
 SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
 TIED = 1e-2  # what a limit has to cost of a step's time to hold it [-]; of those that do not it is some 1e-5
 
@@ -122,7 +123,8 @@ class Priced(NamedTuple):
     def saving(self, bound: float) -> Saving:
         """The least and the most of it, where it is at most `bound` [s]."""
         saved = min(self.saved(), bound)
-        least = 1.0 - (2.0 if bound < self.saved() else 1.0) * WITHIN
+        partly = bound < (1.0 - ROUNDING) * self.saved()
+        least = 1.0 - (2.0 if partly else 1.0) * WITHIN
         return Saving(*sorted((least * saved, (1.0 + WITHIN) * saved)))
 
 
@@ -149,12 +151,14 @@ def found_prices(
         name: priced.saving(at_feed if name == FEED.name else np.inf).widened(UNREST * cycle_time)
         for name, priced in more.items()
     }
+    saved = {name: saving.middle for name, saving in ranges.items()}
+    saved |= {name: min(middle, most) for name, middle in saved.items() if name != TOLERANCE}
     ranges |= {name: saving.below(most) for name, saving in ranges.items() if name != TOLERANCE}
     return PriceList(
         limits={name: slope[name] / limit[name] for name in limit},
         feed=slope[FEED.name],
         tolerance=tolerance,
-        saved={name: saving.middle for name, saving in ranges.items()},
+        saved=saved,
         corners=_dearest(toolpath, of_tolerance.alone),
         ranges={name: (saving.least, saving.most) for name, saving in ranges.items()},
         hints=tuple(name for name, saving in ranges.items() if saving.vague(cycle_time)),

@@ -41,4 +41,4 @@ def test_no_threads_are_refused(tmp_path):
     refused = CliRunner().invoke(app, ["plan", str(job), "--threads", "0"])
     assert refused.exit_code == 2
     assert "--threads" in refused.output
-    assert "greater than or equal to 1" in refused.output
+    assert "must be 1 or more" in refused.output

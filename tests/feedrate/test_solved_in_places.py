@@ -63,7 +63,8 @@ def test_it_keeps_all_limits_and_takes_the_time_that_solving_everything_takes(be
     costs = whole.cycle_time / before[1].cycle_time - 1.0
     assert costs > 1e-5  # else this test shows nothing
     assert solution.cycle_time == pytest.approx(whole.cycle_time, rel=0.1 * costs)
-    np.testing.assert_allclose(solution.prices.jerk, whole.prices.jerk, rtol=2e-2)
+    # the multipliers are those from before the limits became tighter
+    np.testing.assert_allclose(solution.prices.jerk, whole.prices.jerk, rtol=5e-2)
 
 
 def test_outside_the_ranges_the_motion_is_as_before_but_for_the_slowing_down_of_the_end(

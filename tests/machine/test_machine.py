@@ -71,7 +71,7 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
 def test_a_machine_file_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "machine.toml").write_bytes(b"\xff\xfe\x00\x00")
     assert "cannot be read" in refusal(tmp_path / "machine.toml")
-    assert "cannot be read" in refusal(tmp_path)
+    assert "this is a directory; give the machine file" in refusal(tmp_path)
 
 
 @pytest.mark.parametrize(

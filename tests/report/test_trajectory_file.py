@@ -160,8 +160,9 @@ def test_files_that_are_none(tmp_path: Path, suffix: str, content: bytes) -> Non
 def test_missing_file_and_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not found"):
         read_trajectory(tmp_path / "none.parquet")
+    (tmp_path / "some.xlsx").write_bytes(b"")
     with pytest.raises(InputError, match=r"unknown format '\.xlsx'"):
-        read_trajectory(tmp_path / "none.xlsx")
+        read_trajectory(tmp_path / "some.xlsx")
     with pytest.raises(ValueError, match="unknown format"):
         write_trajectory(tmp_path / "none.xlsx", TRAJECTORY)
 

@@ -29,7 +29,7 @@ def on_corners(request):
 @pytest.fixture(scope="module")
 def on_splines():
     among = ("feed", "acceleration.x", "tolerance")
-    return compared("pentagon", problems.pentagon(), MACHINE, "auto", among)
+    return compared("pentagon", problems.pentagon(), MACHINE, "spline", among)
 
 
 @pytest.mark.slow

@@ -14,6 +14,8 @@ From such a state the range's solution is looked for beside the known profile sl
     W = (1 - q^2)^2,    q = s / way,    u = (x W)'/2 = u W - 2 q (1 - q^2) x / way,
 
 which has the state at q = 0. A range that gets no solution keeps its profile, and its limits what they were.
+
+Multipliers stay those of the solution before: between two states that are fixed they would price these instead of the limits.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.window import Way
 from planner.feedrate.solution import FeedrateSolution
 
+MULTIPLIERS = ("rows", "feed", "dynamics")  # columns of a profile
 REACH = 0.5  # to each side of a changed point [ways to brake]
 DEEP = 0.9  # feed^2 at a dip, over that of the peaks beside it, at most [-]
 EDGE = 8  # points at least on each side of a changed one: on coarse grids few points lie on a way to brake
@@ -111,7 +114,7 @@ class RangeAgain:
         self.solved = not self.chain.failed and not self.chain.stops
         for name, old in before.items():
             values = getattr(self.profile, name)[self.first : ends[name]]
-            if not self.solved:
+            if not self.solved or name in MULTIPLIERS:
                 values[:] = old
             elif name in ("x", "u"):
                 values[0], values[-1] = old[0], old[-1]  # but for rounding they are

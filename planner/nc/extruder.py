@@ -57,7 +57,9 @@ def with_extruder(program: Program, words: Words, rows: int) -> Program:
     first, last = (np.searchsorted(program.line[of_moves], line, side=side) for side in ("left", "right"))
     several = np.flatnonzero(last - first > 1)
     if len(several):
-        _refuse(program, line[several], "an E word beside more than one move; write G0 to G3 alone on its line")
+        _refuse(
+            program, line[several], "an E word beside more than one move; write G0 to G3 alone on its line"
+        )
     alone = last == first
     without = np.flatnonzero(alone & (fed.feed[given] == 0.0))
     if len(without):

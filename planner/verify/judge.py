@@ -148,7 +148,7 @@ def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited:
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         axes=trajectory.axes,
-        own=machine.own,
+        own=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
     )
 
 

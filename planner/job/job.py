@@ -133,7 +133,7 @@ class Job:
         machine, toolpath = self.real
         with self.stage("sample"):
             motion = self.settled(motion, not_limited)
-            whole = motion if toolpath.extrusion is None else Extruding(motion, toolpath)
+            whole = motion if toolpath.extrusion is None else Extruding(motion, toolpath, machine.dt)
             trajectory = sample_motion(whole, machine.dt)
             places = SegmentsInOrder(toolpath)
 

@@ -21,9 +21,10 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import PHASES, rest_to_rest_phases
 from planner.constraints.own import along_path
 from planner.geometry.extrusion import Extrusion
-from planner.geometry.toolpath import Toolpath
-from planner.motion.timing import CHUNK, MotionInTime
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory
+from planner.motion.vertex_times import passing_times_of
 
 AT_JOINT = 1e-9  # a motion this near to the length at which it rests is at rest there [mm + share of the length]
 
@@ -49,11 +50,14 @@ class _Alone(NamedTuple):
 
 
 class Extruding:
-    """A motion with its extruder: its trajectories have the columns `extruder`."""
+    """A motion with its extruder: its trajectories have the columns `extruder`.
 
-    def __init__(self, motion: MotionInTime, toolpath: Toolpath):
+    dt : period at which joints are looked for [s]
+    """
+
+    def __init__(self, motion: MotionInTime, toolpath: Toolpath, dt: float):
         assert toolpath.extrusion is not None
-        self.motion, self.toolpath, self.extrusion = motion, toolpath, toolpath.extrusion
+        self.motion, self.toolpath, self.dt, self.extrusion = motion, toolpath, dt, toolpath.extrusion
 
     @property
     def t(self) -> FloatArray:
@@ -67,7 +71,7 @@ class Extruding:
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Extruding:
         """The motion standing longer by `by` (n,) [s] where it comes to rest, at the times `at` (n,) [s]."""
-        return Extruding(self.motion.waiting(at, by), self.toolpath)
+        return Extruding(self.motion.waiting(at, by), self.toolpath, self.dt)
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) [s]; dt [s] is the trajectory's interpolation period."""
@@ -78,20 +82,23 @@ class Extruding:
     def _passed(self) -> _Passed:
         """Where and when the joints are passed."""
         edges = np.unique(np.append(self.motion.t, self.motion.end))
-        s, block = np.empty(len(edges)), np.empty(len(edges), dtype=np.int64)
-        for first in range(0, len(edges), CHUNK):
-            part = slice(first, first + CHUNK)
-            seen = self.motion.at(edges[part], 1.0)
-            s[part], block[part] = seen.s, seen.block
-        joint = self.extrusion.joint
-        behind = self.toolpath.block[np.minimum(joint, len(self.toolpath) - 1)]
-        at = np.minimum(np.searchsorted(np.maximum.accumulate(block), behind), len(edges) - 1)
-        way = s[at]
+        s = self._way(edges)
+        chunks = in_chunks(self.motion, self.dt, np.append(np.arange(0.0, self.motion.end, self.dt), edges))
+        when = passing_times_of(chunks, self.toolpath)[self.extrusion.joint]
+        times, place = np.unique(when, return_inverse=True)
+        way = np.maximum.accumulate(self._way(times)[place])
         way[0], way[-1] = s[0], s[-1]
         near = AT_JOINT * (1.0 + way)
         arrival = edges[np.minimum(np.searchsorted(s, way - near), len(edges) - 1)]
         departure = edges[np.searchsorted(s, way + near, side="right") - 1]
+        rests = self.toolpath.joint[self.extrusion.joint] == Joint.STOP
+        arrival, departure = np.where(rests, arrival, when), np.where(rests, departure, when)
         return _Passed(way, arrival, np.maximum(departure, arrival))
+
+    def _way(self, times: FloatArray) -> FloatArray:
+        """(n,) the length run at ascending times (n,) [mm]."""
+        parts = [times[first : first + CHUNK] for first in range(0, len(times), CHUNK)]
+        return np.concatenate([self.motion.at(part, 1.0).s for part in parts])
 
     @cached_property
     def _alone(self) -> _Alone:

@@ -1,8 +1,8 @@
 """What the extruder of a 3-D printer does along a path: an axis that follows the way, and moves alone at full stops.
 
-Along the way it feeds in proportion to the length of the motion's path between two joints where both have their programmed place, so that
-what is programmed is fed, whatever corners the path cuts. Where its ratio changes its speed steps, as on printers: no motion that goes
-on could avoid it. Joints nearer to each other than `APART` tolerances share one ratio; without that the rounding of E on short blocks
+Between two joints at which it has its programmed place it feeds in proportion to the length of the motion's path, so that what is
+programmed is fed, whatever corners the path cuts. Where its ratio changes its speed steps, as on printers: no motion that goes on could
+avoid it. Joints nearer to each other than `APART` tolerances share one ratio; without that the rounding of E on short blocks
 would be steps of its own.
 
 Its limits v, a, j are limits v/r, a/r, j/r along the path where the ratio is r. A motion within eps of a joint's vertex saves at most

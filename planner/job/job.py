@@ -26,9 +26,9 @@ from planner.job.stages import Stages
 from planner.job.trace import Tell
 from planner.lookahead.stop_moves import stop_time
 from planner.machine import Machine
+from planner.motion.extruding import Extruding
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.shaping import ShapedMotion
-from planner.motion.extruding import Extruding
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program

@@ -60,9 +60,7 @@ class Method(ABC):
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
             if (fed := toolpath.extrusion) is not None:
-                machine = with_extruder_limit(
-                    machine, toolpath.axes, fed.limits, fed.ratio, toolpath.block
-                )
+                machine = with_extruder_limit(machine, toolpath.axes, fed.limits, fed.ratio, toolpath.block)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
         at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
         require_samples(at_feed, machine.dt)

@@ -20,17 +20,19 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import PHASES, rest_to_rest_phases
 from planner.constraints.own import along_path
-from planner.geometry.extrusion import Extrusion
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory
 from planner.motion.vertex_times import passing_times_of
 
-AT_JOINT = 1e-9  # a motion this near to the length at which it rests is at rest there [mm + share of the length]
+AT_JOINT = (
+    1e-9  # a motion this near to the length at which it rests is at rest there [mm + share of the length]
+)
 
 
 class _Passed(NamedTuple):
-    """Where and when a motion passes the K joints of an extrusion: the length run (K,) [mm], and when it arrives and leaves (K,) [s]."""
+    """Of the K joints of an extrusion: the length that is run when the motion passes them (K,) [mm], and when it arrives there and
+    leaves (K,) [s]."""
 
     s: FloatArray
     arrival: FloatArray

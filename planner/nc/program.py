@@ -143,8 +143,8 @@ class Program:
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
-    extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; beside no move a block of kind STOP,
-                   with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
+    extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it moves alone, a block of
+                   kind STOP with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
     reading      : the settings it was read with
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : the program itself, if it was given as a text; None for those of a file, and for points

@@ -205,9 +205,7 @@ class _Column:
         right = (samples.position, samples.d1, samples.d2_right, samples.d3_right)
         middle = tuple(inside[:, k] for k in range(4))
         block = _block(samples)
-        here, between = (
-            Place(axes, list(p[0].T), p[1], b) for p, b in ((right, block), (middle, block[at]))
-        )
+        here, between = (Place(axes, list(p[0].T), p[1], b) for p, b in ((right, block), (middle, block[at])))
         q_left, q_right, q_mid = (_along(limit, axes, p, here) for p in (left, right, middle))
         bound, bound_mid = bounds_at(limit, here, points), bounds_at(limit, between, len(at))
         if limit.value(here) is None:

@@ -91,7 +91,9 @@ def verify(
     extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
     if toolpath.extrusion is not None:
         checks |= extruder.checks(toolpath.extrusion.limits, not_limited)
-    faults += [check.sentence(toolpath.axes) for name, check in checks.items() if name[-2:] == ".e" and check.broken]
+    faults += [
+        check.sentence(toolpath.axes) for name, check in checks.items() if name[-2:] == ".e" and check.broken
+    ]
     faults += extruder.faults
     notes += extruder.notes
     after = after_filters(trajectory, motion, toolpath, machine, pieces)

@@ -7,6 +7,8 @@ axes keep the acceleration along the path below |a|, and its jerk below |j| but 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -57,7 +59,7 @@ def with_extruder_limit(
     ratio  : (M,) mm of filament per mm of way on each segment [-]
     block  : (M,) of each segment
     """
-    own = [limit for limit in machine.own if not isinstance(limit, ExtruderLimit)]
+    own: list[Any] = [limit for limit in machine.own if not isinstance(limit, ExtruderLimit)]
     strongest, sharpest = (np.linalg.norm(machine.limits(q, axes)) for q in ("acceleration", "jerk"))
     most = float(ratio.max(initial=0.0))
     if most * strongest > limits[1] or most * TURNING * sharpest > limits[2]:

@@ -12,7 +12,7 @@ the program has one block at most where E stands beside G0 to G3.
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -81,7 +81,7 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
     extruded : (B,) of the blocks that are there
     """
 
-    def put(values: Array, new: Array) -> Array:
+    def put(values: Array, new: Any) -> Array:
         return np.insert(values, at, new, axis=0)
 
     def later(block: Array) -> Array:
@@ -89,7 +89,7 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
 
     before = np.maximum(at - 1, 0)
     place = np.vstack([program.start, program.end])[at]
-    columns = {
+    columns: dict[str, Any] = {
         "kind": put(program.kind, Kind.STOP),
         "end": put(program.end, place),
         "feed": put(program.feed, alone.feed),

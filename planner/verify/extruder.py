@@ -20,7 +20,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.geometry.extrusion import Extrusion
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
@@ -71,11 +70,10 @@ def extruder_seen(
     trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, given: Given
 ) -> ExtruderSeen:
     """What the extruder of a delivered motion did; nothing where the program has none."""
-    fed = toolpath.extrusion
-    if fed is None:
+    if toolpath.extrusion is None:
         return ExtruderSeen()
     passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
-    watch = _Watch(toolpath, fed, passed, given)
+    watch = _Watch(toolpath, passed, given)
     for chunk in trajectory.chunks():
         if not len(chunk.extruder):
             return ExtruderSeen(notes=("there is no column e: what the extruder does is not judged",))
@@ -86,7 +84,9 @@ def extruder_seen(
 class _Watch:
     """The samples so far, chunk by chunk."""
 
-    def __init__(self, toolpath: Toolpath, fed: Extrusion, passed: FloatArray, given: Given):
+    def __init__(self, toolpath: Toolpath, passed: FloatArray, given: Given):
+        fed = toolpath.extrusion
+        assert fed is not None
         self.toolpath, self.fed, self.passed, self.given = toolpath, fed, passed, given
         none = (0.0, 0.0, np.zeros(len(toolpath.axes)), int(toolpath.line[0]))
         self.worst = [none, none, none]

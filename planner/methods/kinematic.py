@@ -33,7 +33,7 @@ from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces
-from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
+from planner.lookahead.kinematic_corners import corner_passages, fitted, leg_limits
 from planner.lookahead.look_ahead import look_ahead
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
@@ -104,7 +104,7 @@ class KinematicMethod(Method):
         lines = parted_by_feed(chorded(toolpath, CHORD_FRACTION, whole))
         path = legs_of(lines)
         legs = leg_limits(path, lines, machine)
-        free = candidates(path, lines, legs, machine, self.start_stop)
+        free = corner_passages(path, lines, legs, machine, self.start_stop)
         fitting = [fitted(way, legs) for way in free]
         passage, time = look_ahead(legs, fitting, self.short_segment)
         return _Chain(

@@ -106,6 +106,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         tolerance=of_joint,
         dwell=dwell,
         held=np.isin(block, program.synchronised),
+        exact=_exact(program, block, joint),
         zero_length=np.flatnonzero(moves & ~real),
         extrusion=extrusion,
     )
@@ -260,6 +261,13 @@ def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
         cut = (program.kind[block] != Kind.RAPID) & ~np.isin(block, program.synchronised)
         feed[cut] = np.minimum(feed[cut], machine.feed_max)
     return feed
+
+
+def _exact(program: Program, block: Array, joint: Array) -> Array:
+    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a block under G64."""
+    rounded = joint == Joint.CORNER
+    exact: Array = (program.path_control[block] != PathControl.BLEND) & ~rounded[:-1] & ~rounded[1:]
+    return exact
 
 
 def _joints(

@@ -112,8 +112,8 @@ class Chain:
         return _turned(-turn, self._tilted(tilt if self.data.type == HEAD_TABLE else -tilt, up))
 
     def angles(self, direction: FloatArray) -> FloatArray:
-        """(n, 2, 2) both pairs (tilt, c) of angles for unit vectors `direction` (n, 3) along the tool [rad]; c is 0 at the pole. c lies within
-        -pi to pi, the tilt of the first pair within 0 to pi, that of the second is its negative."""
+        """(n, 2, 2) both pairs (tilt, c) of angles for unit vectors `direction` (n, 3) along the tool [rad]; c is 0 at the pole. c lies
+        within -pi to pi, the tilt of the first pair within 0 to pi, that of the second is its negative."""
         tilt = np.arctan2(np.hypot(direction[:, 0], direction[:, 1]), direction[:, 2])
         own = [sign * tilt for sign in (1.0, -1.0)]
         pairs = []

@@ -184,9 +184,7 @@ def test_kernels_are_made_where_the_cache_may_fail() -> None:
     ],
 )
 def test_help_and_import_load_nothing_heavy(code: str) -> None:
-    code += "\nimport sys\nprint('loaded:', *sorted(name for name in sys.modules if '.' not in name))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.rpartition("loaded:")[2].split())
+    loaded = _loaded(code)
     assert "planner" in loaded
     assert not loaded & HEAVY
 
@@ -214,11 +212,23 @@ def test_a_plan_loads_only_what_it_uses(tmp_path: Path) -> None:
     job = tmp_path / "corner.ngc"
     job.write_text("G21 G90 G64 P0.05 F3000\nG1 X10\nX20 Y5\nM2\n")
     planner.plan(job, "mill")  # its kernels are on the disk now
-    code = f"import planner\nplanner.plan({str(job)!r}, 'mill')\nimport sys\nprint('loaded:', *sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.rpartition("loaded:")[2].split())
+    in_python = f"import planner; planner.plan({str(job)!r}, 'mill')"
+    loaded = _loaded(in_python)
     assert {"planner.optimal.loop", "llvmlite"} <= loaded
     assert loaded & NOT_OF_A_PLAN == set()
+    options = ["plan", str(job), "--quiet", "-o", str(tmp_path / "out")]
+    loaded = _loaded(f"from planner.cli import app; app({options}, standalone_mode=False)")
+    assert {"planner.optimal.loop", "llvmlite"} | OF_THE_FILES <= loaded
+    assert loaded & NOT_OF_A_PLAN == OF_THE_FILES
+
+
+OF_THE_FILES = {"pyarrow", "planner.report"}
+
+
+def _loaded(code: str) -> set[str]:
+    code += "\nimport sys\nprint('loaded:', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.rpartition("loaded:")[2].split())
 
 
 def test_readme_names_files_that_exist() -> None:

@@ -53,6 +53,7 @@ def test_the_page_on_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert {one.name for one in Path("out").iterdir()} >= {"summary.json", "report.html"}
 
 
+@pytest.mark.slow
 def test_the_page_for_students_runs() -> None:
     seen: dict = {}
     for example in examples("student.md"):

@@ -19,6 +19,7 @@ from planner.base.units import MICROMETRE, MM_PER_INCH
 from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore_list
 
 DEFAULT_MACHINE = "mill"
+# Units of a length on the command line [mm].
 LENGTHS = {"mm": 1.0, "um": MICROMETRE, "µm": MICROMETRE, "in": MM_PER_INCH}
 _LENGTH = re.compile(rf"([^a-zµ]+(?:e[-+]?\d+)?)\s*({'|'.join(LENGTHS)})?")
 
@@ -118,6 +119,7 @@ SOLVER = _choice(
     + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
     known=names.SOLVERS,
 )
+# Rounds of reshaping: for comparisons; --effort is the dial for users.
 ROUNDS = typer.Option(
     "--rounds",
     min=0,

@@ -19,7 +19,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.units import MICROMETRE
 from planner.control_files.chords import Polyline, planned_polyline, programmed_polyline
-from planner.control_files.linuxcnc_model import joined, linuxcnc_time
+from planner.control_files.linuxcnc_model import joined_moves, linuxcnc_time
 from planner.job.plan import Plan
 from planner.nc.points import are_points
 from planner.nc.program import Program
@@ -125,7 +125,7 @@ def _time(plan: Plan, line: Polyline, p: float, q: float) -> float:
     """Predicted time, dwells included [s]."""
     stands = standing(plan, line)
     feed: FloatArray = np.where(line.rapid, np.inf, line.feed)
-    kept = joined(line.points, feed, line.rapid, stands, q)
+    kept = joined_moves(line.points, feed, line.rapid, stands, q)
     moving = linuxcnc_time(
         line.points[kept], feed[kept[:-1]], stands[kept], plan.machine, plan.toolpath.axes, p
     )

@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.control_files.models import along, reachable, times
+from planner.control_files.models import along, move_times, reachable
 from planner.machine import Machine
 
 NORMAL = np.sqrt(3.0) / 2.0  # share of the acceleration that an arc takes across, at most
@@ -40,7 +40,7 @@ HALF_TURN = 0.5 * np.pi  # half of turning back [rad]
 BLOCKS = 50  # ARC_BLEND_OPTIMIZATION_DEPTH, its default
 
 
-def joined(points: FloatArray, feed: FloatArray, rapid: Array, stop: Array, within: float) -> Array:
+def joined_moves(points: FloatArray, feed: FloatArray, rapid: Array, stop: Array, within: float) -> Array:
     """Indices of the vertices that LinuxCNC keeps with G64 Q.
 
     points : (n+1, A) [mm]
@@ -101,7 +101,7 @@ def linuxcnc_time(
     seen = _alternate(np.where(swallowed, 0, 1), np.where(kinks, 0, 1))
     v_sq = reachable(np.minimum(bound, _stoppable(gain, seen)), gain)
     peak = np.minimum(tops**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
-    return float(times(pieces, accels, v_sq[:-1], peak, v_sq[1:]).sum())
+    return float(move_times(pieces, accels, v_sq[:-1], peak, v_sq[1:]).sum())
 
 
 def _alternate(lines: FloatArray, arcs: FloatArray) -> FloatArray:

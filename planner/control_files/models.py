@@ -118,7 +118,7 @@ def predicted_time(
     if control.blocks is not None:
         v_sq = reachable(np.minimum(v_sq, stoppable(gain, control.blocks)), gain)
     peak = np.minimum(top**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
-    return float(times(length, accel, v_sq[:-1], peak, v_sq[1:]).sum())
+    return float(move_times(length, accel, v_sq[:-1], peak, v_sq[1:]).sum())
 
 
 def along(way: FloatArray, limit: FloatArray) -> FloatArray:
@@ -170,7 +170,7 @@ def stoppable(gain: FloatArray, blocks: int) -> FloatArray:
     return found
 
 
-def times(
+def move_times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
     """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
@@ -210,4 +210,4 @@ def _smoothed_times(length: FloatArray, top: FloatArray, accel: FloatArray, boun
         before = peak[i] if not np.isnan(peak[i]) else before
         peak[i] = before
     highest = np.minimum(np.minimum(top, 0.5 * (fast[1:] + fast[:-1] + gain)), peak)
-    return times(length, accel, np.minimum(fast[:-1], highest), highest, np.minimum(fast[1:], highest))
+    return move_times(length, accel, np.minimum(fast[:-1], highest), highest, np.minimum(fast[1:], highest))

@@ -50,7 +50,7 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
 
 
-def candidates(
+def corner_passages(
     path: Legs, toolpath: Toolpath, legs: LegLimits, machine: Machine, start_stop: float
 ) -> list[Passage]:
     """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, at n+1 joints.

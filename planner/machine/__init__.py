@@ -13,9 +13,10 @@ template with every key and its unit.
 from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict
 from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import Axis, DialectData, Fir, Mode, Plotter, Times, ToolData
-from planner.machine.whole import LINEAR_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
+from planner.machine.whole import EXTRUDER, LINEAR_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
 
 __all__ = [
+    "EXTRUDER",
     "LINEAR_AXES",
     "ROTARY_AXES",
     "WORK_OFFSETS",

@@ -30,6 +30,7 @@ from planner.machine.parts import (
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
+EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
@@ -39,7 +40,7 @@ class Machine(Record):
     """A machine. The template explains every key. Raises InputError for all faults at once.
 
     name                : of the machine
-    axes                : limits by axis letter, at least x and y
+    axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm of filament
     dt                  : interpolation period [s]
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
@@ -79,7 +80,7 @@ class Machine(Record):
     @field_validator("axes")
     @classmethod
     def _axes_known(cls, axes: dict[str, Axis]) -> dict[str, Axis]:
-        known = LINEAR_AXES + ROTARY_AXES
+        known = (*LINEAR_AXES, *ROTARY_AXES, EXTRUDER)
         for letter in axes:
             if letter not in known:
                 raise ValueError(f"axis '{letter}' is not known; allowed are {', '.join(known)}")

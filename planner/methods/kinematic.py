@@ -19,6 +19,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
+from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import error_rate
@@ -32,11 +33,11 @@ from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces
-from planner.lookahead.kinematic_corners import candidates, fitted, leg_limits
+from planner.lookahead.kinematic_corners import corner_passages, fitted, leg_limits
 from planner.lookahead.look_ahead import look_ahead
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
+from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl
@@ -103,7 +104,7 @@ class KinematicMethod(Method):
         lines = parted_by_feed(chorded(toolpath, CHORD_FRACTION, whole))
         path = legs_of(lines)
         legs = leg_limits(path, lines, machine)
-        free = candidates(path, lines, legs, machine, self.start_stop)
+        free = corner_passages(path, lines, legs, machine, self.start_stop)
         fitting = [fitted(way, legs) for way in free]
         passage, time = look_ahead(legs, fitting, self.short_segment)
         return _Chain(

@@ -39,6 +39,7 @@ from planner.tube.run import budgets_of
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of tube/price.py
 TOLERANCE = "tolerance"
+# T goes with limit^-n where a limit holds all of the motion, n [-]: lengths alone with speed, with acceleration, with jerk.
 POWER = {
     **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
     **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0},

@@ -34,6 +34,7 @@ _JERK = {"mm/s3": 1.0, "m/s3": 1e3}
 _ANGLE = {"deg": 1.0}
 _NONE: dict[str, float] = {"": 1.0}
 _OF_AXIS = {"velocity": _SPEED, "acceleration": _ACCELERATION, "jerk": _JERK}
+# A rotary axis is in degrees, as in the machine file; a name alone has that unit too.
 _OF_ROTARY = {
     name: {f"deg/s{power}": 1.0} for name, power in (("velocity", ""), ("acceleration", "2"), ("jerk", "3"))
 }

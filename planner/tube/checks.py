@@ -16,8 +16,8 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.tube.legs import LegFormulas, along_tangent, formula_point, nearest_point
 
-PLACES = 33
-NEWTON_STEPS = 4
+PLACES = 33  # where a step is looked at first [-]
+NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
 # Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
 PIECES = 4
 

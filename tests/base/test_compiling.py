@@ -49,6 +49,7 @@ def spread(x):
     return np.arange(x).sum() + np.empty(int(x)).shape[0] * 0.5
 
 
+@pytest.mark.slow
 def test_a_function_of_numba_s_own_is_of_use_outside_after_a_kernel_had_it() -> None:
     """Its library is one without entries."""
     assert spread(4) == 8.0
@@ -69,6 +70,7 @@ def test_numba_is_as_it_was_after_a_kernel_and_after_a_fault() -> None:
     assert numba.njit(lambda x: x + 1)(1) == 2
 
 
+@pytest.mark.slow
 def test_results_and_exceptions_of_a_kernel_inside_another() -> None:
     x = np.ones(9)
     assert (twice(x, 2), share(x, 2)) == (1.0, 0.5)

@@ -91,6 +91,7 @@ def files(tmp_path: Path) -> list[str]:
     return sorted(file.name for file in (tmp_path / "cache").rglob("*") if file.is_file())
 
 
+@pytest.mark.slow
 def test_kernels_from_the_disk(use: Callable[..., str], tmp_path: Path) -> None:
     assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
     written = files(tmp_path)
@@ -143,6 +144,7 @@ def type_of(x):
     return x
 
 
+@pytest.mark.slow
 def test_the_kind_of_an_argument_is_its_numba_type() -> None:
     """Kinds are told apart as numba does: every argument here but one has a kernel of its own."""
     from numba import typeof
@@ -194,6 +196,7 @@ def test_what_a_kernel_computes_is_its_content() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_kernel_of_something_that_only_numba_knows() -> None:
     from numba.typed import List
 

@@ -61,6 +61,7 @@ def test_the_process_starts_once_with_the_first_kernel_and_ends_with_the_command
     assert process.returncode not in (None, 0)
 
 
+@pytest.mark.slow
 def test_a_second_process_that_fails_says_nothing(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,6 +13,7 @@ from hand_made import SQUARE
 from planner.base.errors import InputError
 
 
+@pytest.mark.slow
 def test_plan_writes_and_exits_0(planned: Callable[..., None], job: Path, tmp_path: Path) -> None:
     planned()
     result = run("plan", job, "-o", tmp_path / "out", "--plot", "--corners")

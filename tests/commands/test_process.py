@@ -134,6 +134,7 @@ cli.main()
 # ------------------------------------------------------------------------------------------ output
 
 
+@pytest.mark.slow
 def test_broken_pipe_is_quiet(job: Path) -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import planner
-from planner.control_files.linuxcnc_model import BLOCKS, LAST, NORMAL, joined, linuxcnc_time
+from planner.control_files.linuxcnc_model import BLOCKS, LAST, NORMAL, joined_moves, linuxcnc_time
 from planner.control_files.program import write_program
 from planner.machine import Machine
 from planner.nc.program import Kind
@@ -76,8 +76,8 @@ def test_joined_points_are_near_the_moves_that_are_kept() -> None:
     angle = np.linspace(0, np.pi, 200)
     points = np.stack([10 * np.cos(angle), 10 * np.sin(angle), np.zeros(200)], axis=1)
     feed, rapid, stop = np.full(199, 50.0), np.zeros(199, bool), np.zeros(200, bool)
-    assert len(joined(points, feed, rapid, stop, 0.0)) == 200
-    kept = joined(points, feed, rapid, stop, 0.01)
+    assert len(joined_moves(points, feed, rapid, stop, 0.0)) == 200
+    kept = joined_moves(points, feed, rapid, stop, 0.01)
     assert 2 < len(kept) < 100
     for a, b in itertools.pairwise(kept):
         chord = points[b] - points[a]
@@ -85,7 +85,7 @@ def test_joined_points_are_near_the_moves_that_are_kept() -> None:
         assert np.linalg.norm(points[a:b] - points[a] - u[:, None] * chord, axis=1).max() <= 0.01
     stop[77] = True
     feed[120:] = 60.0
-    assert {77, 120} <= set(joined(points, feed, rapid, stop, 0.01).tolist())
+    assert {77, 120} <= set(joined_moves(points, feed, rapid, stop, 0.01).tolist())
 
 
 @pytest.mark.parametrize("case", MEASURED, ids=lambda case: f"{case[0]} P{case[1]} Q{case[2]}")
@@ -100,7 +100,7 @@ def test_predictions_are_near_linuxcnc(case: tuple[str, float, float]) -> None:
     points, feed = points[moves], program.feed[moves[1:]]
     rapid = (program.kind == Kind.RAPID)[moves[1:]]
     stop = np.zeros(len(points), bool)
-    kept = joined(points, feed, rapid, stop, q)
+    kept = joined_moves(points, feed, rapid, stop, q)
     feed = np.where(rapid, np.inf, feed)[kept[:-1]]
     predicted = linuxcnc_time(points[kept], feed, stop[kept], MACHINE, ("x", "y", "z"), p)
     assert predicted == pytest.approx(MEASURED[case], rel=0.021)

@@ -144,6 +144,7 @@ def coarse(dt: float, eps: float):
     return problems.machine(dt=dt, tolerance=eps, jerk=1e5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("dt", "eps"), PERIODS)
 @pytest.mark.parametrize(
     "method",

@@ -64,6 +64,7 @@ def test_nothing_is_solved_where_nothing_changed(known):
     assert again.prices.jerk == pytest.approx(known.solution.prices.jerk)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("piece", [0, 1, 2])
 def test_only_the_changed_piece_is_solved_and_the_motion_is_that_of_solving_all(known, piece):
     problem, solver = slower(known, piece), Counting()

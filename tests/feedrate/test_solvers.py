@@ -121,6 +121,7 @@ def test_progress_ends_at_the_whole(name):
     assert told[-1] == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but("ipopt", FOREIGN))
 def test_a_whole_job_with_every_solver(name, tmp_path):
     job = tmp_path / "corner.ngc"

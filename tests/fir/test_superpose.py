@@ -42,6 +42,7 @@ legs = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(legs=legs, T1=st.floats(2e-3, 0.1), ratio=st.floats(0.05, 1.0))
 @settings(max_examples=60)
 def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):

@@ -174,6 +174,7 @@ def mixed(blocks: int) -> str:
     return "\n".join([*lines, "M2"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method",
     slow_but(

@@ -96,6 +96,7 @@ def test_the_picture_is_the_motion(plan: Plan) -> None:
         assert one.split()[-1] == next_one.split()[0], "the lines of one colour join"
 
 
+@pytest.mark.slow
 def test_figures_hold_the_numbers_of_the_plan(plan: Plan) -> None:
     assert plan.trajectory is not None
     by_feed, by_limit = plan.plot.path(), plan.plot.path("limit")
@@ -166,6 +167,7 @@ def test_the_methods_are_listed_and_made() -> None:
         planner.methods["stopp"]
 
 
+@pytest.mark.slow
 def test_names_that_are_packages_too_stay_what_they_are() -> None:
     """In whatever order modules are imported."""
     code = (

@@ -84,6 +84,7 @@ def assert_kept(made, lengths):
     np.testing.assert_allclose(position[-1], made.toolpath.end[-1], atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", slow_but([(0.02, 0.013)], LENGTHS), ids=str)
 @pytest.mark.parametrize("method", slow_but(("stop", "kinematic", "fir", "second-order"), METHODS))
 def test_behind_the_filters_nothing_leaves_the_tolerance(method, lengths):

@@ -69,6 +69,7 @@ def machine(seed: int = 0, **more) -> Machine:
     return problems.machine(**({"axes": axes, "tolerance": 10 ** rng.uniform(-2.0, -0.7)} | more))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method", slow_but(set(HOLDING) - {"optimal", "second-order", "fir-spline"}, HOLDING)
 )

@@ -38,6 +38,7 @@ def test_jobs_are_verified_with_their_jerk_limited(name, corner):
     assert plan.corners.held == len(plan.corners) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("corner", "expected"), [("bezier", 0.989), ("spline", 0.9605)])
 def test_the_pentagon_is_faster_than_stopping_at_its_corners(corner, expected):
     plan = OptimalMethod(corner=corner).plan(problems.pentagon(), MACHINE)
@@ -64,6 +65,7 @@ def isolated_corners(jerk, dt, tolerance, normal):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dt", "tolerance", "normal", "holds"),
     [(0.001, 0.05, 300.0, "normal_acceleration"), (0.008, 0.01, None, "chord_error")],

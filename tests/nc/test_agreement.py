@@ -306,6 +306,7 @@ VERDICTS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @needs_oracle
 def test_both_refuse_the_same_lines(tmp_path: Path) -> None:
     jobs = []

@@ -18,6 +18,7 @@ from planner.optimal.order import ThirdOrder
 
 # Jobs on which plans of every kind take the place of splines: fir corners 70, method kinematic 86; because of the period bezier
 # corners 97, fir corners 197, kinematic corners 167, full stops 99. On 3 and 40 splines stay.
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", slow_but([3, 86], [3, 40, 70, 86, 97, 99, 167, 197]))
 def test_nothing_is_faster_than_optimal(seed):
     row = compared(seed)

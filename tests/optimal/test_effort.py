@@ -33,6 +33,7 @@ def test_every_name_has_an_effort_and_more_points_a_coarser_grid():
         assert grids == sorted(grids)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "program", [problems.zigzag(20), problems.star_spiral(40)], ids=lambda own: own.source
 )
@@ -51,6 +52,7 @@ def test_more_effort_is_never_slower(program):
     np.testing.assert_allclose(best.trajectory.position[-1], best.toolpath.end[-1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_where_jerk_is_what_limits_rounds_do_not_find_what_the_default_finds():
     """On mill, a/j = 40 ms: rounds end 2 % later than ipopt's free optimum, 2.8357 s for 50 legs."""
     rounds, default = plan(problems.zigzag(6), MACHINE, rounds=40), plan(problems.zigzag(6), MACHINE)
@@ -58,6 +60,7 @@ def test_where_jerk_is_what_limits_rounds_do_not_find_what_the_default_finds():
     assert default.trajectory.cycle_time < rounds.trajectory.cycle_time * (1 - 1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "why",
     [

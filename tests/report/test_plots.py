@@ -21,6 +21,7 @@ PROGRAMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but("flat", PROGRAMS))
 def test_figures(tmp_path: Path, name: str) -> None:
     plots.write_figures(make_plan(PROGRAMS[name]), tmp_path)

@@ -89,6 +89,7 @@ def test_a_row_for_each_quantity_that_is_bounded_and_none_for_the_others(program
     assert "velocity.fast" in dict(plan.prices.ranked())
 
 
+@pytest.mark.slow
 def test_prices_sum_up_to_the_time_with_limits_of_ones_own_too(program):
     """Time k times as fast is velocities times k, accelerations k^2, jerks k^3, feeds k, periods 1/k."""
     machine = problems.machine(dt=4e-5)

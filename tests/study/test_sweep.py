@@ -117,6 +117,7 @@ def test_a_point_is_the_plan_with_its_settings() -> None:
     assert "samples" in refused["sentence"]
 
 
+@pytest.mark.slow
 def test_a_sweep_is_taken_up_again(job: Path, tmp_path: Path) -> None:
     out, ranges = tmp_path / "out", ("--vary", "tolerance=0.01,0.02", "--vary", "x.jerk=1e5:2e5:3")
     first = run(job, "-o", out, *ranges, "--method", "stop", "--threads", 1)
@@ -142,6 +143,7 @@ def test_a_sweep_is_taken_up_again(job: Path, tmp_path: Path) -> None:
     assert "3, 2 of them planned before: 3 passed" in more.stdout
 
 
+@pytest.mark.slow
 def test_what_has_changed_is_refused(job: Path, tmp_path: Path) -> None:
     out, ranges = tmp_path / "out", ("--vary", "tolerance=0.01,0.02", "--threads", 1)
     assert run(job, "-o", out, *ranges, "--method", "stop").exit_code == 0
@@ -262,6 +264,7 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed(
     assert workers[1].poll() is None
 
 
+@pytest.mark.slow
 def test_an_address_without_a_scheduler(job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip(
         "distributed", reason="distributed is not installed: pip install feedrate-planner[cluster]"

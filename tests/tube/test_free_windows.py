@@ -176,6 +176,7 @@ def test_shares_are_those_of_a_fine_sampling():
 # --- what it finds -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["corner", "arcs", "pentagon"])
 def test_ipopt_finds_the_same(name):
     run, guess = begun(name)

@@ -45,6 +45,7 @@ def test_a_run_is_the_programmed_path():
     np.testing.assert_allclose(run.tangents(legs, run.length / 2), slope, atol=1e-8)
 
 
+@pytest.mark.slow
 @given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
 @settings(max_examples=200, deadline=None)
 def test_a_leg_is_off_its_own_cubic_by_no_more_than_the_bound(places, t):

@@ -60,6 +60,7 @@ def run_along(first=0.0, last=1.0, aside=0.0):
     return along(1.0, beside, rest_to_rest(1.0, 1.0, 2.0, 4.0))
 
 
+@pytest.mark.slow
 def test_the_distance_from_a_curve_is_the_searched_one() -> None:
     pieces = program_pieces(toolpath())
     assert len(pieces.piece) > len(toolpath())
@@ -149,6 +150,7 @@ def test_a_motion_that_leaves_the_curve_is_refused() -> None:
     assert "line 2" in text
 
 
+@pytest.mark.slow
 def test_a_motion_along_the_chord_is_refused() -> None:
     def chord(s):
         zero = np.zeros((len(s), 3))

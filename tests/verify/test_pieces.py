@@ -11,6 +11,7 @@ from planner.verify.pieces import PIECE_ANGLE, program_pieces
 M = machine()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rise", [0.0, 3.0, -30.0])
 @pytest.mark.parametrize("sweep", [2 * np.pi, -0.4 * np.pi, 0.1, 5 * np.pi])
 def test_the_distance_from_an_arc_is_the_searched_one(sweep, rise):

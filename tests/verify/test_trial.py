@@ -1,9 +1,12 @@
 """The trial of benchmarks/verifier_trial.py, on one plan: every kind of fault is proved and found, every correct motion passes."""
 
+import pytest
+
 from benchmarks.mutations import KINDS
 from benchmarks.verifier_trial import correct_of, faults_of
 
 
+@pytest.mark.slow
 def test_every_kind_of_fault_is_found():
     rows = faults_of(0, len(KINDS))
     assert {row["kind"] for row in rows} == {kind.__name__.replace("_", " ") for kind in KINDS}

@@ -32,6 +32,7 @@ def test_every_dialect_reads_as_the_same_path(strokes, dialect):
     assert_same_path(path_of(program), expected(strokes), FINE)
 
 
+@pytest.mark.slow
 @given(
     strokes=drawings, dialect=dialect, scale=st.sampled_from([0.1, 0.5, 2.54, 40.0]), mirrored=st.booleans()
 )

@@ -102,6 +102,7 @@ def test_thinned_samples_keep_the_peaks(plan: Plan) -> None:
     assert (np.diff(few.shown.t) > 0).all()
 
 
+@pytest.mark.slow
 def test_distances_from_lines_arcs_and_helices() -> None:
     text = "G21 F99\nG1 X10\nG3 X10 Y20 Z6 J10 P3\nG2 X30 Y20 I10\nG1 X40"
     toolpath = toolpath_from_program(parse_program(text, MILL), MILL, None)

@@ -14,6 +14,7 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.constraints.own import OwnLimit, check_names
 from planner.machine.faults import faults_in_words
+from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import (
     Axis,
     DialectData,
@@ -47,6 +48,7 @@ class Machine(Record):
     feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
+    kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
     """
 
     name: str
@@ -63,6 +65,7 @@ class Machine(Record):
     plotter: Plotter | None = None
     dialect: DialectData | None = None
     times: Times | None = None
+    kinematics: KinematicsData | None = None
     tools: dict[str, ToolData] = Field(default_factory=dict)
     positions: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     work_offsets: dict[str, dict[str, Finite]] = Field(default_factory=dict)
@@ -103,6 +106,9 @@ class Machine(Record):
                 for letter in values:
                     if letter not in LINEAR_AXES:
                         raise ValueError(f"{table}.{key}: axis '{letter}' is not known; allowed are x, y, z")
+        for letter in self.kinematics.axes if self.kinematics else ():
+            if letter not in self.axes:
+                raise ValueError(f"kinematics: axis '{letter}' is missing; write a table [axes.{letter}]")
         for tool in self.tools:
             if not tool.isdecimal() or len(tool) > TOOL_DIGITS:
                 raise ValueError(f"tools: '{tool[:TOOL_DIGITS]}' is not a tool number; write e.g. 1 = 25.0")
@@ -149,5 +155,6 @@ _KEYS = {
     "plotter": [*Plotter.model_fields],
     "dialect": [*DialectData.model_fields],
     "times": [*Times.model_fields],
+    "kinematics": [*KinematicsData.model_fields],
     "tools": [*ToolData.model_fields],
 }

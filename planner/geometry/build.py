@@ -1,8 +1,9 @@
 """From the blocks of a program to the segments and joints of a toolpath.
 
 A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
-or exact path (G61) with a turn (with limited jerk where the curvature jumps, too: corners/smooth.py), between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
-tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
+or exact path (G61) with a turn (with limited jerk also where the curvature jumps: corners/smooth.py), between rapid and feed moves
+(unless the machine blends rapids), and at a reversal. Where the tangents agree it is smooth; everywhere else it is a corner. An axis
+that never moves and that the machine lacks is left out.
 
 A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
 the motion goes on as at smooth joints, in exact stop mode too; where the spline itself has a kink there is a corner.

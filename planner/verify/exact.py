@@ -5,7 +5,8 @@ counts. On a line the distance is that from the chord, on an arc that from the p
 
     (p(x) - q) p'(x) = 0,      by Newton's method from the angle at which q is seen from the axis, in each turn,
 
-or from its ends. Between samples, and on splines of the program, the tolerance counts (contour.py).
+or from its ends; on a spline of the program the same, from the nearest of `STARTS` places (curves.py). Between samples the tolerance
+counts (contour.py).
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
+from planner.verify.curves import curve_points
 from planner.verify.findings import Look
 from planner.verify.pieces import PLACE_ROUNDING, ProgramPieces
 
+STARTS = 17  # places on a curve
+CURVE_STEPS = 6  # of Newton's method without the curvature, which is exact for samples on the curve
 NEWTON = 3  # steps: the angle is off by the gap of an arc over its radius, some 1e-4 at most; squared twice that is rounding
 
 
@@ -34,7 +38,7 @@ def exact_faults(
     worst, when, line = 0.0, 0.0, 0
     for chunk in trajectory.chunks():
         k = np.clip(np.searchsorted(passed, chunk.t, side="right") - 1, 0, len(toolpath) - 1)
-        inside = np.flatnonzero(toolpath.exact[k] & (toolpath.curve[k] < 0))
+        inside = np.flatnonzero(toolpath.exact[k])
         if not len(inside):
             continue
         off = np.min(
@@ -53,7 +57,7 @@ def exact_faults(
 
 
 def _distance(toolpath: Toolpath, q: FloatArray, segment: Array) -> FloatArray:
-    """(n,) distance of points q (n, A) from segments (n,); inf from curves."""
+    """(n,) distance of points q (n, A) from segments (n,)."""
     found = np.full(len(q), np.inf)
     lines, arcs = np.flatnonzero(toolpath.straight[segment]), np.flatnonzero(toolpath.arc[segment] >= 0)
     start, length = toolpath.start[segment[lines]], toolpath.length[segment[lines]]
@@ -63,7 +67,24 @@ def _distance(toolpath: Toolpath, q: FloatArray, segment: Array) -> FloatArray:
     for row in np.unique(segment[arcs]):
         of_row = arcs[segment[arcs] == row]
         found[of_row] = _from_arc(toolpath, q[of_row], int(row))
+    curves = np.flatnonzero(toolpath.curve[segment] >= 0)
+    if len(curves):
+        found[curves] = _from_curves(toolpath, q[curves], toolpath.curve[segment[curves]])
     return found
+
+
+def _from_curves(toolpath: Toolpath, q: FloatArray, row: Array) -> FloatArray:
+    """(n,) distance of points q (n, A) from curves, by their rows (n,)."""
+    points, weights = toolpath.curves.points[row], toolpath.curves.weight[row]
+    best, u = np.full(len(q), np.inf), np.zeros(len(q))
+    for place in np.linspace(0.0, 1.0, STARTS):
+        apart = np.linalg.norm(curve_points(points, weights, np.full(len(q), place))[0] - q, axis=1)
+        u, best = np.where(apart < best, place, u), np.minimum(best, apart)
+    for _ in range(CURVE_STEPS):
+        point, rate = curve_points(points, weights, u)
+        step = np.einsum("na,na->n", point - q, rate) / np.einsum("na,na->n", rate, rate)
+        u = np.clip(u - step, 0.0, 1.0)
+    return np.linalg.norm(curve_points(points, weights, u)[0] - q, axis=1)
 
 
 def _from_arc(toolpath: Toolpath, q: FloatArray, segment: int) -> FloatArray:

@@ -14,7 +14,10 @@ from planner.job.plan import Plan
 from planner.motion.trajectory import Trajectory
 from planner.verify import verify
 
-TEXT = "G21 G17 {mode} F3000\nG1 X10 Y5\nG2 X10 Y5 Z6 I5 J0 P3\nG18 G3 X20 Z6 I5 K0\nG17 G3 X30 Y15.0002 I0 J10\nG1 Y30 Z0\n"
+TEXT = (
+    "G21 G17 {mode} F3000\nG1 X10 Y5\nG2 X10 Y5 Z6 I5 J0 P3\nG18 G3 X20 Z6 I5 K0\nG17 G3 X30 Y15.0002 I0 J10\nG1 Y30 Z0\n"
+    "G5 X40 Y40 I0 J5 P-5 Q0\n"
+)
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +47,18 @@ def faults(plan: Plan, motion: Trajectory, mode: str) -> list[str]:
     return [fault for fault in found.faults if "exact path" in fault]
 
 
-@pytest.mark.parametrize("block", range(5))
+@pytest.mark.parametrize("block", range(6))
 def test_samples_beside_the_path_are_found_on_every_kind_of_block(plan: Plan, block: int) -> None:
-    aside = np.array([[0.5, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    aside = np.array(
+        [
+            [0.5, -1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [0.6, -0.8, 0.0],
+        ]
+    )
     assert moved(plan, 0.0 * aside[block], block) == []
     found = moved(plan, 5e-5 * aside[block], block)
     assert len(found) == 1

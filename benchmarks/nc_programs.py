@@ -157,7 +157,8 @@ def _dialect(program: Any) -> str:
 def _table(rows: list[dict[str, Any]], corners: list[str]) -> str:
     """One line for each program: all about the first corner, and the cycle times with the others over its own."""
     columns = [
-        "program", "dialect", "effort", "notes", "blocks", "blocks/s", "grid points", f"cycle, {corners[0]} [s]", *(f"{other} / {corners[0]}" for other in corners[1:]),
+        "program", "dialect", "effort", "notes", "blocks", "blocks/s", "grid points",
+        f"cycle, {corners[0]} [s]", *(f"{other} / {corners[0]}" for other in corners[1:]),
         "stops [s]", "worst limit", "contour, vertex [um]", "corner/eq. 19-20", "read, geometry, solve, sample, verify [s]",
         "CPU of all [s]", "peak [GB]", "outcome",
     ]  # fmt: skip

@@ -24,6 +24,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.geometry.curves import Curves
+from planner.geometry.extrusion import Extrusion, extruding_part
 
 
 class Joint(IntEnum):
@@ -77,6 +78,7 @@ class Toolpath:
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
     held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
     zero_length     : (Z,) blocks that move nowhere, kept as events
+    extrusion       : what the extruder does along it; None without one
     """
 
     source: str
@@ -101,6 +103,7 @@ class Toolpath:
     dwell: FloatArray
     held: Array
     zero_length: Array
+    extrusion: Extrusion | None = None
 
     def __post_init__(self) -> None:
         segments, axes = len(self.length), len(self.axes)
@@ -153,6 +156,7 @@ class Toolpath:
             curvature=np.maximum.reduceat(self.curvature, first),
             arc=np.full(len(first), -1),
             curve=np.full(len(first), -1),
+            extrusion=None,
             **{name: getattr(self, name)[first] for name in of_segment},
             **{name: getattr(self, name)[at] for name in ("joint", "theta", "tolerance", "dwell")},
         )
@@ -174,4 +178,6 @@ class Toolpath:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray) and field.name != "zero_length":
                 columns[field.name] = value[kept if len(value) == len(self) else joints]
+        if self.extrusion is not None:
+            columns["extrusion"] = extruding_part(self.extrusion, kept)
         return dataclasses.replace(self, **columns)

@@ -107,9 +107,8 @@ def _run(pipe: Any, file: str, options: argparse.Namespace, corner: str) -> None
             file, planner.load_machine(options.machine), planner.Reading(extruder=options.extruder)
         )
         read_s = time.process_time() - began
-        quick = 0 < options.quick_above < len(program)
-        effort = {"effort": "quick"} if quick else {}
-        plan = planner.plan(program, options.machine, method=options.method, corner=corner, **effort)
+        effort = "quick" if 0 < options.quick_above < len(program) else None
+        plan = planner.plan(program, options.machine, method=options.method, corner=corner, effort=effort)
     except planner.InputError as fault:
         pipe.send({"outcome": "refused", "message": str(fault).replace(file, Path(file).name)})
         return
@@ -122,7 +121,7 @@ def _run(pipe: Any, file: str, options: argparse.Namespace, corner: str) -> None
         "sentence": plan.sentence,
         "blocks": len(plan.program),
         "dialect": _dialect(program),
-        "effort": effort.get("effort", ""),
+        "effort": effort or "",
         "notes": list(plan.notes),
         "read_s": round(read_s, 3),
         "grid_points": plan.grid_points,

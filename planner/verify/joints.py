@@ -74,7 +74,8 @@ def verify_joints(
     """
     if machine.kinematics is None:
         raise InputError(f"machine '{machine.name}' has no table [kinematics]")
-    length = machine.kinematics.tool_length if tool_length is None else tool_length
+    data = machine.kinematics
+    length = data.tool_length if tool_length is None else tool_length
     given = Given() if given is None else given
 
     def tips(position: FloatArray) -> FloatArray:
@@ -83,7 +84,7 @@ def verify_joints(
         angles = np.where(turns, position / radius, position)
         found = position.copy()
         linear = [setpoints.axes.index(letter) for letter in LINEAR_AXES]
-        found[:, linear], _ = tip_and_direction(machine.kinematics, length, setpoints.axes, angles)
+        found[:, linear], _ = tip_and_direction(data, length, setpoints.axes, angles)
         return found
 
     at = tips(setpoints.position)

@@ -19,8 +19,8 @@ from planner.kinematics.along_path import in_rad
 from planner.kinematics.chain import LINEAR, Kinematics, kinematics_of
 from planner.machine import Axis, Machine
 
-# Limits of the tip's coordinates: so many times the largest of the linear joints [-]. Splines are shaped by them, not by the joints': with 10
-# a path of three axes is planned 3 % slower than by a machine without kinematics, with 2 1 %, with 1 as fast.
+# Limits of the tip's coordinates: so many times the largest of the linear joints [-]. Splines are shaped by them, not by those of the
+# joints: with 10 a path of three axes is planned 3 % slower than by a machine without kinematics, with 2 1 %, with 1 as fast.
 WIDE = 2.0
 
 

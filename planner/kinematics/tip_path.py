@@ -54,9 +54,7 @@ def tip_path(
         raise InputError(
             f"angles or directions: {turns.shape[0]} for {len(at)} tips; one finite row for each is needed"
         )
-    return _program(
-        chain, np.hstack([at + np.array([0.0, 0.0, chain.length]), radius * turns]), feed, tolerance
-    )
+    return _program(chain, np.hstack([at + np.array([0.0, 0.0, chain.length]), turns]), feed, tolerance)
 
 
 def _program(chain: Chain, points: FloatArray, feed: float | None, tolerance: float | None) -> Program:

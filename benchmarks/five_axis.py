@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import time
+from typing import Any
 
 import numpy as np
 
@@ -71,13 +72,13 @@ def s_piece(points: int) -> tuple[FloatArray, FloatArray]:
     return np.stack([x, y, 5.0 * t**2], axis=1), direction
 
 
-def solvers_on_the_path(program: planner.Program, on_tip: Machine) -> list[dict[str, object]]:
+def solvers_on_the_path(program: planner.Program, on_tip: Machine) -> list[dict[str, Any]]:
     """Motion and time of each solver on the first splines' grid."""
     toolpath = toolpath_from_program(program, on_tip, None)
     given = round_corners(toolpath, on_tip, corner_shape("auto", on_tip, toolpath), blend_tangents=True)
     rounded, splines = splined_with_stops(given, on_tip, True)
     problem = feedrate_problem(sample_path(with_spline(rounded, splines), on_tip, third_order=True), on_tip)
-    known: list[tuple[str, object, bool]] = [
+    known: list[tuple[str, Any, bool]] = [
         ("own, no jerk limits", Reachability(), False),
         ("toppra", ToppraSolver(), False),
         ("own, jerk limits", JerkLimited(), True),
@@ -86,9 +87,9 @@ def solvers_on_the_path(program: planner.Program, on_tip: Machine) -> list[dict[
         known.append(("copp", CoppSocp(), True))
     rows = []
     for name, solver, jerk_limited in known:
-        solver.solve(problem)  # type: ignore[attr-defined]
+        solver.solve(problem)
         began = time.process_time()
-        found = solver.solve(problem)  # type: ignore[attr-defined]
+        found = solver.solve(problem)
         rows.append(
             {
                 "solver": name,
@@ -111,7 +112,8 @@ def main() -> None:
     tips, directions = s_piece(points)
     program = tip_path(five, tips, directions=directions, feed=FEED)
     program = dataclasses.replace(program, source="S piece")
-    on_tip, rows = at_tip(five), []
+    on_tip = at_tip(five)
+    rows: list[dict[str, Any]] = []
     for method in ("second-order", "optimal"):
         plan = planner.plan(program, on_tip, method=method)
         found = verify_joints(

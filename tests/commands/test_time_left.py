@@ -98,7 +98,7 @@ def test_time_left_falls_as_time_passes_and_is_never_negative() -> None:
 
 
 def test_a_search_tells_its_share_and_nothing_is_said_before() -> None:
-    """30 % of the search in 3 s leave 7 s of it, whatever its start took; programs that are too large for it go straight to the loop."""
+    """30 % of the search in 3 s leave 7 s of it, whatever its start took; programs too large for it go straight to the loop."""
     left, now = TimeLeft(searched=True), 3.0
     left.step(0.0, step("programmed feed", 1e-6, dt=1.0, segments=100))
     left.stage(1.0, "solve", 0.0)

@@ -65,12 +65,17 @@ def relief(blocks: int, seed: int = 3) -> str:
 
 
 class Clock:
-    """Processor time by stage, without the stages inside it; a `progress` of `planner.plan`."""
+    """Processor time by stage, without the stages inside it; a `progress` of `planner.plan`.
+
+    took  : of all threads [s]
+    alone : of the thread that calls, which waits while others work [s]
+    """
 
     def __init__(self) -> None:
         self.took: dict[str, float] = {}
+        self.alone: dict[str, float] = {}
         self._stack: list[str] = []
-        self._last = time.process_time()
+        self._last, self._last_alone = time.process_time(), time.thread_time()
 
     def __call__(self, stage: str, done: float) -> None:
         if not 0.0 < done < 1.0:
@@ -82,10 +87,11 @@ class Clock:
                 pass
 
     def _count(self) -> None:
-        now = time.process_time()
+        now, alone = time.process_time(), time.thread_time()
         stage = self._stack[-1] if self._stack else "else"
         self.took[stage] = self.took.get(stage, 0.0) + now - self._last
-        self._last = now
+        self.alone[stage] = self.alone.get(stage, 0.0) + alone - self._last_alone
+        self._last, self._last_alone = now, alone
 
 
 def one(blocks: int, method: str, machine: str, *, files: bool) -> dict[str, Any]:

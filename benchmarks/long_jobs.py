@@ -8,7 +8,10 @@ Real programs are those of `--nc`, left out where that is absent. Generated are
     carving   chords of 1 to 20 um along the strokes of a carved text: arcs with kinks between them, deeper where a stroke is wider
     relief    rows of a milled relief (benchmarks/growth.py)
 
-Processor and wall seconds are of planning alone, on compiled kernels; memory is the largest resident set of the process.
+Processor and wall seconds are of planning alone, on compiled kernels; memory is the largest resident set of the process. On several
+threads the CPU seconds of a stage stand before those of the thread that plans. A second core makes a job at most
+CPU / (alone + (CPU - alone) / 2) times as fast.
+
 A row stays in the results until the same job is run again with as many threads and the same corner. A run that was cut off goes on
 where it ended: rows of the same commit (the last one that changed the planner) are not run again, unless `--again` is given.
 """
@@ -128,6 +131,7 @@ def one(name: str, options: argparse.Namespace) -> dict[str, Any]:
         "samples": 0 if found is None else len(found),
         "passed": plan.verdict is not None and plan.verdict.passed,
         "stages_s": clock.took,
+        "alone_s": clock.alone,
         "load": os.getloadavg()[0],
     }
 
@@ -169,7 +173,9 @@ def main() -> None:
                 print(f"{name}: {done.stderr.strip().splitlines()[-1:] or done.returncode}", flush=True)
                 continue
             row = {**json.loads(done.stdout.splitlines()[-1]), "commit": commit}
-            print({key: value for key, value in row.items() if key != "stages_s"}, flush=True)
+            print(
+                {key: value for key, value in row.items() if key not in ("stages_s", "alone_s")}, flush=True
+            )
             rows = _with(row)
             write_results("long-jobs", {"rows": rows}, _table(rows))
 
@@ -187,6 +193,12 @@ def _with(row: dict[str, Any]) -> list[dict[str, Any]]:
 
     kept = [one for one in _before() if one["job"] in JOBS and key(one) != key(row)]
     return sorted([*kept, row], key=key)
+
+
+def _stage(row: dict[str, Any], name: str) -> str:
+    """CPU seconds of a stage; where more than one thread was allowed, those of the thread that plans behind them."""
+    took = f"{row['stages_s'].get(name, 0.0):.3g}"
+    return f"{took}, {row['alone_s'].get(name, 0.0):.3g}" if row["threads"] > 1 and "alone_s" in row else took
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
@@ -207,7 +219,7 @@ def _table(rows: list[dict[str, Any]]) -> str:
         "grid points",
         "samples",
         "passed",
-        *(f"{name} [CPU s]" for name in stages),
+        *(f"{name} [CPU s, of them alone]" for name in stages),
         "load",
         "commit",
     ]
@@ -226,7 +238,7 @@ def _table(rows: list[dict[str, Any]]) -> str:
             f"{row['points']:,}",
             f"{row['samples']:,}",
             "yes" if row["passed"] else "no",
-            *(f"{row['stages_s'].get(name, 0.0):.3g}" for name in stages),
+            *(_stage(row, name) for name in stages),
             f"{row['load']:.1f}",
             row.get("commit", ""),
         ]

@@ -1,8 +1,9 @@
 """From the blocks of a program to the segments and joints of a toolpath.
 
 A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
-or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
-tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
+or exact path (G61) with a turn (with limited jerk also where the curvature jumps: corners/smooth.py), between rapid and feed moves
+(unless the machine blends rapids), and at a reversal. Where the tangents agree it is smooth; everywhere else it is a corner. An axis
+that never moves and that the machine lacks is left out.
 
 A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
 the motion goes on as at smooth joints, in exact stop mode too; where the spline itself has a kink there is a corner.
@@ -106,6 +107,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         tolerance=of_joint,
         dwell=dwell,
         held=np.isin(block, program.synchronised),
+        exact=_exact(program, block, joint),
         zero_length=np.flatnonzero(moves & ~real),
         extrusion=extrusion,
     )
@@ -260,6 +262,13 @@ def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
         cut = (program.kind[block] != Kind.RAPID) & ~np.isin(block, program.synchronised)
         feed[cut] = np.minimum(feed[cut], machine.feed_max)
     return feed
+
+
+def _exact(program: Program, block: Array, joint: Array) -> Array:
+    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a block under G64."""
+    rounded = joint == Joint.CORNER
+    exact: Array = (program.path_control[block] != PathControl.BLEND) & ~rounded[:-1] & ~rounded[1:]
+    return exact
 
 
 def _joints(

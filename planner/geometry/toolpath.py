@@ -77,6 +77,7 @@ class Toolpath:
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
     held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
     zero_length     : (Z,) blocks that move nowhere, kept as events
+    radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one norm measures them
     """
 
     source: str
@@ -101,6 +102,7 @@ class Toolpath:
     dwell: FloatArray
     held: Array
     zero_length: Array
+    radius: float = 1.0
 
     def __post_init__(self) -> None:
         segments, axes = len(self.length), len(self.axes)

@@ -4,8 +4,8 @@ A joint is a full stop at both ends of the program, at a dwell or program stop, 
 or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
 tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
 
-Rotary axes are measured at the machine's radius R (`Machine.radius`): their coordinates are R times the angle, so that all axes are lengths,
-a tolerance is one of the norm over all of them, and with it of x y z, eps, and of the angles, eps / R, each by itself. F is the speed of
+Rotary axes are measured at a radius R (`Machine.radius`): a coordinate is R times the angle. All axes are lengths then,
+and a tolerance is one of the norm over all of them: with it x y z keep eps, and the angles eps / R. F is the speed of
 the linear part of a block (program.py); in that norm it becomes F ds/dl, constant along lines, arcs and helices.
 
 A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
@@ -271,15 +271,15 @@ def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> Flo
     refused."""
     feed = program.feed[block].copy()
     if len(program.axes) > len(LINEAR_AXES):
-        feed *= _path_per_length(program.axes, machine.radius, laid)
+        feed *= path_per_length(program.axes, machine.radius, laid)
     if machine.feed_max is not None:
         cut = (program.kind[block] != Kind.RAPID) & ~np.isin(block, program.synchronised)
         feed[cut] = np.minimum(feed[cut], machine.feed_max)
     return feed
 
 
-def _path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid) -> FloatArray:
-    """(M,) ds/dl of the segments: the path's length in all axes for a unit of what F goes by (program.py)."""
+def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath) -> FloatArray:
+    """(M,) ds/dl of segments: the length in all axes, rotary ones at a radius [mm], for a unit of what F goes by (program.py)."""
     change = (laid.end - laid.start) ** 2
     groups = np.array([0 if axis in LINEAR_AXES else 2 if axis in ROTARY_AXES else 1 for axis in axes])
     further = change[:, groups > 0].sum(axis=1)

@@ -5,7 +5,8 @@
     faults.py   what is wrong in a record, in words
     files.py    machine files and built-in machines
 
-Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns lengths at `Machine.radius`. `planner machine init FILE` writes a
+Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns lengths at `Machine.radius`.
+`planner machine init FILE` writes a
 template with every key and its unit.
 """
 

@@ -31,7 +31,7 @@ LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
 PARALLEL_AXES = ("u", "v", "w")  # linear too, beside x, y and z
 ALL_AXES = LINEAR_AXES + ROTARY_AXES + PARALLEL_AXES
-# Distance from a rotary axis at which its turning counts as a length, where the machine says none [mm]: the half of a workpiece of 100 mm.
+# Distance from a rotary axis at which turning counts as a length, where the machine says none [mm]: half of a workpiece of 100 mm.
 ROTARY_RADIUS = 50.0
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
@@ -50,8 +50,8 @@ class Machine(Record):
     feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
-    rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length at this radius; None is `ROTARY_RADIUS`. A
-                          machine file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
+    rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is `ROTARY_RADIUS`. A machine
+                          file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
     """
 
     name: str

@@ -54,7 +54,8 @@ def move(state: State, block: Block) -> None:
         elif letter in further.wrapped and not in_machine:
             if abs(value) >= _TURN:
                 raise WordFault(
-                    block.at[letter], f"axis {letter} is wrapped: its places are above -360 and below 360 degrees"
+                    block.at[letter],
+                    f"axis {letter} is wrapped: its places are above -360 and below 360 degrees",
                 )
             further.position[column] = _unwrapped(value, here - offset[column]) + offset[column]
         else:

@@ -83,9 +83,7 @@ class Interpreter:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
         self._end_compensation()
-        return self.store.finish(
-            self.source, self.notes, frames, self.reading, self.state.further.letters
-        )
+        return self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
 
     def go_on_with(self, state: State, store: Store) -> None:
         """Execute what follows in another `state` and into another `store`: a profile that is read aside."""

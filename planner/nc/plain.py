@@ -87,9 +87,13 @@ def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assum
         state.offset,
         *_of_further(state),
     )
-    begin = _Counts(row, store.blocks, store.events, store.refusals, state.motion, state.feed, state.feed_unit)
+    begin = _Counts(
+        row, store.blocks, store.events, store.refusals, state.motion, state.feed, state.feed_unit
+    )
     others = _Others(assumed.treatment, assumed.parked)
-    end = _run(rows, begin, fixed, state.position, place, store.block, store.event, store.refused_word, others)
+    end = _run(
+        rows, begin, fixed, state.position, place, store.block, store.event, store.refused_word, others
+    )
     further.position[columns] = place
     if end.blocks > begin.blocks:
         state.series = None
@@ -116,7 +120,9 @@ def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
 
 
 @njit(cache=True)
-def _run(rows, begin, fixed, position, place, block, event, refused_word, others):  # pragma: no cover - compiled
+def _run(
+    rows, begin, fixed, position, place, block, event, refused_word, others
+):  # pragma: no cover - compiled
     """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
     letter, value, line, first, frame = rows
     absolute, unit, path_control, tolerance, offset, column, rotary, further_offset, wrapped = fixed

@@ -14,7 +14,6 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.machine import LINEAR_AXES
 from planner.geometry.build import path_per_length
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES

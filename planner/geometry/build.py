@@ -22,6 +22,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.geometry.curves import CHORD_SHARE, CurveSegments, curve_segments
+from planner.geometry.extrusion import Laid, Waits, extruder_limits, extrusion_of, waits
 from planner.geometry.run_in import require_room
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
@@ -77,14 +78,25 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     laid = _laid(program, splines, block)
     theta = np.zeros(len(block) + 1)
     theta[1:-1] = turning_angle(laid.tangent_end[:-1], laid.tangent_start[1:])
-    joint, dwell = _joints(program, machine, block, theta)
+    stands = np.isin(program.kind, (Kind.DWELL, Kind.STOP))
+    if len(program.extruded):
+        stands |= ~real & (program.extruded != 0.0)
+    found = waits(program, machine, np.flatnonzero(stands))
+    joint, dwell = _joints(program, machine, block, theta, found)
+    feed, of_joint = _feeds(program, machine, block, laid), of_block[np.append(block[:1], block)]
+    extrusion = None
+    if len(program.extruded):
+        at_joints = Laid(block, laid.length, joint == Joint.STOP)
+        extrusion = extrusion_of(program, extruder_limits(machine), at_joints, of_joint, found)
+        with np.errstate(divide="ignore"):
+            feed = np.minimum(feed, extrusion.limits[0] / extrusion.ratio)
     toolpath = Toolpath(
         source=program.source,
         axes=axes,
         start=laid.start[:, axis],
         end=laid.end[:, axis],
         length=laid.length,
-        feed=_feeds(program, machine, block, laid),
+        feed=feed,
         rapid=program.kind[block] == Kind.RAPID,
         block=block,
         line=program.line[block],
@@ -97,11 +109,12 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         curvature=laid.curvature,
         joint=joint,
         theta=theta,
-        tolerance=of_block[np.append(block[:1], block)],
+        tolerance=of_joint,
         dwell=dwell,
         held=np.isin(block, program.synchronised),
         zero_length=np.flatnonzero(moves & ~real),
         radius=machine.radius,
+        extrusion=extrusion,
     )
     require_room(toolpath, machine)
     return toolpath
@@ -291,7 +304,9 @@ def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath
     return per
 
 
-def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray) -> tuple[Array, FloatArray]:
+def _joints(
+    program: Program, machine: Machine, block: Array, theta: FloatArray, found: Waits
+) -> tuple[Array, FloatArray]:
     """Kind and dwell of every joint."""
     joint = np.where(theta < COLLINEAR_ANGLE, Joint.SMOOTH, Joint.CORNER).astype(np.uint8)
     joint[theta > REVERSAL_ANGLE] = Joint.STOP
@@ -303,10 +318,11 @@ def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray)
     if not machine.blend_rapids:
         rapid = program.kind[block] == Kind.RAPID
         joint[1:-1][rapid[:-1] != rapid[1:]] = Joint.STOP
-    still = np.flatnonzero((program.kind == Kind.DWELL) | (program.kind == Kind.STOP))
-    at = np.searchsorted(block, still)  # the joint before the first segment that comes after the standstill
+    at = np.searchsorted(
+        block, found.block
+    )  # the joint before the first segment that comes after the standstill
     joint[at] = Joint.STOP
     dwell = np.zeros(len(block) + 1)
-    np.add.at(dwell, at, program.dwell[still])
+    np.add.at(dwell, at, found.lasts)
     joint[0] = joint[-1] = Joint.STOP
     return joint, dwell

@@ -97,6 +97,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     dwell[first], dwell[-1] = toolpath.dwell[:-1], toolpath.dwell[-1]
     return dataclasses.replace(
         toolpath,
+        extrusion=None,
         start=start,
         end=end,
         length=length,

@@ -24,6 +24,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.geometry.curves import Curves
+from planner.geometry.extrusion import Extrusion, extruding_part
 
 
 class Joint(IntEnum):
@@ -78,6 +79,7 @@ class Toolpath:
     held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
     zero_length     : (Z,) blocks that move nowhere, kept as events
     radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one norm measures them
+    extrusion       : what the extruder does along it; None without one
     """
 
     source: str
@@ -103,6 +105,7 @@ class Toolpath:
     held: Array
     zero_length: Array
     radius: float = 1.0
+    extrusion: Extrusion | None = None
 
     def __post_init__(self) -> None:
         segments, axes = len(self.length), len(self.axes)
@@ -155,6 +158,7 @@ class Toolpath:
             curvature=np.maximum.reduceat(self.curvature, first),
             arc=np.full(len(first), -1),
             curve=np.full(len(first), -1),
+            extrusion=None,
             **{name: getattr(self, name)[first] for name in of_segment},
             **{name: getattr(self, name)[at] for name in ("joint", "theta", "tolerance", "dwell")},
         )
@@ -176,4 +180,6 @@ class Toolpath:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray) and field.name != "zero_length":
                 columns[field.name] = value[kept if len(value) == len(self) else joints]
+        if self.extrusion is not None:
+            columns["extrusion"] = extruding_part(self.extrusion, kept)
         return dataclasses.replace(self, **columns)

@@ -1,6 +1,7 @@
 """The machine: limits of the axes, interpolation period, tolerance, filters. Read from TOML, checked, frozen.
 
     parts.py    records of the tables of a machine file
+    kinematics_data.py  the record of [kinematics]
     whole.py    `Machine`, the record of all of them
     faults.py   what is wrong in a record, in words
     files.py    machine files and built-in machines
@@ -11,11 +12,21 @@ template with every key and its unit.
 """
 
 from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict
+from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import Axis, DialectData, Fir, Mode, Plotter, Times, ToolData
-from planner.machine.whole import ALL_AXES, LINEAR_AXES, PARALLEL_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
+from planner.machine.whole import (
+    ALL_AXES,
+    EXTRUDER,
+    LINEAR_AXES,
+    PARALLEL_AXES,
+    ROTARY_AXES,
+    WORK_OFFSETS,
+    Machine,
+)
 
 __all__ = [
     "ALL_AXES",
+    "EXTRUDER",
     "LINEAR_AXES",
     "PARALLEL_AXES",
     "ROTARY_AXES",
@@ -23,6 +34,7 @@ __all__ = [
     "Axis",
     "DialectData",
     "Fir",
+    "KinematicsData",
     "Machine",
     "Mode",
     "Plotter",

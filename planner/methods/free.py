@@ -160,8 +160,8 @@ class Start:
         begin, end = self.departure[k], self.arrival[k + 1]
         inside = np.searchsorted(self.seen.t, [begin, end])
         window = slice(inside[0], inside[1] + 1)
-        columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
-        along = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
+        columns = {name: getattr(self.seen, name)[window] for name in self.seen.columns}
+        along = dataclasses.replace(self.seen, **columns)
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
         # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.machine import Machine
+from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block, read_block
@@ -47,7 +47,9 @@ class Interpreter:
         self.setup = Setup.of(machine)
         state = self.setup.start()
         state.further.letters = "".join(c for c in state.further.letters if c not in reading.ignore)
-        self.assumed = Assumed(reading, state.further.letters)
+        self.assumed = Assumed(
+            reading, state.further.letters, extruder=machine is not None and EXTRUDER in machine.axes
+        )
         store = Store(len(state.further.letters))
         self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.note)
         self.state.strict = reading.strict
@@ -142,6 +144,11 @@ class Interpreter:
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
+
+    @property
+    def rows_read(self) -> int:
+        """Rows of the last chunk up to the end of the program."""
+        return self._read
 
     @property
     def all_arcs_close_otherwise(self) -> bool:

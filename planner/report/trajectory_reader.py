@@ -210,7 +210,7 @@ def _assemble(
     }
     said = {"s": "length of the polyline", "feed": "speed of the axes", "line": "unknown", "block": "unknown"}
     notes += [f"{name}: {said[name]} (no column {name})" for name in fill if name not in columns]
-    rest = {name: columns[name] if name in columns else make() for name, make in fill.items()}
+    rest: dict[str, Any] = {name: columns[name] if name in columns else make() for name, make in fill.items()}
     trajectory = Trajectory(
         axes=axes,
         dt=float(np.median(np.diff(t))),

@@ -1,8 +1,9 @@
 """From the blocks of a program to the segments and joints of a toolpath.
 
 A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
-or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
-tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
+or exact path (G61) with a turn (with limited jerk also where the curvature jumps: corners/smooth.py), between rapid and feed moves
+(unless the machine blends rapids), and at a reversal. Where the tangents agree it is smooth; everywhere else it is a corner. An axis
+that never moves and that the machine lacks is left out.
 
 Rotary axes are measured at a radius R (`Machine.radius`): a coordinate is R times the angle. All axes are lengths then,
 and a tolerance is one of the norm over all of them: with it x y z keep eps, and the angles eps / R. F is the speed of
@@ -112,6 +113,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         tolerance=of_joint,
         dwell=dwell,
         held=np.isin(block, program.synchronised),
+        exact=_exact(program, block, joint),
         zero_length=np.flatnonzero(moves & ~real),
         radius=machine.radius,
         extrusion=extrusion,
@@ -302,6 +304,13 @@ def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath
     by = np.where(linear > ZERO_LENGTH, linear, np.where(parallel > ZERO_LENGTH, parallel, rotary / radius))
     per: FloatArray = laid.length / by
     return per
+
+
+def _exact(program: Program, block: Array, joint: Array) -> Array:
+    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a block under G64."""
+    rounded = joint == Joint.CORNER
+    exact: Array = (program.path_control[block] != PathControl.BLEND) & ~rounded[:-1] & ~rounded[1:]
+    return exact
 
 
 def _joints(

@@ -104,6 +104,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
         feed=toolpath.feed[segment],
         rapid=toolpath.rapid[segment],
         held=toolpath.held[segment],
+        exact=toolpath.exact[segment],
         block=toolpath.block[segment],
         line=toolpath.line[segment],
         arc=np.where(straight | chord, -1, toolpath.arc[segment]),

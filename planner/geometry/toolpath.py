@@ -77,6 +77,7 @@ class Toolpath:
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
     held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
+    exact           : (M,) True where the path is to be followed exactly (G61, G61.1); no corner at its ends is rounded
     zero_length     : (Z,) blocks that move nowhere, kept as events
     radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one norm measures them
     extrusion       : what the extruder does along it; None without one
@@ -103,6 +104,7 @@ class Toolpath:
     tolerance: FloatArray
     dwell: FloatArray
     held: Array
+    exact: Array
     zero_length: Array
     radius: float = 1.0
     extrusion: Extrusion | None = None
@@ -116,6 +118,7 @@ class Toolpath:
         freeze(self, "feed", np.float64, (segments,), finite=False)
         freeze(self, "rapid", np.bool_, (segments,))
         freeze(self, "held", np.bool_, (segments,))
+        freeze(self, "exact", np.bool_, (segments,))
         freeze(self, "block", np.int64, (segments,))
         freeze(self, "line", np.int32, (segments,))
         freeze(self, "arc", np.int64, (segments,))
@@ -149,7 +152,7 @@ class Toolpath:
             return self
         last = np.append(first[1:], len(self)) - 1
         at = np.append(first, len(self))
-        of_segment = ("start", "feed", "rapid", "held", "block", "line", "tangent_start")
+        of_segment = ("start", "feed", "rapid", "held", "exact", "block", "line", "tangent_start")
         return dataclasses.replace(
             self,
             end=self.end[last],

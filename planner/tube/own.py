@@ -53,10 +53,12 @@ FOUND = "the best motion near its start, geometry and feed together"
 class TubeOwn:
     """Settings of the search.
 
-    gap : complementarity at its end, share of the time [-]
+    gap    : complementarity at its end, share of the time [-]
+    divide : divide windows that fail; what is found is of use in parts only then
     """
 
     gap: float = 1e-5
+    divide: bool = True
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -167,7 +169,7 @@ class _Search:
         Whether it did not fail; count[1] takes the iterations."""
         if self._improved(lo, hi, count, tries):
             return True
-        if hi - lo < 2 * LEAST:
+        if hi - lo < 2 * LEAST or not self.settings.divide:
             return False
         middle = (lo + hi) // 2
         reach = min(JOIN_WITHIN, (hi - lo) // 4)

@@ -12,6 +12,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
+from planner.verify.exact import exact_faults
 from planner.verify.extruder import extruder_seen
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES
@@ -87,6 +88,7 @@ def verify(
     faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    faults += exact_faults(trajectory, looks, toolpath, pieces, limits.rounding)
     faults += held_faults(trajectory, looks, toolpath, pieces, machine)
     extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
     if toolpath.extrusion is not None:

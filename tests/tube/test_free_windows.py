@@ -191,7 +191,7 @@ def test_ipopt_finds_the_same(name):
 def test_windows_find_what_the_whole_run_finds(monkeypatch):
     run, guess = begun("pentagon")
     whole = TubeOwn().solve(run, guess)
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 2)
+    monkeypatch.setattr(own, "WINDOW", (len(guess) + 1) // 2)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 5)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     parts = TubeOwn().solve(run, guess)

@@ -152,6 +152,7 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     code = FURTHER_SYSTEMS + number if kind == 20 else _SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
+    further_moves.set_system(state, block, code, from_place=False)
 
 
 def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:

@@ -96,15 +96,14 @@ class Assumed:
     def count_letters(self, words: Words, rows: int) -> None:
         """Count the words of letters that were left out or parked in the first `rows` rows of a chunk."""
         letter = words.letter[: words.first[rows]]
-        times = np.bincount(letter, minlength=256)
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
-            times[code] -= self._used.pop(chr(code), 0)
+            times = np.count_nonzero(letter == code) - self._used.pop(chr(code), 0)
             if chr(code) == "E" and self.follows:
                 continue
-            if times[code] > 0 and chr(code) not in self.moved:
+            if times > 0 and chr(code) not in self.moved:
                 word = int(np.argmax(letter == code))
                 line = int(words.line[words.row(word)])
-                self.count(self._of_letter(chr(code)), words.text(word), line, int(times[code]))
+                self.count(self._of_letter(chr(code)), words.text(word), line, times)
 
     def _of_letter(self, letter: str) -> Assumption:
         if self.treatment[ord(letter)] == PARKED:

@@ -97,7 +97,7 @@ class Assumed:
         """Count the words of letters that were left out or parked in the first `rows` rows of a chunk."""
         letter = words.letter[: words.first[rows]]
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
-            times = np.count_nonzero(letter == code) - self._used.pop(chr(code), 0)
+            times = int(np.count_nonzero(letter == code)) - self._used.pop(chr(code), 0)
             if chr(code) == "E" and self.follows:
                 continue
             if times > 0 and chr(code) not in self.moved:

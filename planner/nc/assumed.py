@@ -18,7 +18,7 @@ from planner.nc.codes import LETTERS_REFUSED, PARKABLE, Assumption
 from planner.nc.events import plain
 from planner.nc.lexer import Words
 from planner.nc.reading import IGNORE, Reading
-from planner.nc.settings import EXTRUDER_ZERO
+from planner.nc.settings import EXTRUDER_ZERO, TOOL_POINT_M
 
 # How a letter is treated whatever stands beside it, in `Assumed.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
@@ -73,6 +73,9 @@ class Assumed:
         """Keep that a word was met; `times` if it stands for more of them."""
         if what is EXTRUDER_ZERO and self.follows:
             return
+        turning = (self.treatment[[ord(letter) for letter in "ABC"]] == AXIS).any()
+        if turning and word.upper().lstrip("M0") in ("128", "428"):
+            what = TOOL_POINT_M
         found = self._counted.setdefault(what, _Counted(0, word, line))
         found.times += times
 

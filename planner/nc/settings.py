@@ -26,6 +26,11 @@ UNKNOWN_M = Assumption(
     "M codes that this reader does not know",
     "assumed not to move anything",
 )
+TOOL_POINT_M = Assumption(
+    "switch to the tool centre point, as some controls have it (M128, M428)",
+    "switches to the tool centre point, as some controls have them (M128, M428)",
+    "not followed: every axis is planned as a joint, and with the switch on the tool takes another path",
+)
 PRINTER_M = Assumption(
     "code of a 3-D printer that moves nothing",
     "codes of a 3-D printer that move nothing",

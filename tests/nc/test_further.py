@@ -196,3 +196,15 @@ def test_axes_that_the_machine_lacks_and_that_stand_still_leave_the_program_as_i
     with pytest.raises(InputError, match=r":2:.*A5"):
         parse_program("G21 F100 G1 X1 A0\nX2 A5\n", machine_of("xyz"))
     assert parse_program("G21 F100\nG1 X2 A0\n", machine_of()).axes == ("x", "y", "z")
+
+
+def test_a_switch_to_the_tool_centre_point_is_not_passed_over() -> None:
+    text = "G21 G90 F500\nM428\nG1 X1 A10\nM429\nM2\n"
+    said = [note for note in parse_program(text, machine_of("xyza")).notes if "tool centre point" in note]
+    assert len(said) == 1
+    assert said[0].startswith("1 switch")
+    assert "first M428 line 2" in said[0]
+    assert not any(
+        "tool centre point" in note
+        for note in parse_program(text.replace(" A10", ""), machine_of("xyz")).notes
+    )

@@ -53,10 +53,12 @@ FOUND = "the best motion near its start, geometry and feed together"
 class TubeOwn:
     """Settings of the search.
 
-    gap : complementarity at its end, share of the time [-]
+    gap   : complementarity at its end, share of the time [-]
+    still : change of the time in an iteration that counts as none, share of the time [-]
     """
 
     gap: float = 1e-5
+    still: float = 1e-6
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -188,7 +190,7 @@ class _Search:
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed)
+                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.still)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning
                 )

@@ -34,6 +34,7 @@ FREEZE, FROZEN = 1.5, 1e4
 # complementarity asked for. Of 29 runs of random jobs, frozen as soon as that was reached, one ended 4.4e-4 slower, and all 6e-5 on the
 # mean; half as many of the second end 1e-5 slower.
 STILL_FOR, CLOSE_FOR = 2, 40
+MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning.least` lets it [-]
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two starts of the bracket all
 # of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
 PREDICTED = 0.3
@@ -55,6 +56,7 @@ class Tuning(NamedTuple):
     # than that (problem.py). Slacks of the others follow no more closely than the tangents that are kept.
     missed: float
     still: float  # change of the time in an iteration, share of it, from which it is taken to be settled
+    least: float  # to which prox falls while the time settles
 
 
 class Slacks(NamedTuple):
@@ -159,6 +161,8 @@ def solve_window(legs, limits, x, u, place, tuning):
         close = close + 1 if products <= 2.0 * tuning.gap * time else 0
         still = still + 1 if close and abs(now - before) <= tuning.still * time else 0
         settled, before = settled or still == STILL_FOR or close > CLOSE_FOR, now
+        if close and not settled:
+            prox = min(prox, max(prox * MELT, tuning.least))
         if settled:
             prox = min(prox * FREEZE, FROZEN)
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF * tuning.missed:

@@ -55,10 +55,13 @@ class TubeOwn:
 
     gap   : complementarity at its end, share of the time [-]
     still : change of the time in an iteration that counts as none, share of the time [-]
+    least : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: of 31
+            runs those of random jobs 2.5e-5 faster on the mean in 1.2 times the iterations
     """
 
     gap: float = 1e-5
     still: float = 1e-6
+    least: float = 1.0
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -190,7 +193,9 @@ class _Search:
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.still)
+                tuning = Tuning(
+                    PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.still, self.settings.least
+                )
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning
                 )

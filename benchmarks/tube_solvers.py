@@ -5,7 +5,8 @@
 The random programs of never_slower.py, lines and arcs, on the built-in `mill` and on the machine of problems.py, where no normal
 acceleration is limited (the solvers hold it between its places in different ways), with one run between full stops and at most `STEPS`
 steps; single corners, pentagons and arcs before them. The start is the motion on the first splines. ipopt begins there, and once more
-where the own solver ended: what it still finds there is what the own solver left. Jobs that the results hold already are not made again.
+where the own solver ended: what it still finds there is what the own solver left. The own solver
+is asked for more than by default (`PRECISE`). Jobs that the results hold already are not made again.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from planner.tube.run import TubeRun, tube_runs_of
 
 NAME = "tube-solvers"
 STEPS = 200  # of a job at most: ipopt takes 10 to 40 ms per step in all
+PRECISE = TubeOwn(least=0.01)
 SAME = 1e-5  # share of the cycle time within which two solvers agree [-]
 
 
@@ -91,10 +93,12 @@ def compared(run: TubeRun, guess: Guess, fatrop: bool) -> dict[str, Any]:
         "steps": len(guess),
         "start_s": float(guess.h.sum()),
     }
+    row |= _of("default", TubeOwn().solve(run, guess), 0.0)
     found = {}
     for name in ("own", "ipopt", "fatrop") if fatrop else ("own", "ipopt"):
         began = time.process_time()
-        solution = TubeOwn().solve(run, guess) if name == "own" else TubeNLP(solver=name).solve(run, guess)
+        solver = PRECISE if name == "own" else TubeNLP(solver=name)
+        solution = solver.solve(run, guess)
         found[name] = solution
         row |= _of(name, solution, time.process_time() - began)
     if found["own"].steps is not None:
@@ -121,15 +125,25 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     for name, row in rows.items():
         own = row["own_s"]
         cells.append([name, str(row["legs"]), str(row["arcs"]), str(row["steps"]), _time(own)])
-        for other in ("ipopt", "ipopt from own", "fatrop"):
+        for other in ("default", "ipopt", "ipopt from own", "fatrop"):
             lasts = row.get(f"{other}_s")
             cells[-1].append(
                 f"{lasts / own - 1.0:+.1e}" if lasts and own else "" if f"{other}_s" not in row else "failed"
             )
         cells[-1] += [f"{row['own_cpu']:.2f}", f"{row['ipopt_cpu']:.1f}"]
-    columns = ["job", "legs", "arcs", "steps", "own [s]", "ipopt - 1", "ipopt from own - 1", "fatrop - 1"]
+    columns = [
+        "job",
+        "legs",
+        "arcs",
+        "steps",
+        "own [s]",
+        "default - 1",
+        "ipopt - 1",
+        "ipopt from own - 1",
+        "fatrop - 1",
+    ]
     text = "The own solver's cycle time, and by what share that of the others is longer.\n\n"
-    for other in ("ipopt", "ipopt from own", "fatrop"):
+    for other in ("default", "ipopt", "ipopt from own", "fatrop"):
         ended = [row for row in rows.values() if row.get(f"{other}_s") and row["own_s"]]
         asked = sum(f"{other}_s" in row for row in rows.values())
         if not asked:

@@ -72,7 +72,7 @@ LEGS_MAX = 500
 
 @dataclass(frozen=True, kw_only=True)
 class TubeNLP:
-    """The free optimum by ipopt.
+    """The free optimum by ipopt or fatrop.
 
     solver         : "ipopt", or "fatrop", which uses the stages
     tol            : relative tolerance of optimality [-], > 0

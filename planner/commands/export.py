@@ -84,6 +84,8 @@ def export_command(
     if os.path.lexists(output):
         raise InputError("exists already and is not overwritten; give another name", source=str(output))
     trajectory = read_trajectory(trajectory_file(plan)).trajectory
+    if len(trajectory.extruder):
+        raise InputError(_NO_EXTRUDER, source=str(plan))
     new = output.with_name(f".{output.name}.{os.getpid()}")
     try:
         new.mkdir(parents=True)
@@ -101,6 +103,11 @@ def export_command(
     say(f"{output}: {said}")
 
 
+_NO_EXTRUDER = (
+    "this export would lose what the extruder does; planned.ngc and the trajectory file of the plan have it"
+)
+
+
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
     """Write the program of a plan's directory for a control, and say what it holds."""
     from planner.control_files.program import write_program
@@ -113,6 +120,8 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
             "give the directory that 'plan -o' wrote: the program is needed too", source=str(plan)
         )
     saved, _, _ = saved_plan(plan)
+    if saved.toolpath.extrusion is not None:
+        raise InputError(_NO_EXTRUDER, source=str(plan))
     allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
     new = output.with_name(f".{output.name}.{os.getpid()}")
     try:

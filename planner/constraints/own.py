@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.series import Series
 
@@ -47,11 +47,19 @@ AT_REST = 1e-6
 
 
 class Place:
-    """n places on a path: `x`, `y` ... [mm], and `direction`, the unit tangent there (n, A), for limits that depend on it."""
+    """n places on a path: `x`, `y` ... [mm], `direction`, the unit tangent there (n, A), for limits that depend on it, and `block`, the
+    program's block there (n,), where it is known."""
 
-    def __init__(self, axes: tuple[str, ...], columns: Sequence[Any], direction: FloatArray):
+    def __init__(
+        self,
+        axes: tuple[str, ...],
+        columns: Sequence[Any],
+        direction: FloatArray,
+        block: Array | None = None,
+    ):
         self.axes = axes
         self.direction = direction
+        self.block = block
         self._columns = dict(zip(axes, columns, strict=True))
 
     def __getattr__(self, letter: str) -> Any:
@@ -226,7 +234,7 @@ def ratios(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int
     if not limits:
         return
     path, direction = along_path(*columns)
-    place = Place(motion.axes, list(motion.position.T), direction)
+    place = Place(motion.axes, list(motion.position.T), direction, motion.block)
     for limit in limits:
         bounds = bounds_at(limit, place, len(motion.t))
         values = (

@@ -160,7 +160,8 @@ def round_corners(
     """Blend every corner of the toolpath within its budget.
 
     blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it; such a corner has
-                     theta = 0, bends off both legs within the tolerance, and has no jump left
+                     theta = 0, bends off both legs within the tolerance, and has no jump left. Where the path is to be followed
+                     exactly (G61) it is a full stop
     free           : fraction of every leg that its corners leave free [-], for motions that change their speed between corners only
 
     Raises InputError if the machine lacks an axis of the toolpath.
@@ -169,7 +170,8 @@ def round_corners(
     at = legs.first
     joint = toolpath.joint[at].copy()
     if blend_tangents:
-        joint[(joint == Joint.SMOOTH) & curvature_jumps(toolpath, at)] = Joint.CORNER
+        jumps = (joint == Joint.SMOOTH) & curvature_jumps(toolpath, at)
+        joint[jumps] = np.where(_exact(toolpath, at[jumps]), Joint.STOP, Joint.CORNER)
     blend = joint == Joint.CORNER
     theta, tol = toolpath.theta[at], toolpath.tolerance[at]
     sin_half = np.sin(theta / 2)
@@ -246,6 +248,23 @@ def curvature_jumps(toolpath: Toolpath, at: Array) -> Array:
     before, after = _neighbours(at, len(toolpath))
     jump = np.linalg.norm(vectors[0, after] - vectors[1, before], axis=1)
     return jump > SAME_CURVATURE * np.maximum(toolpath.curvature[before], toolpath.curvature[after])
+
+
+def _exact(toolpath: Toolpath, at: Array) -> Array:
+    """(n,) True for the joints `at` (n,) beside a segment that is to be followed exactly."""
+    before, after = _neighbours(at, len(toolpath))
+    exact: Array = toolpath.exact[before] | toolpath.exact[after]
+    return exact
+
+
+def exact_stops(toolpath: Toolpath) -> Array:
+    """(n,) joints that are full stops for motions with limited jerk alone: tangent ones where the curvature jumps and the path is to
+    be followed exactly."""
+    at = np.arange(len(toolpath) + 1)
+    found: Array = np.flatnonzero(
+        (toolpath.joint == Joint.SMOOTH) & _exact(toolpath, at) & curvature_jumps(toolpath, at)
+    )
+    return found
 
 
 def _neighbours(at: Array, segments: int) -> tuple[Array, Array]:

@@ -15,11 +15,11 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.point_to_point import rest_to_rest_times
 from planner.fir.design import plan_for
 from planner.fir.leg_guide import LegGuide
 from planner.fir.schedule import Schedule
 from planner.fir.slow_down import WORTH, settled_fastest
-from planner.lookahead.rest_to_rest import rest_to_rest_times
 from planner.machine import Machine
 
 # Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others

@@ -1,8 +1,9 @@
 """From the blocks of a program to the segments and joints of a toolpath.
 
 A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
-or exact path (G61) with a turn, between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where the
-tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine lacks is left out.
+or exact path (G61) with a turn (with limited jerk also where the curvature jumps: corners/smooth.py), between rapid and feed moves
+(unless the machine blends rapids), and at a reversal. Where the tangents agree it is smooth; everywhere else it is a corner. An axis
+that never moves and that the machine lacks is left out.
 
 A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
 the motion goes on as at smooth joints, in exact stop mode too; where the spline itself has a kink there is a corner.
@@ -18,6 +19,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.geometry.curves import CHORD_SHARE, CurveSegments, curve_segments
+from planner.geometry.extrusion import Laid, Waits, extruder_limits, extrusion_of, waits
 from planner.geometry.run_in import require_room
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import Machine
@@ -72,14 +74,24 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     laid = _laid(program, splines, block)
     theta = np.zeros(len(block) + 1)
     theta[1:-1] = turning_angle(laid.tangent_end[:-1], laid.tangent_start[1:])
-    joint, dwell = _joints(program, machine, block, theta)
+    stands = np.isin(program.kind, (Kind.DWELL, Kind.STOP))
+    if len(program.extruded):
+        stands |= ~real & (program.extruded != 0.0)
+    found = waits(program, machine, np.flatnonzero(stands))
+    joint, dwell = _joints(program, machine, block, theta, found)
+    feed, of_joint, extrusion = _feeds(program, machine, block), of_block[np.append(block[:1], block)], None
+    if len(program.extruded):
+        at_joints = Laid(block, laid.length, joint == Joint.STOP)
+        extrusion = extrusion_of(program, extruder_limits(machine), at_joints, of_joint, found)
+        with np.errstate(divide="ignore"):
+            feed = np.minimum(feed, extrusion.limits[0] / extrusion.ratio)
     toolpath = Toolpath(
         source=program.source,
         axes=axes,
         start=laid.start[:, axis],
         end=laid.end[:, axis],
         length=laid.length,
-        feed=_feeds(program, machine, block),
+        feed=feed,
         rapid=program.kind[block] == Kind.RAPID,
         block=block,
         line=program.line[block],
@@ -92,10 +104,12 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         curvature=laid.curvature,
         joint=joint,
         theta=theta,
-        tolerance=of_block[np.append(block[:1], block)],
+        tolerance=of_joint,
         dwell=dwell,
         held=np.isin(block, program.synchronised),
+        exact=_exact(program, block, joint),
         zero_length=np.flatnonzero(moves & ~real),
+        extrusion=extrusion,
     )
     require_room(toolpath, machine)
     return toolpath
@@ -250,7 +264,16 @@ def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
     return feed
 
 
-def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray) -> tuple[Array, FloatArray]:
+def _exact(program: Program, block: Array, joint: Array) -> Array:
+    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a block under G64."""
+    rounded = joint == Joint.CORNER
+    exact: Array = (program.path_control[block] != PathControl.BLEND) & ~rounded[:-1] & ~rounded[1:]
+    return exact
+
+
+def _joints(
+    program: Program, machine: Machine, block: Array, theta: FloatArray, found: Waits
+) -> tuple[Array, FloatArray]:
     """Kind and dwell of every joint."""
     joint = np.where(theta < COLLINEAR_ANGLE, Joint.SMOOTH, Joint.CORNER).astype(np.uint8)
     joint[theta > REVERSAL_ANGLE] = Joint.STOP
@@ -262,10 +285,11 @@ def _joints(program: Program, machine: Machine, block: Array, theta: FloatArray)
     if not machine.blend_rapids:
         rapid = program.kind[block] == Kind.RAPID
         joint[1:-1][rapid[:-1] != rapid[1:]] = Joint.STOP
-    still = np.flatnonzero((program.kind == Kind.DWELL) | (program.kind == Kind.STOP))
-    at = np.searchsorted(block, still)  # the joint before the first segment that comes after the standstill
+    at = np.searchsorted(
+        block, found.block
+    )  # the joint before the first segment that comes after the standstill
     joint[at] = Joint.STOP
     dwell = np.zeros(len(block) + 1)
-    np.add.at(dwell, at, program.dwell[still])
+    np.add.at(dwell, at, found.lasts)
     joint[0] = joint[-1] = Joint.STOP
     return joint, dwell

@@ -97,12 +97,14 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     dwell[first], dwell[-1] = toolpath.dwell[:-1], toolpath.dwell[-1]
     return dataclasses.replace(
         toolpath,
+        extrusion=None,
         start=start,
         end=end,
         length=length,
         feed=toolpath.feed[segment],
         rapid=toolpath.rapid[segment],
         held=toolpath.held[segment],
+        exact=toolpath.exact[segment],
         block=toolpath.block[segment],
         line=toolpath.line[segment],
         arc=np.where(straight | chord, -1, toolpath.arc[segment]),

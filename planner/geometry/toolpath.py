@@ -24,6 +24,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.geometry.curves import Curves
+from planner.geometry.extrusion import Extrusion, extruding_part
 
 
 class Joint(IntEnum):
@@ -76,7 +77,9 @@ class Toolpath:
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
     held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
+    exact           : (M,) True where the path is to be followed exactly (G61, G61.1); no corner at its ends is rounded
     zero_length     : (Z,) blocks that move nowhere, kept as events
+    extrusion       : what the extruder does along it; None without one
     """
 
     source: str
@@ -100,7 +103,9 @@ class Toolpath:
     tolerance: FloatArray
     dwell: FloatArray
     held: Array
+    exact: Array
     zero_length: Array
+    extrusion: Extrusion | None = None
 
     def __post_init__(self) -> None:
         segments, axes = len(self.length), len(self.axes)
@@ -111,6 +116,7 @@ class Toolpath:
         freeze(self, "feed", np.float64, (segments,), finite=False)
         freeze(self, "rapid", np.bool_, (segments,))
         freeze(self, "held", np.bool_, (segments,))
+        freeze(self, "exact", np.bool_, (segments,))
         freeze(self, "block", np.int64, (segments,))
         freeze(self, "line", np.int32, (segments,))
         freeze(self, "arc", np.int64, (segments,))
@@ -144,7 +150,7 @@ class Toolpath:
             return self
         last = np.append(first[1:], len(self)) - 1
         at = np.append(first, len(self))
-        of_segment = ("start", "feed", "rapid", "held", "block", "line", "tangent_start")
+        of_segment = ("start", "feed", "rapid", "held", "exact", "block", "line", "tangent_start")
         return dataclasses.replace(
             self,
             end=self.end[last],
@@ -153,6 +159,7 @@ class Toolpath:
             curvature=np.maximum.reduceat(self.curvature, first),
             arc=np.full(len(first), -1),
             curve=np.full(len(first), -1),
+            extrusion=None,
             **{name: getattr(self, name)[first] for name in of_segment},
             **{name: getattr(self, name)[at] for name in ("joint", "theta", "tolerance", "dwell")},
         )
@@ -174,4 +181,6 @@ class Toolpath:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray) and field.name != "zero_length":
                 columns[field.name] = value[kept if len(value) == len(self) else joints]
+        if self.extrusion is not None:
+            columns["extrusion"] = extruding_part(self.extrusion, kept)
         return dataclasses.replace(self, **columns)

@@ -25,5 +25,5 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
     trajectory = plan.require().trajectory
     assert trajectory is not None
     table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory))
-    table.attrs["units"] = units(trajectory.axes)
+    table.attrs["units"] = units(trajectory.axes, extruder=plan.toolpath.extrusion is not None)
     return table

@@ -26,6 +26,7 @@ from planner.job.stages import Stages
 from planner.job.trace import Tell
 from planner.lookahead.stop_moves import stop_time
 from planner.machine import Machine
+from planner.motion.extruding import Extruding
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
@@ -132,7 +133,8 @@ class Job:
         machine, toolpath = self.real
         with self.stage("sample"):
             motion = self.settled(motion, not_limited)
-            trajectory = sample_motion(motion, machine.dt)
+            whole = motion if toolpath.extrusion is None else Extruding(motion, toolpath, machine.dt)
+            trajectory = sample_motion(whole, machine.dt)
             places = SegmentsInOrder(toolpath)
 
             def take(chunk: Trajectory) -> None:
@@ -148,7 +150,7 @@ class Job:
                 judged,
                 toolpath,
                 machine,
-                motion=motion,
+                motion=whole,
                 seed=seed,
                 not_limited=not_limited,
                 progress=progress,

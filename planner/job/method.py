@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from planner.constraints.extruder import with_extruder_limit
 from planner.delivery import periods
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint, Toolpath
@@ -58,6 +59,8 @@ class Method(ABC):
         stages = Stages(progress, log)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
+            if (fed := toolpath.extrusion) is not None:
+                machine = with_extruder_limit(machine, toolpath.axes, fed.limits, fed.ratio, toolpath.block)
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
         at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
         require_samples(at_feed, machine.dt)

@@ -27,6 +27,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
         *unit_notes(machine),
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),
+        *_extruder_notes(toolpath),
         *(_tolerance_notes(toolpath) or short_block_notes(toolpath)),
     ]
 
@@ -54,6 +55,18 @@ def _spline_notes(program: Program, toolpath: Toolpath) -> list[str]:
         f"line {toolpath.line[chords[0]]}: the spline all but stands still, at a control point on its end or at a cusp, where its "
         f"curvature has no bound; a chord of {toolpath.length[chords[0]]:.3g} mm stands for it there, within {CHORD_SHARE:.0%} of the "
         f"tolerance ({len(chords):,} chords)"
+    ]
+
+
+def _extruder_notes(toolpath: Toolpath) -> list[str]:
+    fed = toolpath.extrusion
+    if fed is None or not len(fed.at):
+        return []
+    at = np.unique(fed.at)
+    line = int(toolpath.line[max(int(fed.at[0]) - 1, 0)])
+    return [
+        f"line {line}: the extruder moves alone behind it while the axes wait ({len(fed.at):,} such moves; with dwells beside them "
+        f"{float(toolpath.dwell[at].sum()):.4g} s)"
     ]
 
 

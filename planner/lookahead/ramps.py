@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.kernels import njit
+from planner.base.point_to_point import PHASES
 from planner.corners.kinematic import entry_acceleration, phase_times
-from planner.lookahead.rest_to_rest import PHASES
 
 ROUNDING = 1e-15  # of a leg's length [-]
 # What is left of a leg between two ramps is run at constant speed if it is at most this fraction of the leg [-]: faster still would

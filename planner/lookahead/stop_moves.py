@@ -9,12 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.point_to_point import rest_to_rest_phases, rest_to_rest_times
 from planner.corners.smooth import curvature_jumps
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.lookahead.look_ahead import moves, swept
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_phases, rest_to_rest_times
+from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import Machine
 
 

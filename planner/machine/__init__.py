@@ -1,6 +1,7 @@
 """The machine: limits of the axes, interpolation period, tolerance, filters. Read from TOML, checked, frozen.
 
     parts.py    records of the tables of a machine file
+    kinematics_data.py  the record of [kinematics]
     whole.py    `Machine`, the record of all of them
     faults.py   what is wrong in a record, in words
     files.py    machine files and built-in machines
@@ -10,16 +11,19 @@ template with every key and its unit.
 """
 
 from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict
+from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import Axis, DialectData, Fir, Mode, Plotter, Times, ToolData
-from planner.machine.whole import LINEAR_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
+from planner.machine.whole import EXTRUDER, LINEAR_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
 
 __all__ = [
+    "EXTRUDER",
     "LINEAR_AXES",
     "ROTARY_AXES",
     "WORK_OFFSETS",
     "Axis",
     "DialectData",
     "Fir",
+    "KinematicsData",
     "Machine",
     "Mode",
     "Plotter",

@@ -14,6 +14,7 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.constraints.own import OwnLimit, check_names
 from planner.machine.faults import faults_in_words
+from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import (
     Axis,
     DialectData,
@@ -29,6 +30,7 @@ from planner.machine.parts import (
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
+EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
@@ -38,7 +40,7 @@ class Machine(Record):
     """A machine. The template explains every key. Raises InputError for all faults at once.
 
     name                : of the machine
-    axes                : limits by axis letter, at least x and y
+    axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm of filament
     dt                  : interpolation period [s]
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
@@ -46,6 +48,7 @@ class Machine(Record):
     feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
+    kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
     """
 
     name: str
@@ -62,6 +65,7 @@ class Machine(Record):
     plotter: Plotter | None = None
     dialect: DialectData | None = None
     times: Times | None = None
+    kinematics: KinematicsData | None = None
     tools: dict[str, ToolData] = Field(default_factory=dict)
     positions: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     work_offsets: dict[str, dict[str, Finite]] = Field(default_factory=dict)
@@ -76,7 +80,7 @@ class Machine(Record):
     @field_validator("axes")
     @classmethod
     def _axes_known(cls, axes: dict[str, Axis]) -> dict[str, Axis]:
-        known = LINEAR_AXES + ROTARY_AXES
+        known = (*LINEAR_AXES, *ROTARY_AXES, EXTRUDER)
         for letter in axes:
             if letter not in known:
                 raise ValueError(f"axis '{letter}' is not known; allowed are {', '.join(known)}")
@@ -102,6 +106,9 @@ class Machine(Record):
                 for letter in values:
                     if letter not in LINEAR_AXES:
                         raise ValueError(f"{table}.{key}: axis '{letter}' is not known; allowed are x, y, z")
+        for letter in self.kinematics.axes if self.kinematics else ():
+            if letter not in self.axes:
+                raise ValueError(f"kinematics: axis '{letter}' is missing; write a table [axes.{letter}]")
         for tool in self.tools:
             if not tool.isdecimal() or len(tool) > TOOL_DIGITS:
                 raise ValueError(f"tools: '{tool[:TOOL_DIGITS]}' is not a tool number; write e.g. 1 = 25.0")
@@ -148,5 +155,6 @@ _KEYS = {
     "plotter": [*Plotter.model_fields],
     "dialect": [*DialectData.model_fields],
     "times": [*Times.model_fields],
+    "kinematics": [*KinematicsData.model_fields],
     "tools": [*ToolData.model_fields],
 }

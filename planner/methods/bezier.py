@@ -18,7 +18,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.corners.bezier import BezierCorner
-from planner.corners.smooth import SmoothPath, round_corners
+from planner.corners.smooth import SmoothPath, exact_stops, round_corners
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
 from planner.job.job import Job
@@ -31,6 +31,7 @@ from planner.lookahead.ramps import JointKind
 from planner.machine import Machine
 from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion
+from planner.optimal.notes import exact_note
 from planner.optimal.tighten import slowed
 from planner.path.samples import PathSamples, sample_path
 from planner.sensitivity.closed_form import corner_apexes, corners_at
@@ -62,6 +63,7 @@ class BezierMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
+        job.note(*exact_note(job.toolpath, exact_stops(job.toolpath)))
         with job.stage("geometry"):
             shares = machine if self.allocate else machine.model_copy(update={"dt": NO_PERIOD, "fir": None})
             path = round_corners(job.toolpath, shares, self.corner, blend_tangents=True, free=FREE_FRACTION)

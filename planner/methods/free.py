@@ -46,13 +46,14 @@ class Freed(NamedTuple):
 
 def searchable(job: Job) -> bool:
     """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no limits of one's own, no
-    range in step with the spindle."""
+    range in step with the spindle; and whether the path leaves it anything to find."""
     machine, toolpath = job.real
     return (
         machine.fir is None
         and not machine.own
         and not (toolpath.curve >= 0).any()
         and not toolpath.held.any()
+        and not toolpath.exact.all()
     )
 
 
@@ -104,6 +105,8 @@ def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
     """Share of the time on which the start's motion stays [-]."""
     stays = 0.0
     for k, one in enumerate(found):
+        if one.run.exact:  # there is nothing to be found
+            continue
         if k in kept or one.steps is None:
             stays += start.lasting(k)
         elif one.kept is not None:
@@ -160,8 +163,8 @@ class Start:
         begin, end = self.departure[k], self.arrival[k + 1]
         inside = np.searchsorted(self.seen.t, [begin, end])
         window = slice(inside[0], inside[1] + 1)
-        columns = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
-        along = dataclasses.replace(self.seen, **{name: getattr(self.seen, name)[window] for name in columns})
+        columns = {name: getattr(self.seen, name)[window] for name in self.seen.columns}
+        along = dataclasses.replace(self.seen, **columns)
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
         # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
@@ -197,6 +200,9 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) ->
     for start in starts:
         first = not why
         least = start.lasting(k) if first else least
+        if run.exact:
+            why.append("G61 asks for the exact path")
+            break
         guess = start.guess(k, run)
         solution = solver.solve(run, guess)
         steps, kept = solution.steps, solution.kept

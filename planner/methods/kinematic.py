@@ -19,6 +19,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
+from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import error_rate
@@ -36,7 +37,7 @@ from planner.lookahead.kinematic_corners import corner_passages, fitted, leg_lim
 from planner.lookahead.look_ahead import look_ahead
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
+from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl

@@ -100,7 +100,7 @@ class TrajectoryOnDemand(Trajectory):
         return times
 
     def __getattr__(self, name: str) -> Any:
-        if name not in COLUMNS:
+        if name not in (*COLUMNS, "extruder"):
             raise AttributeError(name)
         if "_whole" not in vars(self):
             object.__setattr__(self, "_whole", joined(list(self.chunks())))

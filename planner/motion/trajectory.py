@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ class Trajectory:
     feed         : (T,) ds/dt [mm/s]
     block        : (T,) index of the block of the program
     line         : (T,) NC line of that block
+    extruder     : (T, 4) place [mm of filament], velocity, acceleration and jerk of the extruder; (0, 4) without one
     """
 
     axes: tuple[str, ...]
@@ -42,6 +43,7 @@ class Trajectory:
     feed: FloatArray
     block: Array
     line: Array
+    extruder: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
     def __post_init__(self) -> None:
         samples, axes = len(self.t), len(self.axes)
@@ -51,6 +53,7 @@ class Trajectory:
             freeze(self, name, np.float64, (samples, axes))
         freeze(self, "block", np.int64, (samples,))
         freeze(self, "line", np.int32, (samples,))
+        freeze(self, "extruder", np.float64, (samples if len(self.extruder) else 0, 4))
         if not self.dt > 0:
             raise ValueError(f"Trajectory.dt: {self.dt} s; must be positive")
         if samples and not (np.diff(self.t) > 0).all():
@@ -76,7 +79,12 @@ class Trajectory:
 
     def rows(self, k: Array) -> Trajectory:
         """The samples with the ascending indices k (n,)."""
-        return dataclasses.replace(self, **{name: getattr(self, name)[k] for name in COLUMNS})
+        return dataclasses.replace(self, **{name: getattr(self, name)[k] for name in self.columns})
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the fields with a row for each sample."""
+        return (*COLUMNS, "extruder") if len(self.extruder) else COLUMNS
 
     def first_not_before(self, times: FloatArray) -> Array:
         """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
@@ -88,6 +96,6 @@ def joined(chunks: list[Trajectory]) -> Trajectory:
     fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])
-        for name in COLUMNS
+        for name in chunks[0].columns
     }
     return dataclasses.replace(chunks[0], **columns)

@@ -18,6 +18,7 @@ from planner.nc.codes import LETTERS_REFUSED, PARKABLE, Assumption
 from planner.nc.events import plain
 from planner.nc.lexer import Words
 from planner.nc.reading import IGNORE, Reading
+from planner.nc.settings import EXTRUDER_ZERO
 
 # How a letter is treated whatever stands beside it, in `Assumed.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED = range(4)
@@ -39,10 +40,12 @@ class Assumed:
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
     moved     : letters of axes that are not planned and were refused, because they move
     printer   : the program is one for a 3-D printer: it has M82 or M83
+    follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
     """
 
-    def __init__(self, reading: Reading):
+    def __init__(self, reading: Reading, *, extruder: bool = False):
         self.reading = reading
+        self.follows = extruder and reading.extruder != IGNORE
         self.strict = reading.strict
         self.printer = False
         self.parked = np.full(256, np.nan)
@@ -54,12 +57,22 @@ class Assumed:
         self._used: dict[str, int] = {}
 
     def _treatment(self, letter: str) -> int:
-        if letter in self.reading.ignore or (letter == "E" and self.reading.extruder == IGNORE):
+        if letter in self.reading.ignore or (
+            letter == "E" and (self.follows or self.reading.extruder == IGNORE)
+        ):
             return LEFT_OUT
         return PARKED if letter in PARKABLE and not self.strict else REFUSED
 
+    def refuse_extruder(self) -> None:
+        """E is no axis here: a program that computes may use the letter otherwise."""
+        if self.follows:
+            self.follows = False
+            self.treatment[ord("E")] = self._treatment("E")
+
     def count(self, what: Assumption, word: str, line: int, times: int = 1) -> None:
         """Keep that a word was met; `times` if it stands for more of them."""
+        if what is EXTRUDER_ZERO and self.follows:
+            return
         found = self._counted.setdefault(what, _Counted(0, word, line))
         found.times += times
 
@@ -86,6 +99,8 @@ class Assumed:
         times = np.bincount(letter, minlength=256)
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
             times[code] -= self._used.pop(chr(code), 0)
+            if chr(code) == "E" and self.follows:
+                continue
             if times[code] > 0 and chr(code) not in self.moved:
                 word = int(np.argmax(letter == code))
                 line = int(words.line[words.row(word)])

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.machine import Machine
+from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block, read_block
@@ -45,7 +45,7 @@ class Interpreter:
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
-        self.assumed = Assumed(reading)
+        self.assumed = Assumed(reading, extruder=machine is not None and EXTRUDER in machine.axes)
         self.mover = Mover(self.setup.start(), Store(), self.assumed, self.setup.feed_default, self.note)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
@@ -139,6 +139,11 @@ class Interpreter:
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
+
+    @property
+    def rows_read(self) -> int:
+        """Rows of the last chunk up to the end of the program."""
+        return self._read
 
     @property
     def all_arcs_close_otherwise(self) -> bool:

@@ -40,6 +40,13 @@ class PathControl(IntEnum):
     EXACT_STOP = 2  # G61.1: a full stop
 
 
+def extruder_alone(program: Program) -> Array:
+    """(B,) True for the blocks on which the extruder moves and nothing else."""
+    if not len(program.extruded):
+        return np.zeros(len(program), dtype=bool)
+    return (program.kind == Kind.STOP) & (program.extruded != 0.0)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Event:
     """A word without influence on the motion (M3, S, T, M8 ...), with its place in the program."""
@@ -120,7 +127,7 @@ class Program:
     start        : (A,) machine position before the first block [mm]
     kind         : (B,) `Kind`
     end          : (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
-    feed         : (B,) programmed feed [mm/s]; inf for RAPID, DWELL and STOP
+    feed         : (B,) programmed feed [mm/s]; inf for RAPID, DWELL, and STOP without an extruder
     dwell        : (B,) standstill [s], > 0 for DWELL only
     line         : (B,) source line, from 1
     path_control : (B,) `PathControl` in force at the end of the block
@@ -136,6 +143,8 @@ class Program:
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
+    extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it moves alone, a block of
+                   kind STOP with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
     reading      : the settings it was read with
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : the program itself, if it was given as a text; None for those of a file, and for points
@@ -162,6 +171,7 @@ class Program:
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
+    extruded: FloatArray = field(default_factory=lambda: np.zeros(0))
     reading: Reading = AS_USUAL
     pen: bool = False
     text: bytes | None = None
@@ -188,6 +198,7 @@ class Program:
         if self.splines.points.shape[2] != axes:
             raise ValueError(f"Program.splines: {self.splines.points.shape[2]} axes, expected {axes}")
         freeze(self, "frame", np.int32, (blocks if self.frames else 0,))
+        freeze(self, "extruded", np.float64, (blocks if len(self.extruded) else 0,))
         if not (self.feed > 0).all():
             raise ValueError("Program.feed: every feed must be positive")
 

@@ -14,6 +14,7 @@ from planner.base.errors import InputError
 from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine
 from planner.nc.dialects import is_plotter_file, language_of, refuse_models
+from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
@@ -141,12 +142,16 @@ def execute(
     integers = integers_of(machine, dialect)
     words = integers.applied(words)
     if dialect is not None:
+        interpreter.assumed.refuse_extruder()
         from planner.nc.language.expand import expand
 
         return interpreter, *expand(interpreter, words, dialect, integers, tee)
     interpreter.execute(words)
     interpreter.note_what_follows(words)
-    return interpreter, interpreter.program(), interpreter.faults()
+    program, faults = interpreter.program(), interpreter.faults()
+    if interpreter.assumed.follows and not len(faults):
+        program = with_extruder(program, words, interpreter.rows_read)
+    return interpreter, program, faults
 
 
 def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Program:

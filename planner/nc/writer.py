@@ -22,7 +22,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.leader import without_leader
 from planner.nc.lexer import NUMBER, Words, split_words
-from planner.nc.program import FEED_MOVES, Program
+from planner.nc.program import FEED_MOVES, Program, extruder_alone
 
 SIGNIFICANT = 4  # digits of a feed
 # The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
@@ -45,12 +45,14 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
-    moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES))
+    alone = extruder_alone(program)  # keeps its feed, written out where one of ours is in force
+    moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES) | alone)
     asked = np.asarray(feeds, dtype=np.float64)
     if asked.shape != (len(program),):
         raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
     if (asked < 0).any():
         raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
+    asked = np.where(alone, np.nan, asked)
     reading = program.reading
     read = source if reading.strict else without_leader(source)[0]
     words = split_words(read, block_delete=reading.block_delete)

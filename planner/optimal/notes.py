@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.corners.smooth import SmoothPath
+from planner.corners.smooth import SmoothPath, exact_stops
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.optimal.on_path import OnPath
 from planner.smoothing.spline_path import SplineShape
@@ -20,6 +20,9 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     notes: list[str] = []
     path, at = best.path, best.path.legs.first
     added = (path.joint == Joint.STOP) & (toolpath.joint[at] != Joint.STOP)
+    exact = added & np.isin(at, exact_stops(toolpath))
+    notes += exact_note(toolpath, at[exact])
+    added &= ~exact
     if added.any():
         notes.append(
             _at(toolpath, at[added], "full stop", "where no smooth curve was found inside the tolerance")
@@ -34,6 +37,14 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     if len(lost):
         notes.append(_at(toolpath, lost, "full stop", "where the solver did not converge"))
     return notes
+
+
+def exact_note(toolpath: Toolpath, at: Array) -> tuple[str, ...]:
+    """That the tangent joints `at` (n,) are full stops because of G61, if there are any."""
+    if not len(at):
+        return ()
+    why = "where G61 asks for the exact path and its curvature jumps, which limited jerk allows at rest only; G64 P0.001 rounds them"
+    return (_at(toolpath, at, "full stop", why),)
 
 
 def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:

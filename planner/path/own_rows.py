@@ -123,7 +123,7 @@ def own_rows_at_points(samples: PathSamples, machine: Machine) -> OwnRows:
     axes, points = samples.path.toolpath.axes, len(samples)
     left = (samples.position, samples.d1, samples.d2_left, samples.d3_left)
     right = (samples.position, samples.d1, samples.d2_right, samples.d3_right)
-    here = Place(axes, list(samples.position.T), samples.d1)
+    here = Place(axes, list(samples.position.T), samples.d1, _block(samples))
     real = _real_bounds(samples, machine, np.arange(points), np.stack(right, axis=1))
     v = np.sqrt(real.feed_sq)
     columns: list[dict[str, FloatArray]] = []
@@ -204,7 +204,8 @@ class _Column:
         left = (samples.position, samples.d1, samples.d2_left, samples.d3_left)
         right = (samples.position, samples.d1, samples.d2_right, samples.d3_right)
         middle = tuple(inside[:, k] for k in range(4))
-        here, between = (Place(axes, list(p[0].T), p[1]) for p in (right, middle))
+        block = _block(samples)
+        here, between = (Place(axes, list(p[0].T), p[1], b) for p, b in ((right, block), (middle, block[at])))
         q_left, q_right, q_mid = (_along(limit, axes, p, here) for p in (left, right, middle))
         bound, bound_mid = bounds_at(limit, here, points), bounds_at(limit, between, len(at))
         if limit.value(here) is None:
@@ -264,6 +265,12 @@ class _Column:
             return np.zeros(len(self.error), dtype=bool)
         far = (self.error > resolution) | (self.bend > JERK_SHARE * resolution)
         return far | (self.short > BOUND_SHARE * resolution) | (self.jump > JUMP)
+
+
+def _block(samples: PathSamples) -> Array:
+    """(P,) the program's block of the interval to the right of each point."""
+    block: Array = samples.path.toolpath.block[samples.segment]
+    return block
 
 
 def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray], here: Place) -> FloatArray:

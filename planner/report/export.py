@@ -217,7 +217,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
             "reading": plan.program.reading.changed(),
             "not_limited": _not_limited(plan.verdict) if plan.verdict is not None else [],
-            "units": units(trajectory.axes),
+            "units": units(trajectory.axes, extruder=plan.toolpath.extrusion is not None),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),
             "versions": versions(),
         }

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _MOTION = (
     "kind", "end", "dwell", "line", "path_control", "tolerance",
-    "arc_block", "arc_center", "arc_normal", "arc_sweep",
+    "arc_block", "arc_center", "arc_normal", "arc_sweep", "extruded",
 )  # fmt: skip
 
 

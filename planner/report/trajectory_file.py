@@ -3,6 +3,7 @@
 A trajectory file is a table, one row per sample:
 
     t [s], then per axis  x [mm] vx [mm/s] ax [mm/s2] jx [mm/s3]  (rotary axes in rad), s [mm], feed [mm/s],
+    of an extruder  e [mm of filament] ve ae je,
     line (of the NC program), block (its index; several blocks can come from one line)
 
 as Parquet (`.parquet`), CSV (`.csv`: one header line, shortest digits that read back to the same float64) or
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array
-from planner.machine import ROTARY_AXES
+from planner.machine import EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.trajectory_reader import CSV_METADATA, FORMATS, Format, read_trajectory
 
@@ -49,10 +50,10 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, 
             raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
 
 
-def units(axes: tuple[str, ...]) -> dict[str, str]:
-    """The unit of every column, by its name."""
+def units(axes: tuple[str, ...], *, extruder: bool = False) -> dict[str, str]:
+    """The unit of every column, by its name; `extruder`: there are columns of one."""
     said = {"t": "s"}
-    for axis in axes:
+    for axis in (*axes, EXTRUDER) if extruder else axes:
         length = "rad" if axis in ROTARY_AXES else "mm"
         for prefix, per in zip(("", "v", "a", "j"), ("", "/s", "/s2", "/s3"), strict=True):
             said[prefix + axis] = length + per
@@ -67,6 +68,10 @@ def trajectory_columns(trajectory: Trajectory) -> dict[str, Array]:
         columns["v" + axis] = trajectory.velocity[:, k]
         columns["a" + axis] = trajectory.acceleration[:, k]
         columns["j" + axis] = trajectory.jerk[:, k]
+    if len(trajectory.extruder):
+        columns |= {
+            prefix + EXTRUDER: trajectory.extruder[:, k] for k, prefix in enumerate(("", "v", "a", "j"))
+        }
     return columns | {
         "s": trajectory.s,
         "feed": trajectory.feed,
@@ -139,8 +144,7 @@ def _write_csv(path: Path, trajectory: Trajectory) -> None:
     from pyarrow import csv
 
     with path.open("wb") as file:
-        file.write(
-            (",".join(units(trajectory.axes)) + "\n").encode()
-        )  # pyarrow would put the names in quotes
-        for columns in _groups(trajectory):
+        for n, columns in enumerate(_groups(trajectory)):
+            if n == 0:
+                file.write((",".join(columns) + "\n").encode())  # pyarrow would put the names in quotes
             csv.write_csv(_table(columns), file, csv.WriteOptions(include_header=False, batch_size=65536))

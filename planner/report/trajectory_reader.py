@@ -21,7 +21,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.files import require_ending
-from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.digits import on_grid, rounding
 from planner.verify.given import DERIVATIVES, Given
@@ -30,7 +30,7 @@ Format = Literal["parquet", "csv", "npz"]
 FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")
 CSV_METADATA = ".meta.json"  # takes the place of the suffix .csv
 KNOWN = {"t", "s", "feed", "line", "block"} | {
-    prefix + axis for prefix in ("", "v", "a", "j") for axis in LINEAR_AXES + ROTARY_AXES
+    prefix + axis for prefix in ("", "v", "a", "j") for axis in (*LINEAR_AXES, *ROTARY_AXES, EXTRUDER)
 }
 # Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
 # are noise.
@@ -219,6 +219,7 @@ def _assemble(
         velocity=velocity,
         acceleration=acceleration,
         jerk=jerk,
+        extruder=_extruder(columns, t),
         **rest,
     )
     delivered = Given(
@@ -226,8 +227,23 @@ def _assemble(
         position_rounding=tuple(rounding(columns[axis]) for axis in axes),
         time_rounding=time_rounding,
         end_rounding=end_rounding,
+        extruder_rounding=rounding(columns[EXTRUDER]) if EXTRUDER in columns else 0.0,
     )
     return trajectory, delivered, tuple(notes)
+
+
+def _extruder(columns: dict[str, Array], t: FloatArray) -> FloatArray:
+    """(T, 4) the columns of the extruder, what is missing as differences of its place; (0, 4) without one."""
+    if EXTRUDER not in columns:
+        return np.zeros((0, 4))
+    place = columns[EXTRUDER].astype(np.float64)
+    rates = [
+        columns[prefix + EXTRUDER].astype(np.float64)
+        if prefix + EXTRUDER in columns
+        else divided_difference(t, place[:, None], order)[:, 0]
+        for order, prefix in enumerate(("v", "a", "j"), start=1)
+    ]
+    return np.stack([place, *rates], axis=1)
 
 
 def _times(source: str, given: Array) -> tuple[FloatArray, float, float, list[str]]:

@@ -48,7 +48,7 @@ def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatAr
 
 
 def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray) -> SplineRuns:
-    """The runs of a path over R legs (module text).
+    """The runs of a path over R legs (module text), but for those on legs that are to be followed exactly.
 
     longest : (R,) longest span on each leg [mm], from `longest_span`
     """
@@ -62,6 +62,9 @@ def find_runs(path: SmoothPath, machine: Machine, longest: FloatArray) -> Spline
     after = np.concatenate([split, [True]])
     first = np.flatnonzero(inside & (before | np.concatenate([[True], cut[:-1]])))
     last = np.flatnonzero(inside & (after | np.concatenate([cut[1:], [True]])))
+    exact = np.append(0, np.cumsum(np.logical_or.reduceat(path.toolpath.exact, legs.first[:-1])))
+    free = exact[last + 1] == exact[first - 1]
+    first, last = first[free], last[free]
     return SplineRuns(
         joint_first=first,
         joint_last=last,

@@ -62,6 +62,7 @@ class TubeRun:
                                    where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes
+    exact                        : some of it is to be followed exactly, which the search cannot
     """
 
     axis: Array
@@ -82,6 +83,7 @@ class TubeRun:
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
+    exact: bool = False
 
     def __post_init__(self) -> None:
         legs, axes = len(self.length), len(self.axis)
@@ -157,9 +159,11 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
+        exact = bool(toolpath.exact[first[0] : first[-1]].any())
         held = budgets.across < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
         yield TubeRun(
             axis=np.flatnonzero(moves),
+            exact=exact,
             first=first,
             curvature=toolpath.curvature[row],
             budget=budgets.leg,

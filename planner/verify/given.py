@@ -18,12 +18,14 @@ class Given:
     position_rounding : (A,) largest error of a position by the digits it is written with [mm, rad], or () for none
     time_rounding     : the same of every time [s]
     end_rounding      : the same of the last time alone [s]: the others may lie on a grid, and be known by it
+    extruder_rounding : largest error of the extruder's place by its digits [mm of filament]
     """
 
     columns: tuple[str, ...] = DERIVATIVES
     position_rounding: FloatArray | tuple[float, ...] = ()
     time_rounding: float = 0.0
     end_rounding: float = 0.0
+    extruder_rounding: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, "position_rounding", float, (None,))

@@ -12,6 +12,8 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
+from planner.verify.exact import exact_faults
+from planner.verify.extruder import extruder_seen
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES
 from planner.verify.given import DERIVATIVES, Given
@@ -86,7 +88,16 @@ def verify(
     faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
+    faults += exact_faults(trajectory, looks, toolpath, pieces, limits.rounding)
     faults += held_faults(trajectory, looks, toolpath, pieces, machine)
+    extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
+    if toolpath.extrusion is not None:
+        checks |= extruder.checks(toolpath.extrusion.limits, not_limited)
+    faults += [
+        check.sentence(toolpath.axes) for name, check in checks.items() if name[-2:] == ".e" and check.broken
+    ]
+    faults += extruder.faults
+    notes += extruder.notes
     after = after_filters(trajectory, motion, toolpath, machine, pieces)
     faults += after.faults if after is not None else ()
     corners = error_allocation.check_corners(
@@ -148,7 +159,7 @@ def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited:
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         axes=trajectory.axes,
-        own=machine.own,
+        own=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
     )
 
 

@@ -11,6 +11,7 @@ from random_problems import in_units, make_problem
 from benchmarks import problems
 from benchmarks.jerk_campaign import small_problem
 from benchmarks.random_paths import random_path
+from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -20,7 +21,6 @@ from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import Status, constraint_ratios
 from planner.geometry.build import toolpath_from_program
-from planner.lookahead.rest_to_rest import rest_to_rest_times
 from planner.path.samples import sample_path
 
 

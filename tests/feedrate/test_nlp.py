@@ -9,13 +9,13 @@ import pytest
 from whole_plans import smooth_path
 
 from benchmarks import problems
+from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import Status, active_names, constraint_ratios
-from planner.lookahead.rest_to_rest import rest_to_rest_times
 from planner.machine import Machine
 from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion, dense_motion

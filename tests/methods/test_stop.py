@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
+from planner.base.point_to_point import rest_to_rest_times
 from planner.geometry.build import toolpath_from_program
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
+from planner.lookahead.rest_to_rest import block_limits
 from planner.methods.stop import StopMethod
 from planner.nc.reader import parse_program
 

@@ -13,10 +13,10 @@ from oracles import needs_ruckig
 from whole_plans import CORNERS, Solved, smooth_path, solve
 
 from benchmarks import problems
+from planner.base.point_to_point import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.geometry.build import toolpath_from_program
 from planner.job.job import Job
 from planner.job.stages import Stages
-from planner.lookahead.rest_to_rest import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.methods.optimal import OptimalMethod
 from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion, dense_motion, sample_motion

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from planner import plan
+from planner.base.point_to_point import rest_to_rest_times
 from planner.job.plan import Plan
-from planner.lookahead.rest_to_rest import block_limits, rest_to_rest_times
+from planner.lookahead.rest_to_rest import block_limits
 from planner.machine import load_machine
 from planner.methods.optimal import OptimalMethod
 from planner.methods.stop import StopMethod

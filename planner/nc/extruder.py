@@ -1,0 +1,164 @@
+"""The extruder of a 3-D printer as an axis that follows the path: what it feeds on each block of a program.
+
+    X and Y with E     the block feeds that much filament, in proportion to the way along it
+    E alone            nothing else moves: a full stop for as long as it takes (geometry/extrusion.py), at the F in force
+    M82, M83           E is a place, or a step. After G91 it is a step whatever holds, as in Klipper; Marlin's G90 also ends M83
+    G92 E0             what E is called from here on; nothing moves
+
+E is in the program's units, and starts at 0. The words are gone through once more, for E alone, after the blocks are known: a row of
+the program has one block at most where E stands beside G0 to G3.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.kernels import njit
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.nc.events import EventTable
+from planner.nc.lexer import Words
+from planner.nc.program import MOVES, Kind, Program
+
+_E, _F, _G, _M = ord("E"), ord("F"), ord("G"), ord("M")
+# G codes in tenths beside which E is the extruder's: straight moves, arcs, planes, units, distance and feed modes.
+_WITH_MOVES = np.array([0, 10, 20, 30, 50, 170, 180, 190, 200, 210, 640, 900, 910, 911, 940])
+
+
+class _Fed(NamedTuple):
+    """What the rows of a program say of the extruder: how much (R,) [mm], 0 on most, and the feed in force (R,) [mm/s], 0 before the
+    first F."""
+
+    amount: FloatArray
+    feed: FloatArray
+
+
+def with_extruder(program: Program, words: Words, rows: int) -> Program:
+    """The program with what the extruder feeds on each block, and full stops where it moves alone.
+
+    words : of the program; of these the first `rows` rows
+
+    Raises InputError for an E word beside more than one move or beside another G code, and for one alone before the first F word.
+    """
+    fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES))
+    if not fed.amount.any():
+        return program
+    given = np.flatnonzero(fed.amount)
+    line = words.line[given]
+    unknown = np.flatnonzero(np.isnan(fed.amount[given]))
+    if len(unknown):
+        _refuse(program, line[unknown], "an E word beside a G code that is none of G0 to G3, G5 and G92")
+    moves = np.isin(program.kind, MOVES)
+    of_moves = np.flatnonzero(moves)
+    first, last = (np.searchsorted(program.line[of_moves], line, side=side) for side in ("left", "right"))
+    several = np.flatnonzero(last - first > 1)
+    if len(several):
+        _refuse(
+            program, line[several], "an E word beside more than one move; write G0 to G3 alone on its line"
+        )
+    alone = last == first
+    without = np.flatnonzero(alone & (fed.feed[given] == 0.0))
+    if len(without):
+        _refuse(program, line[without], "an E word alone before the first F word; write its feed")
+    extruded = np.zeros(len(program))
+    extruded[of_moves[first[~alone]]] = fed.amount[given[~alone]]
+    at = np.searchsorted(program.line, line[alone], side="right")
+    return _with_stops(program, extruded, at, line[alone], _Fed(*(c[given[alone]] for c in fed)))
+
+
+def _refuse(program: Program, line: Array, what: str) -> NoReturn:
+    """Raise InputError for the first of the lines (n,)."""
+    raise InputError(f"{what}; or give --extruder ignore", source=program.source, line=int(line[0]))
+
+
+def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, alone: _Fed) -> Program:
+    """The program with a full stop before each of the blocks `at` (n,), not decreasing, on lines (n,), where the extruder moves alone.
+
+    extruded : (B,) of the blocks that are there
+    """
+
+    def put(values: Array, new: Any) -> Array:
+        return np.insert(values, at, new, axis=0)
+
+    def later(block: Array) -> Array:
+        return block + np.searchsorted(at, block, side="right")
+
+    before = np.maximum(at - 1, 0)
+    place = np.vstack([program.start, program.end])[at]
+    columns: dict[str, Any] = {
+        "kind": put(program.kind, Kind.STOP),
+        "end": put(program.end, place),
+        "feed": put(program.feed, alone.feed),
+        "dwell": put(program.dwell, 0.0),
+        "line": put(program.line, line),
+        "extruded": put(extruded, alone.amount),
+    }
+    if len(program):
+        columns |= {
+            name: put(getattr(program, name), getattr(program, name)[before])
+            for name in ("path_control", "tolerance")
+        }
+    else:
+        columns |= {"path_control": np.zeros(len(at)), "tolerance": np.full(len(at), np.nan)}
+    events = program.events
+    if isinstance(events, EventTable):
+        low, high = (np.searchsorted(at, events.block, side=side) for side in ("left", "right"))
+        stops = np.clip(np.searchsorted(line, events.line), low, high)  # that come before the event
+        events = dataclasses.replace(events, block=events.block + stops)
+    return dataclasses.replace(
+        program,
+        arc_block=later(program.arc_block),
+        synchronised=later(program.synchronised),
+        splines=dataclasses.replace(program.splines, block=later(program.splines.block)),
+        events=events,
+        **columns,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _fed(letter, value, first, with_moves):
+    """What each row feeds (R,) [mm], NaN beside a G code that is none of `with_moves` and G92; the feed in force on it (R,) [mm/s]."""
+    rows = len(first) - 1
+    amount, feeds = np.zeros(rows), np.zeros(rows)
+    absolute, absolute_moves, unit, feed, place = True, True, 1.0, 0.0, 0.0
+    for row in range(rows):
+        has, sets, others, unknown, e, before = False, False, False, False, 0.0, unit
+        for word in range(first[row], first[row + 1]):
+            c, v = letter[word], value[word]
+            if c == _E:
+                has, e = True, v
+            elif c == _F and v > 0.0:
+                feed = v * before / SECONDS_PER_MINUTE
+            elif c == _M:
+                others = others or not (v == 82.0 or v == 83.0)
+                if v == 82.0 or v == 83.0:
+                    absolute = v == 82.0
+            elif c == _G:
+                code = int(np.rint(v * 10.0))
+                if code == 900 or code == 910:
+                    absolute_moves = code == 900
+                elif code == 200 or code == 210:
+                    unit = MM_PER_INCH if code == 200 else 1.0
+                sets = sets or code == 920
+                known = False
+                for k in range(len(with_moves)):
+                    known = known or code == with_moves[k]
+                unknown = unknown or not (known or code == 920)
+        feeds[row] = feed
+        if not has or others:
+            continue
+        if unknown:
+            amount[row] = np.nan
+        elif sets:
+            place = e * unit
+        elif absolute and absolute_moves:
+            amount[row] = e * unit - place
+            place = e * unit
+        else:
+            amount[row] = e * unit
+            place += e * unit
+    return amount, feeds

@@ -1,0 +1,111 @@
+"""Blocks under G61 and G61.1: the delivered samples lie on the path itself.
+
+Which block a sample is at follows from the times at which the joints are passed (matching.py); the nearest of it and of its neighbours
+counts. On a line the distance is that from the chord, on an arc that from the place p(x) where the sample is perpendicular to the arc,
+
+    (p(x) - q) p'(x) = 0,      by Newton's method from the angle at which q is seen from the axis, in each turn,
+
+or from its ends; on a spline of the program the same, from the nearest of `STARTS` places (curves.py). Between samples the tolerance
+counts (contour.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.motion.trajectory import Trajectory
+from planner.verify.curves import curve_points
+from planner.verify.findings import Look
+from planner.verify.pieces import PLACE_ROUNDING, ProgramPieces
+
+STARTS = 17  # places on a curve
+CURVE_STEPS = 6  # of Newton's method without the curvature, which is exact for samples on the curve
+NEWTON = 3  # steps: the angle is off by the gap of an arc over its radius, some 1e-4 at most; squared twice that is rounding
+
+
+def exact_faults(
+    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, rounding: FloatArray
+) -> list[str]:
+    """The largest distance of a sample from a path that is to be followed exactly, as a sentence, if it is more than rounding.
+
+    rounding : (A,) largest error of a position by its digits [mm]
+    """
+    if not toolpath.exact.any():
+        return []
+    passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    worst, when, line = 0.0, 0.0, 0
+    for chunk in trajectory.chunks():
+        k = np.clip(np.searchsorted(passed, chunk.t, side="right") - 1, 0, len(toolpath) - 1)
+        inside = np.flatnonzero(toolpath.exact[k])
+        if not len(inside):
+            continue
+        off = np.min(
+            [
+                _distance(toolpath, chunk.position[inside], np.clip(k[inside] + step, 0, len(toolpath) - 1))
+                for step in (-1, 0, 1)
+            ],
+            axis=0,
+        )
+        at = int(off.argmax())
+        if off[at] > worst:
+            worst, when, line = float(off[at]), float(chunk.t[inside[at]]), int(toolpath.line[k[inside[at]]])
+    if worst <= PLACE_ROUNDING + float(np.linalg.norm(rounding)):
+        return []
+    return [f"exact path: {worst:.6g} mm off at t = {when:.6g} s, line {line}: G61 asks for the path itself"]
+
+
+def _distance(toolpath: Toolpath, q: FloatArray, segment: Array) -> FloatArray:
+    """(n,) distance of points q (n, A) from segments (n,)."""
+    found = np.full(len(q), np.inf)
+    lines, arcs = np.flatnonzero(toolpath.straight[segment]), np.flatnonzero(toolpath.arc[segment] >= 0)
+    start, length = toolpath.start[segment[lines]], toolpath.length[segment[lines]]
+    along = (toolpath.end[segment[lines]] - start) / length[:, None]
+    x = np.clip(np.einsum("na,na->n", q[lines] - start, along), 0.0, length)
+    found[lines] = np.linalg.norm(q[lines] - start - x[:, None] * along, axis=1)
+    for row in np.unique(segment[arcs]):
+        of_row = arcs[segment[arcs] == row]
+        found[of_row] = _from_arc(toolpath, q[of_row], int(row))
+    curves = np.flatnonzero(toolpath.curve[segment] >= 0)
+    if len(curves):
+        found[curves] = _from_curves(toolpath, q[curves], toolpath.curve[segment[curves]])
+    return found
+
+
+def _from_curves(toolpath: Toolpath, q: FloatArray, row: Array) -> FloatArray:
+    """(n,) distance of points q (n, A) from curves, by their rows (n,)."""
+    points, weights = toolpath.curves.points[row], toolpath.curves.weight[row]
+    best, u = np.full(len(q), np.inf), np.zeros(len(q))
+    for place in np.linspace(0.0, 1.0, STARTS):
+        apart = np.linalg.norm(curve_points(points, weights, np.full(len(q), place))[0] - q, axis=1)
+        u, best = np.where(apart < best, place, u), np.minimum(best, apart)
+    for _ in range(CURVE_STEPS):
+        point, rate = curve_points(points, weights, u)
+        step = np.einsum("na,na->n", point - q, rate) / np.einsum("na,na->n", rate, rate)
+        u = np.clip(u - step, 0.0, 1.0)
+    return np.linalg.norm(curve_points(points, weights, u)[0] - q, axis=1)
+
+
+def _from_arc(toolpath: Toolpath, q: FloatArray, segment: int) -> FloatArray:
+    """(n,) distance of points q (n, A) from an arc or helix."""
+    k, length = int(toolpath.arc[segment]), float(toolpath.length[segment])
+    centre, e1, e2 = toolpath.arcs.center[k], toolpath.arcs.e1[k], toolpath.arcs.e2[k]
+    drift, radius, rate = toolpath.arcs.drift[k], float(toolpath.arcs.radius[k]), float(toolpath.arcs.rate[k])
+    out = q - centre
+    turn = 2.0 * np.pi / abs(rate)
+    first = np.mod(np.arctan2(out @ e2, out @ e1) / rate, turn)
+    nearest = np.full(len(q), np.inf)
+    for n in range(-1, int(length / turn) + 2):
+        x = np.clip(first + n * turn, 0.0, length)
+        for step in range(NEWTON + 1):
+            cos, sin = np.cos(rate * x)[:, None], np.sin(rate * x)[:, None]
+            gap = radius * (cos * e1 + sin * e2) + drift * x[:, None] - out
+            if step == NEWTON:
+                break
+            slope = radius * rate * (cos * e2 - sin * e1) + drift
+            bend = -radius * rate**2 * (cos * e1 + sin * e2)
+            rise = np.einsum("na,na->n", slope, slope) + np.einsum("na,na->n", gap, bend)
+            x = np.clip(x - np.einsum("na,na->n", gap, slope) / rise, 0.0, length)
+        nearest = np.fmin(nearest, np.linalg.norm(gap, axis=1))
+    return nearest

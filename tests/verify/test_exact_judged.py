@@ -1,0 +1,74 @@
+"""Blocks under G61 are judged by their distance from the path itself; the same motion under G64 by the tolerance."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planner
+from planner.base.arrays import FloatArray
+from planner.geometry.build import toolpath_from_program
+from planner.job.plan import Plan
+from planner.motion.trajectory import Trajectory
+from planner.verify import verify
+
+TEXT = (
+    "G21 G17 {mode} F3000\nG1 X10 Y5\nG2 X10 Y5 Z6 I5 J0 P3\nG18 G3 X20 Z6 I5 K0\nG17 G3 X30 Y15.0002 I0 J10\nG1 Y30 Z0\n"
+    "G5 X40 Y40 I0 J5 P-5 Q0\n"
+)
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    machine = planner.load_machine("mill")
+    program = planner.read_program(text=TEXT.format(mode="G61.1"), machine=machine)
+    made = planner.plan(program, machine, method="stop")
+    assert made.verdict is not None
+    assert made.verdict.passed, made.verdict.faults
+    return made
+
+
+def moved(plan: Plan, by: FloatArray, block: int) -> list[str]:
+    """The faults of the motion with the samples in the middle of a block moved."""
+    assert plan.trajectory is not None
+    motion = plan.trajectory
+    inside = np.flatnonzero(motion.block == block)
+    bump = np.zeros(len(motion))
+    bump[inside] = np.sin(np.linspace(0.0, np.pi, len(inside))) ** 4
+    return faults(plan, dataclasses.replace(motion, position=motion.position + bump[:, None] * by), "G61.1")
+
+
+def faults(plan: Plan, motion: Trajectory, mode: str) -> list[str]:
+    program = planner.read_program(text=TEXT.format(mode=mode), machine=plan.machine)
+    path = toolpath_from_program(program, plan.machine)
+    found = verify(motion, path, plan.machine, not_limited=("acceleration", "jerk", "velocity"))
+    return [fault for fault in found.faults if "exact path" in fault]
+
+
+@pytest.mark.parametrize("block", range(6))
+def test_samples_beside_the_path_are_found_on_every_kind_of_block(plan: Plan, block: int) -> None:
+    aside = np.array(
+        [
+            [0.5, -1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [0.6, -0.8, 0.0],
+        ]
+    )
+    assert moved(plan, 0.0 * aside[block], block) == []
+    found = moved(plan, 5e-5 * aside[block], block)
+    assert len(found) == 1
+    assert f"line {block + 2}:" in found[0]
+
+
+def test_under_g64_the_tolerance_counts(plan: Plan) -> None:
+    assert plan.trajectory is not None
+    shifted = plan.trajectory.position.copy()
+    shifted[:, 2] += 5e-5 * np.sin(np.linspace(0.0, np.pi, len(shifted))) ** 4
+    motion = dataclasses.replace(plan.trajectory, position=shifted)
+    assert faults(plan, motion, "G61.1") != []
+    assert faults(plan, motion, "G64") == []

@@ -33,6 +33,7 @@ from planner.tube.nlp import TubeNLP
 from planner.tube.outcome import TubeSolution
 from planner.tube.own import TubeOwn
 from planner.tube.run import TubeRun, tube_runs_of
+from planner.tube.solvers import TubeSolver
 
 NAME = "tube-solvers"
 STEPS = 120  # of a job at most: ipopt takes 10 to 40 ms per step in all
@@ -95,9 +96,11 @@ def compared(run: TubeRun, guess: Guess, fatrop: bool) -> dict[str, Any]:
     }
     row |= _of("default", TubeOwn().solve(run, guess), 0.0)
     found = {}
-    for name in ("own", "ipopt", "fatrop") if fatrop else ("own", "ipopt"):
+    solvers: dict[str, TubeSolver] = {"own": PRECISE, "ipopt": TubeNLP(), "fatrop": TubeNLP(solver="fatrop")}
+    for name, solver in solvers.items():
+        if name == "fatrop" and not fatrop:
+            continue
         began = time.process_time()
-        solver = PRECISE if name == "own" else TubeNLP(solver=name)
         solution = solver.solve(run, guess)
         found[name] = solution
         row |= _of(name, solution, time.process_time() - began)

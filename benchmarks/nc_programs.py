@@ -1,11 +1,12 @@
 """Plan and verify every program of a folder: does each end with a verdict or a reason, and what does it take?
 
     python -m benchmarks.nc_programs FOLDER -m MACHINE.toml [--method NAME] [--corner NAME ...] [--processes N]
-                                     [--name RESULT] [--resume]
+                                     [--quick-above BLOCKS] [--limit SECONDS] [--extruder ignore] [--name RESULT] [--resume]
 
 Every file is planned in a process of its own, so that peak memory is the file's and nothing can take the others down; with several
-corners once with each, and what the first of them gains over the others is in the table. `--resume` keeps what the result holds
-already; every row names the commit it was made with.
+corners once with each, and what the first of them gains over the others is in the table. Programs of more than `--quick-above`
+blocks are planned with `--effort quick`; one that takes longer than `--limit` is ended, which is its outcome. `--resume` keeps what
+the result holds already, but for what was ended or crashed; every row names the commit it was made with.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import resource
 import statistics
 import threading
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -24,6 +26,7 @@ from typing import Any
 from benchmarks.record import RESULTS, markdown, provenance, write_results
 
 KEEP_OUT = (".csv", ".md", ".txt")
+AGAIN = ("crashed", "ended")  # outcomes that `--resume` plans once more
 
 
 def main() -> None:
@@ -36,6 +39,9 @@ def main() -> None:
     parser.add_argument("--name", default="jerk-nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
     parser.add_argument("--processes", type=int, default=1, help="programs planned at the same time")
+    parser.add_argument("--quick-above", type=int, default=0, help="blocks; 0: never")
+    parser.add_argument("--limit", type=float, default=None, help="seconds for each program")
+    parser.add_argument("--extruder", default="refuse", choices=("refuse", "ignore"))
     parser.add_argument("--resume", action="store_true", help="keep the rows of an earlier run")
     options = parser.parse_args()
     files = [file for file in options.folder.iterdir() if file.suffix not in KEEP_OUT]
@@ -44,6 +50,7 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     if options.resume:
         rows = json.loads((RESULTS / f"{options.name}.json").read_text(encoding="utf-8"))["programs"]
+        rows = [row for row in rows if row["outcome"] not in AGAIN]
     done = {(row["program"], row["corner"]) for row in rows}
     refused = {row["program"] for row in rows if row["outcome"] == "refused"}
     place = {file.name: number for number, file in enumerate(files)}
@@ -53,7 +60,7 @@ def main() -> None:
         for corner in options.corner:
             if (file.name, corner) in done or file.name in refused:
                 continue
-            row = _in_own_process(file, options.machine, options.method, corner)
+            row = _in_own_process(file, options, corner)
             with writing:
                 rows.append(row)
                 rows.sort(key=lambda own: place.get(own["program"], len(place)))
@@ -68,16 +75,21 @@ def main() -> None:
             finished.result()
 
 
-def _in_own_process(file: Path, machine: str, method: str, corner: str) -> dict[str, Any]:
-    """One file with one corner."""
+def _in_own_process(file: Path, options: argparse.Namespace, corner: str) -> dict[str, Any]:
+    """One file with one corner, ended after the time limit."""
     began = time.perf_counter()
     context = multiprocessing.get_context("spawn")
     receive, send = context.Pipe(duplex=False)
-    process = context.Process(target=_run, args=(send, str(file), machine, method, corner))
+    process = context.Process(target=_run, args=(send, str(file), options, corner))
     process.start()
     send.close()
+    row: dict[str, Any]
     try:
-        row: dict[str, Any] = receive.recv()
+        if receive.poll(options.limit):
+            row = receive.recv()
+        else:
+            process.kill()
+            row = {"outcome": "ended", "message": f"after the limit of {options.limit:g} s"}
     except EOFError:
         row = {"outcome": "crashed", "message": f"the process ended with {process.exitcode}"}
     process.join()
@@ -85,12 +97,18 @@ def _in_own_process(file: Path, machine: str, method: str, corner: str) -> dict[
     return row | {"program": file.name, "corner": corner, "wall_s": wall, "commit": provenance()["commit"]}
 
 
-def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
+def _run(pipe: Any, file: str, options: argparse.Namespace, corner: str) -> None:
     """Plan one file; everything that can go wrong is an outcome."""
     import planner
 
+    began = time.process_time()
     try:
-        plan = planner.plan(file, machine, method=method, corner=corner)
+        program = planner.read_program(
+            file, planner.load_machine(options.machine), planner.Reading(extruder=options.extruder)
+        )
+        read_s = time.process_time() - began
+        effort = "quick" if 0 < options.quick_above < len(program) else None
+        plan = planner.plan(program, options.machine, method=options.method, corner=corner, effort=effort)
     except planner.InputError as fault:
         pipe.send({"outcome": "refused", "message": str(fault).replace(file, Path(file).name)})
         return
@@ -102,6 +120,10 @@ def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
         "message": plan.sentence,
         "sentence": plan.sentence,
         "blocks": len(plan.program),
+        "dialect": _dialect(program),
+        "effort": effort or "",
+        "notes": list(plan.notes),
+        "read_s": round(read_s, 3),
         "grid_points": plan.grid_points,
         "stop_s": plan.stop_time,
         "timings_s": {name: round(seconds, 3) for name, seconds in plan.timings.items()},
@@ -124,10 +146,18 @@ def _run(pipe: Any, file: str, machine: str, method: str, corner: str) -> None:
     pipe.send(row)
 
 
+def _dialect(program: Any) -> str:
+    """Whose language a program is in, as the reader took it."""
+    if program.pen:
+        return "HPGL"
+    return "RS274NGC" if program.expansion is None else program.expansion.dialect
+
+
 def _table(rows: list[dict[str, Any]], corners: list[str]) -> str:
     """One line for each program: all about the first corner, and the cycle times with the others over its own."""
     columns = [
-        "program", "blocks", "grid points", f"cycle, {corners[0]} [s]", *(f"{other} / {corners[0]}" for other in corners[1:]),
+        "program", "dialect", "effort", "notes", "blocks", "blocks/s", "grid points",
+        f"cycle, {corners[0]} [s]", *(f"{other} / {corners[0]}" for other in corners[1:]),
         "stops [s]", "worst limit", "contour, vertex [um]", "corner/eq. 19-20", "read, geometry, solve, sample, verify [s]",
         "CPU of all [s]", "peak [GB]", "outcome",
     ]  # fmt: skip
@@ -154,7 +184,11 @@ def _table(rows: list[dict[str, Any]], corners: list[str]) -> str:
         lines.append(
             [
                 row["program"],
+                row.get("dialect", ""),
+                row.get("effort", ""),
+                str(len(row["notes"])) if "notes" in row else "",
                 f"{row['blocks']:,}",
+                f"{row['blocks'] / row['cpu_s']:,.0f}" if row["cpu_s"] else "",
                 f"{row['grid_points']:,}",
                 f"{row['cycle_s']:.3f}",
                 *ratios,
@@ -183,6 +217,8 @@ def _table(rows: list[dict[str, Any]], corners: list[str]) -> str:
         for row in rows
         if row["corner"] != corners[0] and row["outcome"] != "passed"
     ]
+    counts = Counter(row["outcome"] for row in rows if row["corner"] == corners[0])
+    text += "\n" + ", ".join(f"{count} {outcome}" for outcome, count in counts.most_common()) + "\n"
     return text + "".join(f"\n* {line}" for line in failed)
 
 

@@ -37,7 +37,7 @@ def main() -> None:
             count = min(AT_ONCE, options.count - part * AT_ONCE)
             with tempfile.TemporaryDirectory() as folder:
                 tally = agreement.compare(kind, count, options.seed + 1000 * part, Path(folder))
-            for name in ("read", "refused", "gouges", "blocks", "wrong"):
+            for name in ("read", "refused", "gouges", "early", "blocks", "wrong"):
                 setattr(total, name, getattr(total, name) + getattr(tally, name))
         print(*total.wrong, sep="\n", file=sys.stderr)
         rows.append(
@@ -47,6 +47,7 @@ def main() -> None:
                 "blocks compared": total.blocks,
                 "refused by both": total.refused,
                 "refused here alone, as gouging": total.gouges,
+                "refused by LinuxCNC alone, an arc that begins early": total.early,
                 "disagree": len(total.wrong),
             }
         )

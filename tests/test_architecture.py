@@ -39,6 +39,7 @@ LAYERS = (
     "planner.machine_import",
     "planner.constraints",
     "planner.nc",
+    "planner.kinematics.tip_path",
     "planner.geometry",
     "planner.corners",
     "planner.smoothing",

@@ -19,6 +19,7 @@ from planner.job.records import NO_TABLES, Tables
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import passing_times, standstills
+from planner.optimal.effort import THOROUGH, Search
 from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
 from planner.tube.guess import Guess, guess_from
@@ -30,6 +31,8 @@ from planner.tube.splice import Spliced, SplicedRun
 
 # The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
 START_PERIOD, START_SAMPLES = 0.02, 200_000
+# Times nearer to each other than this share of a leg's mean time are one [-].
+LEAST_APART = 1e-6
 # Share of the time without prices from which that is said, and from which those of the start say more [-].
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
 
@@ -57,26 +60,26 @@ def searchable(job: Job) -> bool:
     )
 
 
-def freed(job: Job, plan: Plan, steps_max: float = np.inf) -> Freed:
+def freed(job: Job, plan: Plan, dial: Search = THOROUGH) -> Freed:
     """The plan with a faster motion near its own where one is found (tube/own.py), else the plan.
 
-    job       : a searchable one
-    steps_max : a motion that has more steps of constant jerk is left as it is
+    job  : a searchable one
+    dial : how finely, and up to which size: a motion that has more steps of constant jerk is left as it is
 
-    What holds the motion, and what limits cost, is told from the search (`told`).
+    What holds the motion, and what limits cost, is told from the search (`tabled`).
     """
     if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
         return Freed(plan, 1.0)
     with job.stage("search") as report:
         runs = list(tube_runs_of(job.toolpath, job.machine))
-        start = Start(plan, job.motion_of[plan.trajectory], job)
+        start = Start(job.motion_of[plan.trajectory], job, dial, plan)
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
-        if steps > steps_max:
-            job.tell("search", steps=steps, of=steps_max)
+        if steps > dial.steps_max:
+            job.tell("search", steps=steps, of=dial.steps_max)
             return Freed(plan, 1.0)
         found, done = [], 0
         for k, run in enumerate(runs):
-            found.append(search(k, run, [start], TubeOwn()))
+            found.append(search(k, run, [start], TubeOwn(dial.gap)))
             done += len(start.guess(k, run))
             report(done / steps)
     made, kept, why = delivered(job, start, found)
@@ -85,7 +88,7 @@ def freed(job: Job, plan: Plan, steps_max: float = np.inf) -> Freed:
     job.tell("search", found=made[0].cycle_time, before=plan.trajectory.cycle_time, kept=better, steps=steps)
     if not better:
         return Freed(plan, share)
-    tables = told(job, plan, made[0], found, kept)
+    tables = tabled(job, plan, made[0], found, kept)
     faster = dataclasses.replace(
         plan,
         trajectory=made[0],
@@ -115,14 +118,18 @@ def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
 
 
 class Start:
-    """A motion from which the search begins, and where in it the runs are."""
+    """A motion from which the search begins, and where in it the runs are.
 
-    def __init__(self, plan: Plan, motion: MotionInTime, job: Job):
+    dial : how finely it is cut into steps
+    plan : of the motion; None for one that is searched from and not delivered
+    """
+
+    def __init__(self, motion: MotionInTime, job: Job, dial: Search = THOROUGH, plan: Plan | None = None):
         acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
         period = max(START_PERIOD * float((acceleration / jerk).min()), motion.end / START_SAMPLES)
         even = np.arange(0.0, motion.end, period)
         edges = np.append(motion.t, motion.end)
-        self.plan, self.motion = plan, motion
+        self.plan, self.motion, self.dial = plan, motion, dial
         self.seen = joined(list(in_chunks(motion, period, np.concatenate([even, edges]))))
         self.times = passing_times(self.seen, job.toolpath)
         self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
@@ -150,7 +157,7 @@ class Start:
 
     def _guess(self, k: int, run: TubeRun) -> Guess:
         """The same, made."""
-        guess = guess_from(run, *self.window(k, run))
+        guess = guess_from(run, *self.window(k, run), (self.dial.per_unit, self.dial.of_leg))
         inner = self.departure[k] + np.cumsum(guess.h[:-1])
         seen = self.motion.at(inner, 1.0)
         state = guess.state.copy()
@@ -168,8 +175,10 @@ class Start:
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
         # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
-        seen = np.append(np.diff(t) > 0, True)
-        seen[1:-1] &= t[1:-1] < end
+        apart = LEAST_APART * (end - begin) / len(run)
+        seen = np.append(True, np.diff(t) > apart)
+        seen[1:] &= t[1:] < end - apart
+        seen[-1] = True
         return along, np.interp(run.offset, run.offset[seen], t[seen])
 
 
@@ -189,7 +198,7 @@ class Starts:
             if plan.trajectory is None:
                 self.failed.append(plan)
                 continue
-            self.made.append(Start(plan, own_clock.motion_of[plan.trajectory], self._job))
+            self.made.append(Start(own_clock.motion_of[plan.trajectory], self._job, plan=plan))
             yield self.made[-1]
 
 
@@ -224,6 +233,7 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) ->
 def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered, list[int], str]:
     """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
     motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
+    assert first.plan is not None
     start = first.plan.trajectory, first.plan.verdict
     assert start[0] is not None
     assert start[1] is not None
@@ -247,7 +257,9 @@ def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered,
     return (start[0], start[1]), kept, why
 
 
-def told(job: Job, start: Plan, trajectory: Trajectory, found: list[FoundRun], kept: list[int]) -> Tables:
+def tabled(
+    job: Job, start: Plan | None, trajectory: Trajectory, found: list[FoundRun], kept: list[int]
+) -> Tables:
     """What holds the motion that was delivered, and what limits and tolerance cost (sensitivity/found_*.py), of the search where it
     tells: not on the runs in `kept`, of which a note speaks, and not behind filters."""
     if job.real[0].fir is not None:
@@ -255,11 +267,13 @@ def told(job: Job, start: Plan, trajectory: Trajectory, found: list[FoundRun], k
     with job.stage("report"):
         taken = [one for k, one in enumerate(found) if k not in kept]
         prices = found_prices(job.toolpath, job.machine, taken, trajectory.cycle_time)
-        grid = found_history(job.toolpath, job.motion_of[trajectory], found, kept, start.grid)
+        grid = found_history(
+            job.toolpath, job.motion_of[trajectory], found, kept, start.grid if start else None
+        )
     moving = trajectory.cycle_time - float(job.toolpath.dwell.sum())
     unpriced = 1.0 - sum(one.priced_time() for one in taken) / moving
     if prices is None or unpriced > UNPRICED_MOST:
-        prices = start.prices
+        prices = start.prices if start else None
         if prices is not None:
             job.note("what limits cost is told of the motion before geometry and feed were found together")
     elif unpriced > UNPRICED:
@@ -284,9 +298,7 @@ def said(
     took = [one for k, one in enumerate(found) if k not in kept]
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
     text = worst.sentence if worst else "no motion faster than the start's was found"
-    start = first.plan
-    assert start.trajectory is not None
-    text += f"; its start ({what}) took {start.trajectory.cycle_time:.6g} s"
+    text += f"; its start ({what}) took {first.motion.end:.6g} s"
     if kept:
         run = found[kept[0]].run
         why = why or found[kept[0]].sentence

@@ -4,8 +4,9 @@ feed together, without a path parameter (free.py).
 Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
 
 The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no round
-has reshaped. Where it leaves some of the motion as it was, or there are too many steps for it, the splines are reshaped and it begins
-there once more; the faster plan is taken. Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
+has reshaped, with a motion that need not be fit for delivery (at_once.py). Where it leaves some of that, it begins on the plan of the
+first splines; where it leaves much of that, or there are too many steps for it, the splines are reshaped and it begins there once more;
+the faster plan is taken. Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
 """
 
 from __future__ import annotations
@@ -81,16 +82,24 @@ class OptimalMethod(Method):
 
 def _freed_plan(job: Job, settings: Settings) -> Plan:
     """The plan after the search for geometry and feed together, as far as the effort goes and the search can."""
-    effort = settings.effort
-    if LEAST_STEPS * len(legs_of(job.toolpath).first) > effort.search:
+    dial = settings.effort.search
+    if LEAST_STEPS * len(legs_of(job.toolpath).first) > dial.steps_max:
         return fastest_plan(job, settings)
-    from planner.methods.free import freed, searchable  # other plans need not load what they use
+    from planner.methods.at_once import searched_at_once  # other plans need not load what they use
+    from planner.methods.free import freed, searchable
 
     if not searchable(job):
         return fastest_plan(job, settings)
+    if dial.at_once:
+        plan = searched_at_once(job.afresh(), settings)
+        if plan is not None:
+            return plan
+    if not dial.again:
+        return fastest_plan(job.afresh(), settings)
     on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
-    first = freed(job, fastest_plan(job, on_first), effort.search)
-    if first.kept <= effort.kept:
+    again = job.afresh()
+    first = freed(again, fastest_plan(again, on_first), dial)
+    if first.kept <= dial.kept:
         return first.plan
     again = job.afresh()
-    return faster(freed(again, fastest_plan(again, settings), effort.search).plan, first.plan)
+    return faster(freed(again, fastest_plan(again, settings), dial).plan, first.plan)

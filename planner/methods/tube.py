@@ -25,7 +25,7 @@ from planner.job.job import Delivered, Job
 from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.records import NO_TABLES, Tables
-from planner.methods.free import Starts, delivered, said, search, told
+from planner.methods.free import Starts, delivered, said, search, tabled
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
 from planner.tube.parts import FoundRun
@@ -61,11 +61,12 @@ class TubeMethod(Method):
         if first is None:
             failed = starts.failed[0]
             return self._plan(job, None, failed.status, f"no motion to start from: {failed.sentence}", 0)
+        assert first.plan is not None
         made, kept, why = delivered(job, first, found)
         corner = f" with corner {first.plan.corner}" if first.plan.corner else ""
         status, sentence = said(job, first, found, kept, why, f"{first.plan.method}{corner}")
         grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.plan.grid_points
-        tables = told(job, first.plan, made[0], found, kept)
+        tables = tabled(job, first.plan, made[0], found, kept)
         return self._plan(job, made, status, sentence, grid_points, tables)
 
     def _plan(

@@ -131,7 +131,8 @@ LETTERS_REFUSED: dict[str, Refusal] = {
     **dict.fromkeys("ABC", Refusal("a rotary axis that moves is", _POST)),
     **dict.fromkeys("UVW", Refusal("a second linear axis that moves is", _POST)),
     "E": Refusal(
-        "an extruder axis is", "give --extruder ignore to plan the motion of the other axes without it"
+        "an extruder axis is",
+        "give the machine a table [axes.e], or --extruder ignore to plan the other axes without it",
     ),
     "O": Refusal("a subprogram or O word is", "write its blocks out, or remove a mere program number"),
 }

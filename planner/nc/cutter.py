@@ -10,11 +10,14 @@ meet, the second turns by an angle away from the tool's side (outer corner), tow
     straight on     the second begins where the first ends
 
 An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to `STRAIGHT_ON`, is an outer corner
-between lines, and an inner one beside an arc.
+between lines and before an arc with the tool inside, and an inner one otherwise. Straight on, an arc begins up to `STRAIGHT_ON` r / R
+before its programmed start, R the offset radius.
 
 The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one that ends there with the
 programmed tangent). The move after G40 leads straight from there to the programmed end. Moves along the normal alone keep the place in
-the plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does.
+the plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does,
+but that it refuses an arc that begins early by more than 0.0254 in mm programs, or 0.001 in inch programs, where a corner follows
+(move_endpoint_and_flush in interp_queue.cc compares the angle with a length); here it is cut.
 
 Lengths are machine coordinates in mm. Points and vectors in the plane are complex numbers: n(t) = i t.
 """
@@ -139,7 +142,8 @@ class Cutter:
             side, sweep = self._entry_arc(side, start, sweep)
         else:
             inner = self._corner(start, side, Kind.ARC, line)
-            sweep -= self._left_out(side, allowed_back=STRAIGHT_ON if not inner else _ROUNDING)
+            early = STRAIGHT_ON * max(1.0, self._radius / side.radius)
+            sweep -= self._left_out(side, allowed_back=early if not inner else _ROUNDING)
         if sweep * turning <= 0:
             raise CutterFault(_GOUGE)
         self._add(side, target, Kind.ARC, line, sweep)
@@ -158,7 +162,8 @@ class Cutter:
         before = self._open.side
         turn = cmath.phase(side.first / before.last) * self._sign  # towards the tool's side
         back = math.pi - abs(turn) < STRAIGHT_ON
-        outer = not (side.turning or before.turning) if back else turn < -STRAIGHT_ON
+        around = side.turning == self._sign if side.turning else not before.turning
+        outer = around if back else turn < -STRAIGHT_ON
         inner = not outer and (back or turn > STRAIGHT_ON)
         if inner:
             self._inner_corner(side)

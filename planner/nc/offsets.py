@@ -7,6 +7,9 @@ With q the position in a work system before G92 is taken off (state.py), a coord
 and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for the G92 offset, G10 L20 for
 the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10 takes coordinates as absolute, whatever G90 and G91
 say; a tool's new offset is in force from its next G43 on.
+
+Fanuc and Haas have it otherwise: G10 L20 P gives the origin of G54.1 P, as G10 L2 does that of G54 to G59. After G91 both would add,
+which is refused: the flat program (language/flat.py) could not say it.
 """
 
 from __future__ import annotations
@@ -109,6 +112,9 @@ def set_data(state: State, block: Block, note: Note) -> None:
 
 
 def _set_system(state: State, block: Block, kind: int) -> None:
+    if state.fanuc:
+        _set_fanuc_system(state, block, kind)
+        return
     number = integer(block, "P", 0) if "P" in block.value else -1
     if not 0 <= number <= len(_SYSTEMS):
         word = block.at["P"] if number >= 0 else block.at["one-shot"]
@@ -124,6 +130,23 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
         system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
+
+
+def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
+    """G10 L2 P1 to P6, and G10 L20 P1 to P300 for G54.1."""
+    number, most = integer(block, "P", 0) if "P" in block.value else -1, FURTHER_MAX if kind == 20 else 6
+    if not 1 <= number <= most:
+        word = block.at["P"] if number >= 0 else block.at["one-shot"]
+        external = "; P0, the external offset, is not read" if number == 0 else ""
+        raise WordFault(word, f"G10 L{kind} of Fanuc needs its work system as P1 to P{most}{external}")
+    for letter in "IJQR":
+        if letter in block.value:
+            raise WordFault(block.at[letter], f"G10 L{kind} does not use {letter}; remove it")
+    if not state.absolute:
+        raise WordFault(block.at["one-shot"], f"G10 L{kind} of Fanuc adds after G91; write G90 before it")
+    code = FURTHER_SYSTEMS + number if kind == 20 else _SYSTEMS[number - 1]
+    system = state.work_system(code)
+    state.systems[code] = replace(system, origin=_given(state, block, system.origin))
 
 
 def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:

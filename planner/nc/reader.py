@@ -18,12 +18,12 @@ from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.detect import LATHE_NOTE, dialect_of, is_turned
+from planner.nc.language.detect import LATHE_NOTE, dialect_of, has_further_systems, is_turned
 from planner.nc.leader import without_leader
 from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.points import are_points, read_points
 from planner.nc.program import Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, HEIDENHAIN, LATHE, SIEMENS, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, LATHE, SIEMENS, Reading
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
 
@@ -139,6 +139,9 @@ def execute(
     if is_turned(words, dialect, reading, machine):
         dialect = LATHE
         interpreter.note(LATHE_NOTE, int(words.line[0]))
+    interpreter.state.fanuc = (
+        reading.dialect == FANUC or dialect in (FANUC, LATHE) or has_further_systems(words)
+    )
     integers = integers_of(machine, dialect)
     words = integers.applied(words)
     if dialect is not None:

@@ -108,6 +108,7 @@ class State:
     cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
     actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     strict       : nothing is assumed (`Reading.strict`)
+    fanuc        : G10 L2 and L20 are those of Fanuc and Haas
     in_thread    : the last block was cut in step with the spindle
     """
 
@@ -142,6 +143,7 @@ class State:
     actual: FloatArray | None = None
     in_thread: bool = False
     strict: bool = False
+    fanuc: bool = False
 
     @property
     def place(self) -> FloatArray:

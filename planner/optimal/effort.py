@@ -26,6 +26,31 @@ class Grids(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Search:
+    """How a motion is searched for geometry and feed together (methods/free.py).
+
+    steps_max : of constant jerk that it may have
+    kept      : share of the time that this may leave as it was; where it leaves more it begins on reshaped splines too [-]
+    per_unit  : steps in a unit of time where the jerk is at its limit (tube/guess.py) [-]
+    of_leg    : steps of a leg at least [-]
+    gap       : complementarity at the end, share of the time [-]
+    at_once   : begin with a motion on the first splines that is not fit for delivery (methods/at_once.py)
+    again     : begin with a plan where that leaves something
+    """
+
+    steps_max: float
+    kept: float = 0.05
+    per_unit: float = 4.0
+    of_leg: float = 2.0
+    gap: float = 1e-5
+    at_once: bool = True
+    again: bool = True
+
+
+THOROUGH = Search(steps_max=float("inf"), kept=-1.0, at_once=False)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Effort:
     """What a plan is worth.
 
@@ -33,16 +58,14 @@ class Effort:
     rounds : of reshaping at most
     left   : no more of them where one promises less than this share of the time [-]
     sizes  : grids by the size of the job, ascending
-    search : steps of constant jerk that a motion may have to be searched for geometry and feed together (methods/free.py)
-    kept   : share of the time that this may leave as it was; where it leaves more it begins on reshaped splines too [-]
+    search : for geometry and feed together
     """
 
     work: int
     rounds: int
     left: float
     sizes: tuple[Grids, ...]
-    search: float = 0.0
-    kept: float = 0.0
+    search: Search
 
     def grids(self, points: int) -> Grids:
         """The grids for a job that has so many points on a grid of the resolution `COARSE`."""
@@ -55,21 +78,25 @@ class Effort:
 # coarse grid leave small jobs 1e-3 slower.
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
-    QUICK: Effort(work=25_000, rounds=2, left=1e-3, sizes=(_LARGE,)),
+    QUICK: Effort(
+        work=25_000,
+        rounds=2,
+        left=1e-3,
+        search=Search(steps_max=30_000, per_unit=2.0, of_leg=1.0, gap=1e-3, again=False),
+        sizes=(_LARGE,),
+    ),
     NORMAL: Effort(
         work=150_000,
         rounds=40,
         left=1e-5,
-        search=60_000,
-        kept=0.05,
+        search=Search(steps_max=60_000),
         sizes=(Grids(1_500, 2e-3, 2e-4), Grids(4_000, 8e-3, 5e-4), Grids(40_000, COARSE, 2e-3), _LARGE),
     ),
     BEST: Effort(
         work=5_000_000,
         rounds=100,
         left=1e-6,
-        search=float("inf"),
-        kept=-1.0,
+        search=THOROUGH,
         sizes=(Grids(4_000, 2e-3, 2e-4), Grids(40_000, 8e-3, 5e-4), Grids(400_000, COARSE, 2e-3), _LARGE),
     ),
 }

@@ -46,7 +46,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.base.names import AUTO, NORMAL, SPLINE
+from planner.base.names import AUTO, NORMAL, QUICK, SPLINE
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.job.job import Delivered, Job
@@ -58,7 +58,7 @@ from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
 from planner.optimal.effort import COARSE, EFFORTS, Effort, Grids
-from planner.optimal.geometry import corner_shape, splined_with_stops
+from planner.optimal.geometry import corner_shape, lost_joints, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order
@@ -66,7 +66,7 @@ from planner.optimal.reshape import chosen, reshape, run_times
 from planner.optimal.result import plan_of_solution, prices_of
 from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.path.samples import PathSamples, sample_path
-from planner.smoothing.spline_path import SplineShape, with_spline
+from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
 
 # A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
 # than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
@@ -155,9 +155,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     order, machine = settings.order, job.machine
 
     # Geometry: corners rounded each by itself, or splines in their place; a full stop where a run gets none.
-    with job.stage("geometry"):
-        shape = corner_shape(settings.corner, machine, job.toolpath, settings.bezier)
-        given = round_corners(job.toolpath, machine, shape, blend_tangents=order.jerk_limited)
+    given = _rounded(job, settings)
     if settings.corner not in (AUTO, SPLINE):
         return order.solve(given, job, grids_for(given, job, settings)[0].final)
     with job.stage("geometry"):
@@ -197,6 +195,27 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
                 return without
 
     return dataclasses.replace(best, notes=notes)
+
+
+def first_motion(job: Job, settings: Settings) -> OnPath | None:
+    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points only: enough to search
+    from (methods/at_once.py). None where a run gets no spline, where their spans are more than the steps that are searched, and where
+    there is no solution."""
+    rounded = _rounded(job, settings)
+    with job.stage("geometry"):
+        shape = spline_shape(rounded, job.machine)
+        whole = shape.splines.fits.all() and not len(lost_joints(rounded, shape, fence=False))
+    if not whole or shape.splines.span_first[-1] > settings.effort.search.steps_max:
+        return None
+    planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
+    return planned if planned.solution.solved else None
+
+
+def _rounded(job: Job, settings: Settings) -> SmoothPath:
+    """The path with every corner rounded by itself."""
+    with job.stage("geometry"):
+        shape = corner_shape(settings.corner, job.machine, job.toolpath, settings.bezier)
+        return round_corners(job.toolpath, job.machine, shape, blend_tangents=settings.order.jerk_limited)
 
 
 def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, resolution: float) -> OnPath:

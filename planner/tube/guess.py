@@ -27,7 +27,7 @@ from planner.tube.run import TubeRun
 STEPS_PER_UNIT = 4.0
 STEPS_OF_LEG = 2.0
 # Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
-LONGEST, MOST_FOR_LENGTH = 8.0, 30
+LONGEST, MOST_FOR_LENGTH = 4.0, 60
 # Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to move.
 ARC_STEP = 0.8
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
@@ -92,13 +92,19 @@ class Guess:
         return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
 
 
-def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> Guess:
+def guess_from(
+    run: TubeRun,
+    motion: Trajectory,
+    vertex_time: FloatArray,
+    fine: tuple[float, float] = (STEPS_PER_UNIT, STEPS_OF_LEG),
+) -> Guess:
     """Cut a motion along a run of R legs into steps.
 
     motion      : along this run alone, at rest at both ends
     vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
+    fine        : steps in a unit where the jerk is at its limit, and of a leg at least (module text) [-]
     """
-    leg, nodes = _steps(run, motion, vertex_time)
+    leg, nodes = _steps(run, motion, vertex_time, fine)
     of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
     state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
     state[[0, -1], 1:] = 0.0
@@ -108,13 +114,15 @@ def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> Gue
     return Guess(leg=leg, h=h, state=state, place=place)
 
 
-def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray) -> tuple[Array, FloatArray]:
+def _steps(
+    run: TubeRun, motion: Trajectory, vertex_time: FloatArray, fine: tuple[float, float]
+) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
     unit = float(min((run.acceleration / run.jerk).min(), np.cbrt(run.budget.min() / run.jerk.max())))
     busy = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
     lasting = np.diff(motion.t)
-    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * STEPS_PER_UNIT / unit
-    least = STEPS_OF_LEG + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
+    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * fine[0] / unit
+    least = fine[1] + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
     least = np.maximum(least, run.length / (ARC_STEP * run.step_max))
     steps, times = np.empty(len(run), np.int64), []
     for r, (begin, end) in enumerate(pairwise(vertex_time)):

@@ -28,12 +28,13 @@ from planner.tube.rows import VECTORS, Linear, put_rows, slopes
 LEAST_SLACK = 0.05  # of a start [-]
 FIRST_GAP = 0.3  # complementarity of the start, share of the time [-]
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
-# Growth of prox per iteration once it grows, and its largest value [-]; a growth of 3 leaves one window of five without an end.
-FREEZE, FROZEN = 1.5, 1e4
-# The time has settled when it changes by no more than `Tuning.still` in so many iterations in a row, and at last after so many at the
-# complementarity asked for. Of 29 runs of random jobs, frozen as soon as that was reached, one ended 4.4e-4 slower, and all 6e-5 on the
-# mean; half as many of the second end 1e-5 slower.
-STILL_FOR, CLOSE_FOR = 2, 40
+# Growth of prox per iteration once it grows, and its largest value [-]: with 1.5 searches of 80 random jobs take 1.2 times as many
+# iterations and end at the same times within 2e-5 on the mean.
+FREEZE, FROZEN = 2.5, 1e4
+# The time has settled when it changes by no more than this share of the complementarity asked for in so many iterations in a row, and
+# at last after so many at that complementarity. Of 29 runs of random jobs, frozen as soon as that was reached (with a growth of 1.5),
+# one ended 4.4e-4 slower, and all 6e-5 on the mean; half as many of the second end 1e-5 slower.
+STILL, STILL_FOR, CLOSE_FOR = 0.1, 2, 40
 MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning.least` lets it [-]
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two starts of the bracket all
 # of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
@@ -55,7 +56,6 @@ class Tuning(NamedTuple):
     # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off: limits are narrowed by more
     # than that (problem.py). Slacks of the others follow no more closely than the tangents that are kept.
     missed: float
-    still: float  # change of the time in an iteration, share of it, from which it is taken to be settled
     least: float  # to which prox falls while the time settles
 
 
@@ -159,7 +159,7 @@ def solve_window(legs, limits, x, u, place, tuning):
                     ratio[i, r] = z[i, r] / s[i, r]
         now = u[:, axes].sum()
         close = close + 1 if products <= 2.0 * tuning.gap * time else 0
-        still = still + 1 if close and abs(now - before) <= tuning.still * time else 0
+        still = still + 1 if close and abs(now - before) <= STILL * tuning.gap * time else 0
         settled, before = settled or still == STILL_FOR or close > CLOSE_FOR, now
         if close and not settled:
             prox = min(prox, max(prox * MELT, tuning.least))

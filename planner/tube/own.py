@@ -53,15 +53,15 @@ FOUND = "the best motion near its start, geometry and feed together"
 class TubeOwn:
     """Settings of the search.
 
-    gap   : complementarity at its end, share of the time [-]
-    still : change of the time in an iteration that counts as none, share of the time [-]
-    least : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: of 31
-            runs those of random jobs 2.5e-5 faster on the mean in 1.2 times the iterations
+    gap    : complementarity at its end, share of the time [-]
+    least  : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: of 31
+             runs those of random jobs 2.5e-5 faster on the mean in 1.2 times the iterations
+    divide : divide windows that fail; what is found is of use in parts only then
     """
 
     gap: float = 1e-5
-    still: float = 1e-6
     least: float = 1.0
+    divide: bool = True
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -172,7 +172,7 @@ class _Search:
         Whether it did not fail; count[1] takes the iterations."""
         if self._improved(lo, hi, count, tries):
             return True
-        if hi - lo < 2 * LEAST:
+        if hi - lo < 2 * LEAST or not self.settings.divide:
             return False
         middle = (lo + hi) // 2
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
@@ -193,9 +193,7 @@ class _Search:
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(
-                    PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.still, self.settings.least
-                )
+                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning
                 )

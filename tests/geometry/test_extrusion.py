@@ -48,9 +48,13 @@ def test_alone_it_takes_the_shortest_time_from_rest_to_rest() -> None:
 
 
 def test_blocks_that_move_nothing_but_the_extruder_are_moves_alone() -> None:
-    path = laid_out("G1 X10 F60 E1\nG1 X10 E-1\nG1 X20 E1\n")
-    assert path.extrusion is not None
-    assert path.extrusion.amount == pytest.approx([-1.0])
+    path = laid_out("G1 X10 F60 E1\nG1 X10 E-2\nG1 X20 E1\nG4 P100\nG1 E3\nG1 X30 E1\n")
+    fed = path.extrusion
+    assert fed is not None
+    assert fed.amount == pytest.approx([-2.0, 3.0])
+    assert fed.arrive == pytest.approx([0.0, 1.0, 0.0, 4.0])
+    assert fed.leave == pytest.approx([0.0, -1.0, 3.0, 4.0])
+    assert fed.delay == pytest.approx([0.0, 0.1])  # each from the arrival at its own joint
     assert path.joint[1] == Joint.STOP
 
 

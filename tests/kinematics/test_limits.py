@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planner
+from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.job.plan import Plan
 from planner.kinematics import at_tip, kinematics_of
@@ -32,6 +33,11 @@ def rest_to_rest(machine: Machine, letter: str, angle: float) -> float:
 
 def planned(machine: Machine, points: np.ndarray, feed: float, method: str, tolerance: float = 0.01) -> Plan:
     return planner.plan(tip_program(machine, points, feed, tolerance), at_tip(machine), method=method)
+
+
+def test_a_factor_that_would_hold_the_tip_is_refused() -> None:
+    with pytest.raises(InputError, match="must be 1 or more"):
+        at_tip(table_machine(), wide=0.5)
 
 
 @pytest.mark.slow

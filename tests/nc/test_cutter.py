@@ -173,3 +173,26 @@ def test_a_program_that_just_ends_is_looked_at_too() -> None:
     """The last move is settled without M2 as well."""
     with pytest.raises(InputError, match="gouge"):
         parse_program(HEAD + "G41.1 D4\nG1 X20\nX30\nX29.5 Y1")
+
+
+def test_back_before_an_arc_with_the_tool_inside_goes_round_the_corner() -> None:
+    """And with the tool outside, both moves end where they meet: a line at y = -1 and a circle of radius 6 about (20, -5)."""
+    path = "G1 X10\nX20\nG3 X15 Y-5 I0 J-5\nG40\n"
+    inside = parse_program(HEAD + "G41.1 D2\n" + path)
+    assert inside.arc_sweep == pytest.approx([-np.pi, np.pi / 2])
+    assert inside.end[-2:, :2] == pytest.approx(np.array([[20.0, -1.0], [16.0, -5.0]]))
+    outside = parse_program(HEAD + "G42.1 D2\n" + path)
+    assert len(outside.arc_sweep) == 1
+    assert outside.end[-2, :2] == pytest.approx([20.0 - np.sqrt(36.0 - 16.0), -1.0])
+
+
+def test_straight_on_an_arc_begins_before_its_programmed_start() -> None:
+    """By about the turn times r / R: 0.04 rad away from the tool, r = 2, R = 3 - 2."""
+    turn, start = 0.04, 20.0 + 0.0j
+    centre = start - 3j * np.exp(1j * turn)
+    end = centre + (start - centre) * np.exp(-0.5j * np.pi)
+    arc = f"G2 X{end.real:.12f} Y{end.imag:.12f} I{(centre - start).real:.12f} J{(centre - start).imag:.12f}\nG40\n"
+    program = parse_program(HEAD + "G42.1 D4\nG1 X10\nX20\n" + arc)
+    assert program.end[-2, :2] == pytest.approx([20.0, -2.0])
+    early = np.arctan2(3 * np.sin(turn), 3 * np.cos(turn) - 2) - turn
+    assert -program.arc_sweep[0] == pytest.approx(np.pi / 2 + early, abs=1e-9)

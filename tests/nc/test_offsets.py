@@ -145,3 +145,20 @@ def test_further_work_systems_of_fanuc() -> None:
             parse_program(f"G21 G0 X1\n{wrong}\nM30")
     with pytest.raises(InputError, match=r"g54\.1p301"):
         machine_from_dict({**MACHINE.model_dump(), "work_offsets": {"g54.1p301": {"x": 1.0}}})
+
+
+def test_g10_of_fanuc_gives_the_offset_itself() -> None:
+    """G10 L20 P3 is the origin of G54.1 P3 there, and where LinuxCNC is spoken the offset with which the place has the coordinates."""
+    for kind, use in (("L20 P3", "G54.1 P3"), ("L2 P4", "G54.1 P1\nG57")):
+        assert last(f"G10 {kind} X10 Z-1\n{use} G0 X1 Z1") == [11, 2, 0]
+    assert last("G10 L20 P3 X0\nG56 G0 X0") == [1, 2, 3]
+    assert last("#1=3\nG10 L20 P#1 X9\nG54.1 P#1 G0 X0\nGOTO 5\nN5 M30") == [9, 2, 3]
+    for wrong, said in (
+        ("L2 P0", "external"),
+        ("L2 P7", "P1 to P6"),
+        ("L20 P301", "P1 to P300"),
+        ("L20 P1 R9", "R"),
+        ("L2 P1 G91", "adds after G91"),
+    ):
+        with pytest.raises(InputError, match=said):
+            last(f"G10 {wrong} X1\nG54.1 P1 G0 X1")

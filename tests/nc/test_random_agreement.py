@@ -1,7 +1,8 @@
 """Random programs of cycles, offsets, feed modes, lathes and cutter compensation: the reader and LinuxCNC's interpreter read the same.
 
-What one refuses the other refuses, but for one thing: the reader refuses every inner corner that takes more of a move than there is,
-LinuxCNC only some of them (at others its tool moves backwards, or once round an arc).
+What one refuses the other refuses, but for two things: the reader refuses every inner corner that takes more of a move than there is,
+LinuxCNC only some of them (at others its tool moves backwards, or once round an arc); and LinuxCNC refuses arcs that begin early where
+it goes straight on (planner/nc/cutter.py).
 """
 
 from __future__ import annotations
@@ -29,16 +30,19 @@ from planner.nc.reader import parse_program
 
 KINDS = {**OF_ONE_KIND, "moves": random_program, "splines": random_splines, "together": together}
 COUNT = 60  # of each kind; benchmarks/random_programs.py reads thousands
+EARLY = 0.02  # share of programs that only LinuxCNC refuses for an arc that begins early, at most: 1 of 650 was seen
 GOUGES = 0.04  # share of programs that only the reader refuses, at most: 23 of 1500 were seen
 
 
 @dataclass
 class Tally:
-    """What became of programs: read, refused by both, refused here alone as gouging, blocks compared, and disagreements."""
+    """What became of programs: read, refused by both, refused here alone as gouging, refused there alone for an arc that begins early,
+    blocks compared, and disagreements."""
 
     read: int = 0
     refused: int = 0
     gouges: int = 0
+    early: int = 0
     blocks: int = 0
     wrong: tuple[str, ...] = ()
 
@@ -53,6 +57,9 @@ class Tally:
                 self.gouges += 1
             else:
                 self.wrong += (f"{text}\nonly the reader refuses: {fault}",)
+            return
+        if "Arc move in concave corner" in canon.error:
+            self.early += 1
             return
         try:
             assert not canon.error, f"only LinuxCNC refuses: {canon.error}"
@@ -85,3 +92,4 @@ def test_random_programs_of_a_kind_agree(kind: str, tmp_path: Path) -> None:
     assert not tally.wrong, tally.wrong[0]
     assert tally.read > COUNT / 2
     assert tally.gouges <= GOUGES * COUNT
+    assert tally.early <= EARLY * COUNT

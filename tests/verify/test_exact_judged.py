@@ -15,7 +15,7 @@ from planner.motion.trajectory import Trajectory
 from planner.verify import verify
 
 TEXT = (
-    "G21 G17 {mode} F3000\nG1 X10 Y5\nG2 X10 Y5 Z6 I5 J0 P3\nG18 G3 X20 Z6 I5 K0\nG17 G3 X30 Y15.0002 I0 J10\nG1 Y30 Z0\n"
+    "G21 G17 {mode} F3000\nG1 X10 Y5\nG2 X10 Y5 Z6 I5 J0 P3\nG18 G3 X20 Z6 I5 K0\nG17 G3 X30.0002 Y15 I0 J10\nG1 Y30 Z0\n"
     "G5 X40 Y40 I0 J5 P-5 Q0\n"
 )
 

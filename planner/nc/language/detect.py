@@ -21,6 +21,7 @@ LATHE_NOTE = (
     "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
     "([dialect] lathe = false in the machine file if it is none)"
 )
+G_FURTHER = 54.1
 # Codes that call and return, save and restore modes.
 _CALLS = {ord("M"): (70, 71, 72, 73, 97, 98, 99), ord("G"): (65, 66, 67)}
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
@@ -97,6 +98,11 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
             if np.isin([ord(c) for c in needed], words.letter[words.first[row] : words.first[row + 1]]).all():
                 return True
     return False
+
+
+def has_further_systems(words: Words) -> bool:
+    """Whether G54.1 is in a program, which of the controls that are read only Fanuc's and Haas' know."""
+    return bool(((words.value == G_FURTHER) & (words.letter == ord("G"))).any())
 
 
 def _first_end(words: Words) -> int:

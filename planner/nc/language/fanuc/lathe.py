@@ -20,7 +20,8 @@ import numpy as np
 from planner.nc.integers import LENGTHS
 from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.lathe_cycles import least_increment, name_of
-from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE, LatheWords
+from planner.nc.language.fanuc.lathe_singles import LatheSingles
+from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
     Call,
@@ -47,7 +48,7 @@ _NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
 _AFTER = 1_000_000_000  # label behind the last block of a profile: its number and this
 
 
-class LatheParser(LatheWords):
+class LatheParser(LatheSingles):
     """Statements of a lathe's program."""
 
     def __init__(self, source: Source):
@@ -219,7 +220,7 @@ class LatheParser(LatheWords):
     def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
         """A word of a cycle in the program's unit: in least increments where it is a number without a point."""
         letter = chr(word.letter)
-        in_increments = "PQRDIK" if cycle == "G76" else "D"
+        in_increments = _INCREMENTS.get(cycle, "D")
         if (
             letter not in in_increments
             or not isinstance(word.value, Number)
@@ -233,6 +234,8 @@ class LatheParser(LatheWords):
         return Operation("*", (word.value, _INCREMENT))
 
 
+# Words of cycles that are in least increments where they have no point; of others D is.
+_INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK"}
 # The least increment in the program's unit: #4006 is 20 under G20 and 21 under G21.
 _INCREMENT = Operation(
     "+",

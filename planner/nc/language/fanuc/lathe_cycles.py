@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.lathe_thread import LatheThread, ThreadFault, thread_passes
+from planner.nc.lathe_cuts import Pecking, pecked, single_cut, single_thread
+from planner.nc.lathe_thread import LatheThread, Pass, ThreadFault, thread_passes
 from planner.nc.lexer import Words as LexedWords
 from planner.nc.program import Kind, Program
 from planner.nc.state import State
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from planner.nc.language.run import ProgramRun
 
 RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
+_NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
 _WRONG = {
     (Kind.DWELL, Kind.STOP): "a dwell or a stop",
     (Kind.SPLINE,): "a spline",
@@ -78,9 +80,7 @@ class LatheCycles:
         interpreter = self.run.interpreter
         state = interpreter.state
         if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
-            raise ValueError(
-                "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
-            )
+            raise ValueError(_NEEDS)
         self._start = state.programmed().copy()
         self._aside = copy.deepcopy(state), interpreter.store, self.run.tee
         interpreter.go_on_with(state, Store())
@@ -149,17 +149,47 @@ class LatheCycles:
             taper=given.get("I", 0.0) * unit,
             chamfer=given.get("E", 0.0) * given["F"] * unit,
         )
-        at, rows = start, []
-        try:
-            for one in thread_passes(thread):
-                if one.pitch:
-                    rows.append([("G", 33.0), *self._to(one.end), ("K", one.pitch / unit)])
-                elif abs(one.end - at) > 0.0:
-                    rows.append(self._fast(one.end))
-                at = one.end
-        except ThreadFault as fault:
-            raise ValueError(f"G76: {fault}") from fault
-        return rows
+        return self._passes("G76", start, thread_passes(thread))
+
+    def _single(self, given: Given, *, facing: bool) -> Iterable[Words]:
+        start = self._here()
+        taper = given.get("R", 0.0) * self._unit
+        return self._rows(single_cut(start, self._end(given, start), taper, facing=facing))
+
+    def _single_thread(self, given: Given) -> Iterable[Words]:
+        start = self._here()
+        taper, lead = given.get("R", 0.0) * self._unit, given["F"] * self._unit
+        return self._passes("G92", start, single_thread(start, self._end(given, start), taper, lead))
+
+    def _pecking(self, given: Given, *, grooving: bool) -> Iterable[Words]:
+        start = self._here()
+        if "K" in given and "R" not in given:
+            self.run.interpreter.note(
+                f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", self._line
+            )
+        pecking = Pecking(
+            start=start,
+            end=self._end(given, start),
+            peck=abs(given["K"]) * self._unit if "K" in given else math.inf,
+            shift=abs(given["I"]) * self._unit if "I" in given else math.inf,
+            retract=abs(given["R"]) * self._unit if "R" in given else RETRACT,
+            relief=abs(given.get("D", 0.0)) * self._unit,
+        )
+        return self._rows(pecked(pecking, grooving=grooving))
+
+    def _here(self) -> complex:
+        """Where the tool stands; it is the start of the cycle too. Raises ValueError."""
+        state = self.run.interpreter.state
+        if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
+            raise ValueError(_NEEDS)
+        self._start = state.programmed().copy()
+        return self._point(self._start)
+
+    def _end(self, given: Given, start: complex) -> complex:
+        """The place of X and Z; the start's where they are not given."""
+        unit, part = self._unit, 0.5 if self.run.interpreter.state.diameters else 1.0
+        x = part * given["X"] * unit if "X" in given else start.imag
+        return complex(given["Z"] * unit if "Z" in given else start.real, x)
 
     # --- rows ---------------------------------------------------------------------------------------------------------------
 
@@ -172,7 +202,7 @@ class LatheCycles:
         try:
             for step in steps:
                 leg = step.leg
-                if step.fast and abs(leg.end - at) < SAME:
+                if not leg.turning and abs(leg.end - at) < SAME:
                     continue
                 if step.fast:
                     rows.append(self._fast(leg.end))
@@ -187,6 +217,20 @@ class LatheCycles:
             raise ValueError(str(fault)) from fault
         return rows
 
+    def _passes(self, cycle: str, at: complex, passes: Iterable[Pass]) -> Iterable[Words]:
+        """Moves of a thread. Raises ValueError for what contradicts itself in it."""
+        rows: list[Words] = []
+        try:
+            for one in passes:
+                if one.pitch:
+                    rows.append([("G", 33.0), *self._to(one.end), ("K", one.pitch / self._unit)])
+                elif abs(one.end - at) > 0.0:
+                    rows.append(self._fast(one.end))
+                at = one.end
+        except ThreadFault as fault:
+            raise ValueError(f"{cycle}: {fault}") from fault
+        return rows
+
     def _fast(self, point: complex) -> Words:
         return [("G", 0.0), *self._to(point)]
 
@@ -199,7 +243,12 @@ _CYCLES: dict[str, Callable[[LatheCycles, Given], Iterable[Words]]] = {
     "G71": lambda cycles, given: cycles._removal(given, facing=False),
     "G72": lambda cycles, given: cycles._removal(given, facing=True),
     "G73": LatheCycles._pattern,
+    "G74": lambda cycles, given: cycles._pecking(given, grooving=False),
+    "G75": lambda cycles, given: cycles._pecking(given, grooving=True),
     "G76": LatheCycles._thread,
+    "G90": lambda cycles, given: cycles._single(given, facing=False),
+    "G92": LatheCycles._single_thread,
+    "G94": lambda cycles, given: cycles._single(given, facing=True),
 }
 
 

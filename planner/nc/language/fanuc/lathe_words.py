@@ -7,7 +7,7 @@
     G4 X U          dwell in seconds
     T0203           tool 2 with the offset 3 of the machine file (T2 M6, G43 H3); T0200 without one (G49); a full stop
 
-Refused: G90, G92 and G94 as cycles, G74, G75, drilling cycles, G50 and G92 with coordinates.
+Refused: drilling cycles, G50 with coordinates.
 """
 
 from __future__ import annotations
@@ -35,10 +35,8 @@ X_HERE, Z_HERE = (
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Codes that are not read, and why.
 _REFUSED = {
-    **dict.fromkeys(("G74", "G75"), "peck drilling and grooving cycles of lathes are"),
     **dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are"),
 }
-_CUTTING = {"G90": "turning", "G92": "threading", "G94": "facing"}
 
 
 class LatheAsked(FanucAsked):
@@ -65,6 +63,10 @@ class LatheWords(FanucParser):
         """A line with a cycle."""
         raise NotImplementedError
 
+    def _single(self, words: tuple[Word, ...], codes: set[str], line: SourceLine) -> bool:
+        """Read a line with a cycle without a profile. False if it is none."""
+        raise NotImplementedError
+
     def _words(
         self, words: tuple[Word, ...], assignments: tuple[tuple[Parameter, Expression], ...], line: SourceLine
     ) -> None:
@@ -72,12 +74,9 @@ class LatheWords(FanucParser):
         for code in sorted(codes & set(_REFUSED)):
             raise ProgramFault(line.place, f"{_REFUSED[code]} not read; write the moves out")
         given = {chr(word.letter): word.value for word in words if chr(word.letter) not in "GM"}
-        if given.keys() & set("XZUW"):
-            for code in sorted(codes & set(_CUTTING)):
-                raise ProgramFault(
-                    line.place, f"the {_CUTTING[code]} cycle {code} is not read; write its moves out"
-                )
         self.feed = given.get("F", self.feed)
+        if self._single(words, codes, line):
+            return
         cycle = next((code for code in CYCLES if code in codes), "")
         if cycle:
             self._cycle(cycle, words, line)
@@ -149,7 +148,7 @@ class LatheWords(FanucParser):
         if "G50" in codes or "G92" in codes:
             if "S" not in given or given.keys() & set("XZUW"):
                 raise ProgramFault(
-                    line.place, "G50 and G92 that set a position are not read; write a work system (G54)"
+                    line.place, "G50 that sets a position is not read; write a work system (G54)"
                 )
             self.speed_max = given["S"]
             words = tuple(

@@ -68,6 +68,39 @@ CASES = {
         "G0 X40\nG0 Z-3.5\nG1 X27.1428571428571429\nG0 X28.1428571428571429 Z-3\n"
         "G0 X40\nG0 Z-5.5\nG1 X30\nX20 Z1.5\nG0 Z2.5\nG0 X40 Z2\n",
     ),
+    "turning in one cut": (
+        "G90 X36 Z-20 F80\nX32\nU-12 W-12\nX30 Z-22 R-2\nX20\nG0 X50\nM30",
+        "F80\nG0 X36\nG1 Z-20\nX40\nG0 Z2\nG0 X32\nG1 Z-20\nX40\nG0 Z2\nG0 X28\nG1 Z-10\nX40\nG0 Z2\n"
+        "G0 X26\nG1 X30 Z-22\nX40\nG0 Z2\nG0 X16\nG1 X20 Z-22\nX40\nG0 Z2\nG0 X50\n",
+    ),
+    "facing in one cut": (
+        "G94 X10 Z0 F60\nZ-1\nM8\nG4 U1\nX12 W-4 K1.5\nG1 Z0\nM30",
+        "F60\nG0 Z0\nG1 X10\nZ2\nG0 X40\nG0 Z-1\nG1 X10\nZ2\nG0 X40\nM8\nG4 P1\n"
+        "G0 Z-.5\nG1 X12 Z-2\nZ2\nG0 X40\nG1 Z0\n",
+    ),
+    "a thread in one cut": (
+        "S600 M3\nG92 X38 W-22 F2.\nX37.2\nX36 R-1\nG0 X50\nM30",
+        "S600 M3\nG0 X38\nG33 Z-20 K2\nG0 X40\nZ2\nX37.2\nG33 Z-20 K2\nG0 X40\nZ2\n"
+        "X34\nG33 X36 Z-20 K[2*SQRT[485]/22]\nG0 X40\nZ2\nX50\n",
+    ),
+    "pecks along z": (
+        "G74 R0.5\nG74 X36 W-10 P1500 Q4000 R1. F50\nM30",
+        "F50\nG1 Z-2\nG0 Z-1.5\nG1 Z-6\nG0 Z-5.5\nG1 Z-8\nG0 Z2\nX37\nG1 Z-2\nG0 Z-1.5\nG1 Z-6\nG0 Z-5.5\nG1 Z-8\n"
+        "G0 X39\nZ2\nX36\nG1 Z-2\nG0 Z-1.5\nG1 Z-6\nG0 Z-5.5\nG1 Z-8\nG0 X38\nZ2\nX40\n",
+    ),
+    "a drill in one block": (
+        "G74 W-5 K3. F50\nM30",
+        "F50\nG1 Z-1\nG0 Z-.5\nG1 Z-3\nG0 Z2\n",
+    ),
+    "grooves": (
+        "G75 R0.5\nG75 X34 W-6 P2000 Q4000 R1 F50\nM30",
+        "F50\nG1 X36\nG0 X37\nG1 X34\nG0 X40\nZ-2\nG1 X36\nG0 X37\nG1 X34\nG0 Z-1\nX40\nZ-4\n"
+        "G1 X36\nG0 X37\nG1 X34\nG0 Z-3\nX40\nZ2\n",
+    ),
+    "grooves in one block": (
+        "G75 U-6 Z-2 I2 K4 F50\nM30",
+        "F50\nG1 X36\nG0 X37\nG1 X34\nG0 X40\nZ-2\nG1 X36\nG0 X37\nG1 X34\nG0 X40\nZ2\n",
+    ),
 }  # fmt: skip
 
 
@@ -119,10 +152,19 @@ REFUSED = {
     "no depth": ("G71 P10 Q20 U1.\nN10 G0 X20\nN20 G1 Z-5\nM30", "depth of a pass is not given"),
     "a dwell": ("G71 P10 Q20 D1.\nN10 G0 X20\nG4 U1\nN20 G1 Z-5\nM30", "a dwell or a stop in the profile"),
     "H": ("H90\nU1\nM30", "moves the axis C"),
-    "G75": ("G75 R1.\nU1\nM30", "not read"),
+    "G75 without its bottom": ("G75 R1.\nG75 Z-9 P1000 Q1000\nU1\nM30", "G75 needs the bottom as X or U"),
+    "G74 without a shift": ("G74 Z-9 X30 Q1000\nU1\nM30", "G74 with X needs P or I"),
+    "a retract longer than a peck": ("G74 R1.\nG74 Z-9 Q500\nU1\nM30", "longer than its peck"),
+    "a relief without a point": ("G74 R.1\nG74 X30 Z-9 P1000 Q500 R250\nU1\nM30", "would gouge"),
+    "a peck of nothing": ("G75 X30 P0\nU1\nM30", "must be above 0"),
+    "a million pecks": ("G75 R0\nG75 X30 P1 Q1 W-5\nU1\nM30", "more than 10000 pecks"),
     "G83": ("G83 Z-10 R2 Q1 F10\nU1\nM30", "drilling cycles of lathes"),
-    "G90 as a cycle": ("G90 U-1 Z-10\nM30", "turning cycle G90"),
-    "G50 X": ("G50 X100 Z100\nU1\nM30", "set a position"),
+    "G90 of system B": ("G90 G0 U-1 Z-10\nM30", "G code system A"),
+    "half of G90": ("G90 U-1\nZ-10\nM30", "needs X or U, and Z or W"),
+    "a wrong taper": ("G94 U-1 Z-10 I1\nM30", "does not use I"),
+    "G92 without a lead": ("F2.\nG92 X10 Z-10\nU1\nM30", "needs the lead"),
+    "G92 without room": ("S500 M3\nG0 X20 Z0\nG92 X10 W0 F1\nM30", "room in z"),
+    "G50 X": ("G50 X100 Z100\nU1\nM30", "sets a position"),
     "G76 without a lead": ("G76 X10 Z-10 K1. D.2\nU1\nM30", "lead"),
     "G76 below its crest": ("S500 M3 F1\nG0 X11 Z0\nG76 X10 Z-10 K1. D.2\nU1\nM30", "crest"),
     "half a thread": ("F1\nG76 X10 Z-10 P1000 Q200\nU1\nM30", "P and Q with a block"),
@@ -139,7 +181,7 @@ REFUSED = {
 def test_refused(name: str) -> None:
     text, said = REFUSED[name]
     with pytest.raises(InputError, match=said):
-        read(text if "F1\n" in text or "lead" in name else HEAD + text)
+        read(text if "F1\n" in text or "a lead" in name else HEAD + text)
 
 
 def test_the_machine_says_whether_it_is_a_lathe() -> None:
@@ -170,6 +212,8 @@ def test_linuxcnc_reads_the_flat_program(tmp_path: Path) -> None:
     source = (
         HEAD + G71 + PROFILE + "G70 P10 Q20\nT0101\nG97 S800 M3\nG0 X24 Z5\n"
         "G76 P020560 Q50 R0.02\nG76 X16.932 Z-25. R-0.5 P1534 Q485 F2.5\n"
+        "G0 X40 Z2\nG98\nG90 X36 Z-20 R-1 F80\nX32\nG94 X10 Z0\nG75 R.5\nG75 X34 W-6 P2000 Q4000 R1 F50\n"
+        "G0 Z5\nG92 X38 Z-20 R-1 F2.\nX37\nG0 X24 Z5\n"
         "G0 U6. W2.\nG73 U4. W2. R3\nG73 P30 Q40 U1. W0.2\nN30 G0 X20 Z0\nN40 G1 X30 Z-5\nM30\n"
     )  # fmt: skip
     program = parse_program(source, MACHINE)

@@ -1,0 +1,62 @@
+"""The search for geometry and feed together straight from the first splines: nothing is done that only a delivered start would need.
+
+A motion on the first splines keeps its limits at the points of a coarse grid. That is no plan, but where the search leaves no step of
+it nothing else is asked of it: it is not made slower where it exceeds a limit between grid points, not sampled at the interpolation
+period, not judged, and not compared with other corners, which are slower than what is found (docs/joint.md). Where anything of it
+would have to stay, or what is found does not pass its verdict, there is no plan from here.
+"""
+
+from __future__ import annotations
+
+from planner.job.job import Job
+from planner.job.plan import Plan
+from planner.methods.free import Start, said, search, tabled
+from planner.optimal.loop import Settings, first_motion
+from planner.optimal.notes import path_notes
+from planner.tube.own import TubeOwn
+from planner.tube.parts import FoundRun, parts_of
+from planner.tube.run import tube_runs_of
+from planner.tube.splice import Spliced, SplicedRun
+
+
+def searched_at_once(job: Job, settings: Settings) -> Plan | None:
+    """The plan of what the search finds from the first motion; None where it does not find all of it.
+
+    job : a searchable one (free.py)
+    """
+    dial, planned = settings.effort.search, first_motion(job, settings)
+    if planned is None:
+        return None
+    with job.stage("search") as report:
+        start = Start(planned.motion(), job, dial)
+        runs = list(tube_runs_of(job.toolpath, job.machine))
+        steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
+        if steps > dial.steps_max:
+            return None
+        found: list[FoundRun] = []
+        done, parts = 0, list[SplicedRun]()
+        for k, run in enumerate(runs):
+            found.append(search(k, run, [start], TubeOwn(dial.gap, divide=False)))
+            if not found[-1].whole:
+                job.tell("search", steps=steps, of_runs=len(runs), whole=k)
+                return None
+            parts += parts_of(job.toolpath, found[-1], start.spliced(k))
+            done += len(start.guess(k, run))
+            report(done / steps)
+    made = job.deliver(Spliced(runs=tuple(parts)))
+    trajectory, verdict = made
+    job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)
+    if not verdict.passed or trajectory.cycle_time > job.stop_time:
+        return None
+    job.note(*path_notes(job.toolpath, planned))
+    status, sentence = said(job, start, found, [], "", "a path first, then its feed")
+    return job.plan(
+        made,
+        method=settings.method,
+        corner=settings.corner if isinstance(settings.corner, str) else settings.corner.name,
+        solver=planned.solution.solver,
+        status=status,
+        sentence=sentence,
+        grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
+        tables=tabled(job, None, trajectory, found, []),
+    )

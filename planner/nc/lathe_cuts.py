@@ -1,0 +1,117 @@
+"""Cycles of single cuts on Fanuc and Haas lathes, G90 G92 G94, and those that peck, G74 G75: from their words to moves.
+
+Points are complex numbers, z + i x in radii [mm]; the tool stands at S, the words give E = (Z, X) and a taper r along x (in G94 z).
+
+    G90    fast in x to x_E + r, cut to E, cut in x back to x_S, fast back to S
+    G92    the same as a thread: in step with the spindle to E, then fast
+    G94    fast in z to z_E + r, cut to E, cut in z back to z_S, fast back to S
+    G74    pecks along z from z_S to z_E, each q deeper than the last and drawn back by e; at the bottom, but not of the first one, away
+           by the relief against the shift; fast back to z_S, and the same p further in x until x_E; then fast back to S
+    G75    the same with x and z exchanged
+
+Sources: the formats of Fanuc's lathes (series 0i-T) and of Haas (haascnc.com) as they are known; the order of the moves of G75, and
+that the first groove has no relief: the programming manual of ADTECH's CNC4620, which has Fanuc's format, page 55.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from planner.nc.lathe_thread import Pass, ThreadFault
+from planner.nc.turning import PASSES_MAX, SAME, ContourFault, Leg, TurningStep
+
+
+@dataclass(frozen=True)
+class Pecking:
+    """The words of G74, or with x and z exchanged of G75; lengths in mm.
+
+    start, end : (z, x) where the tool stands, and the bottom of the last hole or groove
+    peck       : q, how much deeper each peck goes; inf for all at once
+    shift      : p, from one to the next along x; inf for one to the end at once
+    retract    : e;  relief : at the bottom, against the shift, at most the way of the shift
+    """
+
+    start: complex
+    end: complex
+    peck: float
+    shift: float
+    retract: float
+    relief: float = 0.0
+
+    def exchanged(self) -> Pecking:
+        """The words with x and z exchanged."""
+        return replace(self, start=_exchanged(self.start), end=_exchanged(self.end))
+
+
+def single_cut(start: complex, end: complex, taper: float, *, facing: bool) -> Iterator[TurningStep]:
+    """The moves of G90, or with `facing` of G94 [mm]."""
+    if facing:
+        for step in single_cut(_exchanged(start), _exchanged(end), taper, facing=False):
+            yield TurningStep(step.leg.exchanged(), step.fast)
+        return
+    yield TurningStep(Leg(complex(start.real, end.imag + taper)), fast=True)
+    yield TurningStep(Leg(end))
+    yield TurningStep(Leg(complex(end.real, start.imag)))
+    yield TurningStep(Leg(start), fast=True)
+
+
+def single_thread(start: complex, end: complex, taper: float, lead: float) -> Iterator[Pass]:
+    """The moves of G92 [mm]; `lead` is that along the longer of z and x. Raises ThreadFault."""
+    begin = complex(start.real, end.imag + taper)
+    along = end - begin
+    if not lead > 0.0 or not abs(along.real) > SAME:
+        raise ThreadFault("a thread needs a lead above 0 and room in z between where the tool stands and Z")
+    yield Pass(begin)
+    yield Pass(end, lead * abs(along) / max(abs(along.real), abs(along.imag)))
+    yield Pass(complex(end.real, start.imag))
+    yield Pass(start)
+
+
+def pecked(given: Pecking, *, grooving: bool) -> Iterator[TurningStep]:
+    """The moves of G74, or with `grooving` of G75 [mm]. Raises ContourFault."""
+    if grooving:
+        for step in pecked(given.exchanged(), grooving=False):
+            yield TurningStep(step.leg.exchanged(), step.fast)
+        return
+    deep, wide = given.end.real - given.start.real, given.end.imag - given.start.imag
+    if abs(deep) < SAME:
+        raise ContourFault("the cycle needs room between where the tool stands and its bottom")
+    if not given.peck > 0.0 or not given.shift > 0.0:
+        raise ContourFault("the peck and the shift of the cycle must be above 0")
+    if (1.0 + abs(wide) / given.shift) * (1.0 + abs(deep) / given.peck) > PASSES_MAX:
+        raise ContourFault(f"the cycle makes more than {PASSES_MAX} pecks")
+    if given.retract > given.peck:
+        raise ContourFault(
+            f"the retract of the cycle, {given.retract:g} mm, is longer than its peck, {given.peck:g} mm"
+        )
+    if given.relief > min(given.shift, abs(wide)):
+        raise ContourFault(
+            f"the relief of the cycle, {given.relief:g} mm, is longer than the way to the next cut: the tool would gouge"
+        )
+    down, on = math.copysign(1.0, deep), math.copysign(1.0, wide)
+    for x in _stations(given.start.imag, given.end.imag, given.shift, from_start=True):
+        yield TurningStep(Leg(complex(given.start.real, x)), fast=True)
+        for z in _stations(given.start.real, given.end.real, given.peck, from_start=False):
+            yield TurningStep(Leg(complex(z, x)))
+            if z != given.end.real:
+                yield TurningStep(Leg(complex(z - down * given.retract, x)), fast=True)
+        away = x - on * given.relief if x != given.start.imag else x
+        yield TurningStep(Leg(complex(given.end.real, away)), fast=True)
+        yield TurningStep(Leg(complex(given.start.real, away)), fast=True)
+    yield TurningStep(Leg(given.start), fast=True)
+
+
+def _stations(begin: float, end: float, step: float, *, from_start: bool) -> Iterator[float]:
+    """Places from begin to end, each `step` from the last, the last one at the end itself."""
+    whole, way = abs(end - begin), math.copysign(1.0, end - begin)
+    n = 0 if from_start else 1
+    while n * step < whole - SAME if n else whole > SAME:
+        yield begin + way * n * step
+        n += 1
+    yield end
+
+
+def _exchanged(point: complex) -> complex:
+    return complex(point.imag, point.real)

@@ -1,12 +1,17 @@
 """How time and memory grow with the length of a program: reliefs of a thousand to millions of blocks, planned and written.
 
-    python -m benchmarks.growth [--blocks N ...] [--method NAME] [--machine NAME] [--most SECONDS] [--no-files]
+    python -m benchmarks.growth [--blocks N ...] [--method NAME] [--machine NAME] [--most SECONDS] [--threads N] [--no-files] [--again]
 
 A relief is one run without a stop: rows of `PER_ROW` blocks of `STEP`, heights of random waves with kinks where they are cut off. Each
 size is planned in a process of its own, as `planner plan -o` does it. Times are processor times, by stage and without the stages inside
-a stage, on kernels that are compiled already (each process plans `WARM_UP` blocks first). Memory is the largest resident set of the
-process, and by how much it is above that of the warm process per block. The slope is the exponent of the time between a size and the
-one before; the largest size follows only if the one before took less than `--most` seconds.
+a stage, on kernels that are compiled already (each process plans `WARM_UP` blocks first); wall time is told beside them. Memory is the
+largest resident set of the process, and by how much it is above that of the warm process per block. The slope is the exponent of the
+processor time between a size and the one before; below the table stands the one fitted to all sizes from `FITTED` blocks on. The next
+size follows only if the one before took less than `--most` processor seconds.
+
+Each size is written when it is done. A run that was cut off goes on where it ended: what the results hold of the same settings and
+commit (the last one that changed the planner) is not run again, unless `--again` is given. Other rows stay until their size is run, and
+no slope is told from them.
 """
 
 from __future__ import annotations
@@ -14,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import resource
 import subprocess
 import sys
@@ -24,7 +30,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.record import markdown, write_results
+from benchmarks.record import RESULTS, markdown, write_results
+from planner.base.threads import threads, use_threads
 
 BLOCKS = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000, 2_000_000)
 PER_ROW, STEP, ROW_STEP = 400, 0.3, 0.4  # blocks, [mm], [mm]
@@ -36,6 +43,8 @@ WAVES, HEIGHT, CUT_OFF = (
 )  # waves, their height [mm], and above which height the relief is flatter [mm]
 WARM_UP = 200  # blocks
 MOST = 300.0  # [s]
+FITTED = 10_000  # blocks: smaller jobs get rounds and a search that longer ones do not (optimal/effort.py)
+SETTINGS = ("method", "machine", "threads", "files", "commit")  # of a row, beside its number of blocks
 
 
 def relief(blocks: int, seed: int = 3) -> str:
@@ -56,12 +65,17 @@ def relief(blocks: int, seed: int = 3) -> str:
 
 
 class Clock:
-    """Processor time by stage, without the stages inside it; a `progress` of `planner.plan`."""
+    """Processor time by stage, without the stages inside it; a `progress` of `planner.plan`.
+
+    took  : of all threads [s]
+    alone : of the thread that calls, which waits while others work [s]
+    """
 
     def __init__(self) -> None:
         self.took: dict[str, float] = {}
+        self.alone: dict[str, float] = {}
         self._stack: list[str] = []
-        self._last = time.process_time()
+        self._last, self._last_alone = time.process_time(), time.thread_time()
 
     def __call__(self, stage: str, done: float) -> None:
         if not 0.0 < done < 1.0:
@@ -73,10 +87,11 @@ class Clock:
                 pass
 
     def _count(self) -> None:
-        now = time.process_time()
+        now, alone = time.process_time(), time.thread_time()
         stage = self._stack[-1] if self._stack else "else"
         self.took[stage] = self.took.get(stage, 0.0) + now - self._last
-        self._last = now
+        self.alone[stage] = self.alone.get(stage, 0.0) + alone - self._last_alone
+        self._last, self._last_alone = now, alone
 
 
 def one(blocks: int, method: str, machine: str, *, files: bool) -> dict[str, Any]:
@@ -89,7 +104,7 @@ def one(blocks: int, method: str, machine: str, *, files: bool) -> dict[str, Any
         for size in (WARM_UP, blocks):
             program.write_text(relief(size))
             before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-            clock, began = Clock(), time.process_time()
+            clock, began, wall = Clock(), time.process_time(), time.perf_counter()
             plan = planner.plan(program, machine, method=method, progress=clock)
             if files and plan.solved:
                 clock("write", 0.0)
@@ -98,7 +113,13 @@ def one(blocks: int, method: str, machine: str, *, files: bool) -> dict[str, Any
         after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return {
         "blocks": blocks,
+        "method": method,
+        "machine": machine,
+        "threads": threads(),
+        "files": files,
         "cpu_s": time.process_time() - began,
+        "wall_s": time.perf_counter() - wall,
+        "load": os.getloadavg()[0],
         "stages_s": clock.took,
         "peak_mb": after / 1e3,
         "kb_per_block": (after - before) / blocks,
@@ -121,48 +142,106 @@ def main() -> None:
         "--most", type=float, default=MOST, help="processor seconds after which no larger size follows"
     )
     parser.add_argument("--no-files", dest="files", action="store_false", help="plan only")
+    parser.add_argument("--threads", type=int, default=None, help="one per core")
+    parser.add_argument("--again", action="store_true", help="also what the results hold of this commit")
     parser.add_argument(
         "--one", action="store_true", help="print the result of the first size as JSON, in this process"
     )
     options = parser.parse_args()
+    use_threads(options.threads)
     if options.one:
         print(json.dumps(one(options.blocks[0], options.method, options.machine, files=options.files)))
         return
-    rows: list[dict[str, Any]] = []
+    asked = {
+        "method": options.method,
+        "machine": options.machine,
+        "threads": threads(),
+        "files": options.files,
+        "commit": planner_commit(),
+    }
+    rows = _before()
     for blocks in options.blocks:
-        command = [sys.executable, "-m", "benchmarks.growth", "--one", "--blocks", str(blocks)]
-        command += ["--method", options.method, "--machine", options.machine] + ["--no-files"] * (
-            not options.files
-        )
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            print(
-                f"{blocks:,} blocks: {done.stderr.strip().splitlines()[-1:] or done.returncode}", flush=True
+        done = next((row for row in rows if row["blocks"] == blocks and _settings(row) == asked), None)
+        if done is None or options.again:
+            done = _run(blocks, asked)
+            if done is None:
+                break
+            print({name: value for name, value in done.items() if name != "stages_s"}, flush=True)
+            rows = sorted(
+                [row for row in rows if row["blocks"] != blocks] + [done], key=lambda row: row["blocks"]
             )
-            break
-        rows.append(json.loads(done.stdout.splitlines()[-1]))
-        print({name: value for name, value in rows[-1].items() if name != "stages_s"}, flush=True)
-        write_results("growth", {"rows": rows}, _table(rows))
-        if rows[-1]["cpu_s"] > options.most:
+            write_results("growth", {"rows": rows}, _table(rows, asked))
+        if done["cpu_s"] > options.most:
             break
 
 
-def _table(rows: list[dict[str, Any]]) -> str:
+def planner_commit() -> str:
+    """The last commit that changed the planner."""
+    command = ["git", "log", "-1", "--format=%h", "--", "planner"]
+    root = Path(__file__).parent.parent
+    return subprocess.run(command, cwd=root, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def _before() -> list[dict[str, Any]]:
+    """The rows of the results so far."""
+    file = RESULTS / "growth.json"
+    return list(json.loads(file.read_text())["rows"]) if file.exists() else []
+
+
+def _settings(row: dict[str, Any]) -> dict[str, Any]:
+    """What a row was planned with, and at which commit; None where it does not say."""
+    return {name: row.get(name) for name in SETTINGS}
+
+
+def _run(blocks: int, asked: dict[str, Any]) -> dict[str, Any] | None:
+    """The row of one size, planned in a process of its own; None after an error, which is printed."""
+    command = [sys.executable, "-m", "benchmarks.growth", "--one", "--blocks", str(blocks)]
+    command += [
+        "--method",
+        asked["method"],
+        "--machine",
+        asked["machine"],
+        "--threads",
+        str(asked["threads"]),
+    ]
+    command += [] if asked["files"] else ["--no-files"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if ran.returncode:
+        print(f"{blocks:,} blocks: {ran.stderr.strip().splitlines()[-1:] or ran.returncode}", flush=True)
+        return None
+    return {**json.loads(ran.stdout.splitlines()[-1]), "commit": asked["commit"]}
+
+
+def fitted_slope(blocks: list[int], seconds: list[float]) -> float:
+    """The exponent p of seconds = c blocks^p, by least squares of the logarithms; NaN for fewer than two sizes."""
+    if len(blocks) < 2:
+        return math.nan
+    return float(np.polyfit(np.log(blocks), np.log(seconds), 1)[0])
+
+
+def _table(rows: list[dict[str, Any]], asked: dict[str, Any]) -> str:
     stages = list(dict.fromkeys(name for row in rows for name in row["stages_s"]))
-    columns = ["blocks", "CPU [s]", "blocks/s", "slope", *(f"{name} [s]" for name in stages), "peak [MB]"]
-    columns += ["kB/block", "grid points", "samples", "motion [s]", "passed"]
+    columns = [
+        "blocks",
+        "CPU [s]",
+        "wall [s]",
+        "threads",
+        "blocks/CPU s",
+        "slope",
+        *(f"{name} [s]" for name in stages),
+        "peak [MB]",
+    ]
+    columns += ["kB/block", "grid points", "samples", "motion [s]", "passed", "load", "commit"]
     lines = []
     for k, row in enumerate(rows):
-        before = rows[k - 1] if k else None
-        slope = (
-            f"{math.log(row['cpu_s'] / before['cpu_s']) / math.log(row['blocks'] / before['blocks']):.2f}"
-            if before
-            else ""
-        )
+        pair = [one for one in rows[max(k - 1, 0) : k + 1] if _settings(one) == asked]
+        slope = f"{_slope(pair):.2f}" if len(pair) == 2 else ""
         lines.append(
             [
                 f"{row['blocks']:,}",
                 f"{row['cpu_s']:.3g}",
+                f"{row['wall_s']:.3g}" if "wall_s" in row else "",
+                str(row.get("threads", "")),
                 f"{row['blocks'] / row['cpu_s']:,.0f}",
                 slope,
                 *(f"{row['stages_s'].get(name, 0.0):.3g}" for name in stages),
@@ -172,9 +251,21 @@ def _table(rows: list[dict[str, Any]]) -> str:
                 f"{row['samples']:,}",
                 f"{row['cycle_s']:.6g}",
                 "yes" if row["passed"] else "no",
+                f"{row['load']:.1f}" if "load" in row else "",
+                row.get("commit", ""),
             ]
         )
-    return markdown(columns, lines)
+    large = [row for row in rows if row["blocks"] >= FITTED and _settings(row) == asked]
+    told = (
+        f"\nFitted slope of CPU time from {FITTED:,} blocks on: {_slope(large):.2f}.\n"
+        if len(large) > 1
+        else ""
+    )
+    return markdown(columns, lines) + told
+
+
+def _slope(rows: list[dict[str, Any]]) -> float:
+    return fitted_slope([row["blocks"] for row in rows], [row["cpu_s"] for row in rows])
 
 
 if __name__ == "__main__":

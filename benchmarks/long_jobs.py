@@ -1,6 +1,6 @@
 """What long jobs cost: real programs and generated ones of 4,000 to 250,000 blocks, each planned in a process of its own.
 
-    python -m benchmarks.long_jobs [JOB ...] [--threads N ...] [--corner NAME] [--nc DIR] [--machines DIR]
+    python -m benchmarks.long_jobs [JOB ...] [--threads N ...] [--corner NAME] [--nc DIR] [--machines DIR] [--again]
 
 Real programs are those of `--nc`, left out where that is absent. Generated are
 
@@ -8,8 +8,12 @@ Real programs are those of `--nc`, left out where that is absent. Generated are
     carving   chords of 1 to 20 um along the strokes of a carved text: arcs with kinks between them, deeper where a stroke is wider
     relief    rows of a milled relief (benchmarks/growth.py)
 
-Processor and wall seconds are of planning alone, on compiled kernels; memory is the largest resident set of the process.
-A row stays in the results until the same job is run again with as many threads and the same corner.
+Processor and wall seconds are of planning alone, on compiled kernels; memory is the largest resident set of the process. On several
+threads the CPU seconds of a stage stand before those of the thread that plans. A second core makes a job at most
+CPU / (alone + (CPU - alone) / 2) times as fast.
+
+A row stays in the results until the same job is run again with as many threads and the same corner. A run that was cut off goes on
+where it ended: rows of the same commit (the last one that changed the planner) are not run again, unless `--again` is given.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.growth import Clock, relief
+from benchmarks.growth import Clock, planner_commit, relief
 from benchmarks.record import markdown, write_results
 
 RESULTS = Path(__file__).parent / "results" / "long-jobs.json"
@@ -127,6 +131,7 @@ def one(name: str, options: argparse.Namespace) -> dict[str, Any]:
         "samples": 0 if found is None else len(found),
         "passed": plan.verdict is not None and plan.verdict.passed,
         "stages_s": clock.took,
+        "alone_s": clock.alone,
         "load": os.getloadavg()[0],
     }
 
@@ -142,6 +147,7 @@ def main() -> None:
     parser.add_argument("--nc", type=Path, default=Path("../shared/nc"))
     parser.add_argument("--machines", type=Path, default=Path("../shared/machines"))
     parser.add_argument("--one", action="store_true", help="print the result of the first as JSON")
+    parser.add_argument("--again", action="store_true", help="also what the results hold of this commit")
     options = parser.parse_args()
     unknown = [name for name in options.jobs if name not in JOBS]
     if unknown:
@@ -149,12 +155,16 @@ def main() -> None:
     if options.one:
         print(json.dumps(one(options.jobs[0], options)))
         return
+    commit = planner_commit()
     for name in options.jobs:
         program = JOBS[name].program
         if isinstance(program, str) and not (options.nc / program).exists():
             print(f"{name}: {options.nc / program} is absent", flush=True)
             continue
         for threads in options.threads:
+            known = {"job": name, "corner": options.corner, "threads": threads, "commit": commit}
+            if not options.again and any(known.items() <= row.items() for row in _before()):
+                continue
             command = [sys.executable, "-m", "benchmarks.long_jobs", name, "--one", "--threads", str(threads)]
             command += ["--corner", options.corner, "--nc", str(options.nc)]
             command += ["--machines", str(options.machines)]
@@ -162,21 +172,33 @@ def main() -> None:
             if done.returncode:
                 print(f"{name}: {done.stderr.strip().splitlines()[-1:] or done.returncode}", flush=True)
                 continue
-            row = json.loads(done.stdout.splitlines()[-1])
-            print({key: value for key, value in row.items() if key != "stages_s"}, flush=True)
+            row = {**json.loads(done.stdout.splitlines()[-1]), "commit": commit}
+            print(
+                {key: value for key, value in row.items() if key not in ("stages_s", "alone_s")}, flush=True
+            )
             rows = _with(row)
             write_results("long-jobs", {"rows": rows}, _table(rows))
 
 
+def _before() -> list[dict[str, Any]]:
+    """The rows of the results so far."""
+    return list(json.loads(RESULTS.read_text())["rows"]) if RESULTS.exists() else []
+
+
 def _with(row: dict[str, Any]) -> list[dict[str, Any]]:
     """The rows of the results so far with another one, in the order of the jobs."""
-    rows = json.loads(RESULTS.read_text())["rows"] if RESULTS.exists() else []
 
     def key(one: dict[str, Any]) -> tuple[Any, ...]:
         return list(JOBS).index(one["job"]), one["corner"], one["threads"]
 
-    kept = [one for one in rows if one["job"] in JOBS and key(one) != key(row)]
+    kept = [one for one in _before() if one["job"] in JOBS and key(one) != key(row)]
     return sorted([*kept, row], key=key)
+
+
+def _stage(row: dict[str, Any], name: str) -> str:
+    """CPU seconds of a stage; where more than one thread was allowed, those of the thread that plans behind them."""
+    took = f"{row['stages_s'].get(name, 0.0):.3g}"
+    return f"{took}, {row['alone_s'].get(name, 0.0):.3g}" if row["threads"] > 1 and "alone_s" in row else took
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
@@ -197,8 +219,9 @@ def _table(rows: list[dict[str, Any]]) -> str:
         "grid points",
         "samples",
         "passed",
-        *(f"{name} [CPU s]" for name in stages),
+        *(f"{name} [CPU s, of them alone]" for name in stages),
         "load",
+        "commit",
     ]
     lines = [
         [
@@ -215,8 +238,9 @@ def _table(rows: list[dict[str, Any]]) -> str:
             f"{row['points']:,}",
             f"{row['samples']:,}",
             "yes" if row["passed"] else "no",
-            *(f"{row['stages_s'].get(name, 0.0):.3g}" for name in stages),
+            *(_stage(row, name) for name in stages),
             f"{row['load']:.1f}",
+            row.get("commit", ""),
         ]
         for row in rows
     ]

@@ -42,9 +42,11 @@ def write_pvt(
         raise InputError(f"--within must be above 0 mm, found {within:g}")
     linear = 1.0 / MM_PER_INCH if unit == "inch" else 1.0
     rotary = np.array([axis in ROTARY_AXES for axis in trajectory.axes])
-    periods, miss = longest_interval(trajectory, np.where(rotary, within * RAD_PER_DEG, within))
+    periods, miss = longest_interval(
+        trajectory, np.where(rotary, within * RAD_PER_DEG * trajectory.radius, within)
+    )
     rows = _rows(len(trajectory), periods)
-    scale = np.where(rotary, 1.0 / RAD_PER_DEG, linear)
+    scale = np.where(rotary, trajectory.in_degrees, linear)
     names = [f"{kind}{axis}" for axis in trajectory.axes for kind in ("", "v")]
     table = np.empty((len(rows), 1 + len(names)))
     table[:, 0] = trajectory.t[rows]

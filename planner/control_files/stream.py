@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.base.units import MM_PER_INCH, RAD_PER_DEG
+from planner.base.units import MM_PER_INCH
 from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 
@@ -41,16 +41,19 @@ def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> N
         raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
     with (directory / "setpoints.txt").open("w", encoding="ascii") as file:
         file.write(f"# {' '.join(trajectory.axes)} [{unit}, deg], one row every {trajectory.dt:g} s\n")
-        position = np.asarray(trajectory.position) * _scale(trajectory.axes, unit)
+        position = np.asarray(trajectory.position) * _scale(trajectory, unit)
         for first in range(0, len(position), _ROWS_AT_ONCE):
             np.savetxt(file, position[first : first + _ROWS_AT_ONCE], fmt="%.9f")
     (directory / "stream.hal").write_text(_stream_hal(trajectory), encoding="ascii")
     (directory / "try.hal").write_text(_try_hal(trajectory), encoding="ascii")
 
 
-def _scale(axes: tuple[str, ...], unit: str) -> FloatArray:
-    """(A,) file units per mm or rad."""
-    return np.array([1.0 / RAD_PER_DEG if axis in ROTARY_AXES else 1.0 / UNITS[unit] for axis in axes])
+def _scale(trajectory: Trajectory, unit: str) -> FloatArray:
+    """(A,) file units per unit of the positions."""
+    degrees = trajectory.in_degrees
+    return np.array(
+        [degrees[k] if axis in ROTARY_AXES else 1.0 / UNITS[unit] for k, axis in enumerate(trajectory.axes)]
+    )
 
 
 def _signals(axes: tuple[str, ...]) -> list[str]:

@@ -46,6 +46,7 @@ def axes_of(
     position, velocity, acceleration, jerk = state
     return AxisMotion(
         axes=toolpath.axes,
+        radius=toolpath.radius,
         t=t,
         position=position,
         velocity=velocity,

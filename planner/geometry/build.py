@@ -5,6 +5,10 @@ or exact path (G61) with a turn (with limited jerk also where the curvature jump
 (unless the machine blends rapids), and at a reversal. Where the tangents agree it is smooth; everywhere else it is a corner. An axis
 that never moves and that the machine lacks is left out.
 
+Rotary axes are measured at a radius R (`Machine.radius`): a coordinate is R times the angle. All axes are lengths then,
+and a tolerance is one of the norm over all of them: with it x y z keep eps, and the angles eps / R. F is the speed of
+the linear part of a block (program.py); in that norm it becomes F ds/dl, constant along lines, arcs and helices.
+
 A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
 the motion goes on as at smooth joints, in exact stop mode too; where the spline itself has a kink there is a corner.
 """
@@ -22,7 +26,7 @@ from planner.geometry.curves import CHORD_SHARE, CurveSegments, curve_segments
 from planner.geometry.extrusion import Laid, Waits, extruder_limits, extrusion_of, waits
 from planner.geometry.run_in import require_room
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
-from planner.machine import Machine
+from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.nc.bezier import homogeneous
 from planner.nc.program import MOVES, Kind, PathControl, Program
 
@@ -50,6 +54,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         raise InputError(f"tolerance '{tolerance}'; give a number, in mm")
     if tolerance is not None and not (0 < tolerance < np.inf):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
+    program = _measured(program, machine.radius)
     axis = _axes_in_use(program, machine)
     axes = tuple(program.axes[k] for k in axis)
     machine.limits("velocity", axes)
@@ -79,7 +84,8 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         stands |= ~real & (program.extruded != 0.0)
     found = waits(program, machine, np.flatnonzero(stands))
     joint, dwell = _joints(program, machine, block, theta, found)
-    feed, of_joint, extrusion = _feeds(program, machine, block), of_block[np.append(block[:1], block)], None
+    feed, of_joint = _feeds(program, machine, block, laid), of_block[np.append(block[:1], block)]
+    extrusion = None
     if len(program.extruded):
         at_joints = Laid(block, laid.length, joint == Joint.STOP)
         extrusion = extrusion_of(program, extruder_limits(machine), at_joints, of_joint, found)
@@ -109,10 +115,25 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         held=np.isin(block, program.synchronised),
         exact=_exact(program, block, joint),
         zero_length=np.flatnonzero(moves & ~real),
+        radius=machine.radius,
         extrusion=extrusion,
     )
     require_room(toolpath, machine)
     return toolpath
+
+
+def _measured(program: Program, radius: float) -> Program:
+    """The program with its angles as lengths at a radius [mm]."""
+    rotary = np.array([axis in ROTARY_AXES for axis in program.axes])
+    if not rotary.any():
+        return program
+    scale = np.where(rotary, radius, 1.0)
+    return dataclasses.replace(
+        program,
+        start=program.start * scale,
+        end=program.end * scale,
+        splines=dataclasses.replace(program.splines, points=program.splines.points * scale),
+    )
 
 
 class _Laid(NamedTuple):
@@ -164,7 +185,7 @@ def _axes_in_use(program: Program, machine: Machine) -> Array:
     """Indices of the axes that the machine has or that move: a plotter needs no z for a program that stays in the plane."""
     moved = (program.end != program.start).any(axis=0)
     for normal in np.unique(program.arc_normal):
-        moved[np.arange(len(moved)) != normal] = True
+        moved[: len(LINEAR_AXES)][np.arange(len(moved[: len(LINEAR_AXES)])) != normal] = True
     moved |= (np.ptp(program.splines.points, axis=1) > 0.0).any(axis=0)
     return np.flatnonzero(moved | [letter in machine.axes for letter in program.axes])
 
@@ -210,8 +231,10 @@ def _arcs(program: Program, start: FloatArray, end: FloatArray, rows: Array) -> 
     normal = program.arc_normal[rows]
     first, second = (normal + 1) % 3, (normal + 2) % 3
     sweep = program.arc_sweep[rows]
+    space = len(LINEAR_AXES)
     radial = start - program.arc_center[rows]
     radial[pick, normal] = 0.0
+    radial[:, space:] = 0.0
     radius = np.linalg.norm(radial, axis=1)
     if not (radius > 0).all():
         bad = int(np.flatnonzero(~(radius > 0))[0])
@@ -223,8 +246,11 @@ def _arcs(program: Program, start: FloatArray, end: FloatArray, rows: Array) -> 
     e2[pick, first], e2[pick, second] = -e1[pick, second], e1[pick, first]
     rise = end[pick, normal] - start[pick, normal]
     length = np.hypot(radius * sweep, rise)
+    if axes > space:
+        length = np.hypot(length, np.linalg.norm((end - start)[:, space:], axis=1))
     center = program.arc_center[rows].copy()
     center[pick, normal] = start[pick, normal]
+    center[:, space:] = start[:, space:]
     on_circle = center + radius[:, None] * (np.cos(sweep)[:, None] * e1 + np.sin(sweep)[:, None] * e2)
     drift = (end - on_circle) / length[:, None]
     return Arcs(center=center, e1=e1, e2=e2, drift=drift, radius=radius, rate=sweep / length), length
@@ -255,13 +281,29 @@ def _curvature_bound(arcs: Arcs) -> FloatArray:
     return arcs.radius * arcs.rate**2 / np.maximum(1.0 - gap, 0.5) ** 2
 
 
-def _feeds(program: Program, machine: Machine, block: Array) -> FloatArray:
-    """Programmed feed (M,) [mm/s] of the segments, at most `feed_max` of the machine; of threads as it is, to be refused."""
+def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> FloatArray:
+    """Feed (M,) [mm/s] of the segments along the path in all axes, at most `feed_max` of the machine; of threads as it is, to be
+    refused."""
     feed = program.feed[block].copy()
+    if len(program.axes) > len(LINEAR_AXES):
+        feed *= path_per_length(program.axes, machine.radius, laid)
     if machine.feed_max is not None:
         cut = (program.kind[block] != Kind.RAPID) & ~np.isin(block, program.synchronised)
         feed[cut] = np.minimum(feed[cut], machine.feed_max)
     return feed
+
+
+def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath) -> FloatArray:
+    """(M,) ds/dl of segments: the length in all axes, rotary ones at a radius [mm], for a unit of what F goes by (program.py)."""
+    change = (laid.end - laid.start) ** 2
+    groups = np.array([0 if axis in LINEAR_AXES else 2 if axis in ROTARY_AXES else 1 for axis in axes])
+    further = change[:, groups > 0].sum(axis=1)
+    linear, parallel, rotary = (np.sqrt(change[:, groups == n].sum(axis=1)) for n in range(3))
+    turned = (laid.arc >= 0) | (laid.curve >= 0)
+    linear[turned] = np.sqrt(np.maximum(laid.length[turned] ** 2 - further[turned], 0.0))
+    by = np.where(linear > ZERO_LENGTH, linear, np.where(parallel > ZERO_LENGTH, parallel, rotary / radius))
+    per: FloatArray = laid.length / by
+    return per
 
 
 def _exact(program: Program, block: Array, joint: Array) -> Array:

@@ -79,6 +79,7 @@ class Toolpath:
     held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
     exact           : (M,) True where the path is to be followed exactly (G61, G61.1); no corner at its ends is rounded
     zero_length     : (Z,) blocks that move nowhere, kept as events
+    radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one norm measures them
     extrusion       : what the extruder does along it; None without one
     """
 
@@ -105,6 +106,7 @@ class Toolpath:
     held: Array
     exact: Array
     zero_length: Array
+    radius: float = 1.0
     extrusion: Extrusion | None = None
 
     def __post_init__(self) -> None:

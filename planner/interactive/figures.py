@@ -18,7 +18,7 @@ from planner.base.names import known_name
 from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES
 from planner.report.colours import COLOURS, GREY, limit_colours
-from planner.report.html.data import Samples, in_degrees, programmed_path, samples_of
+from planner.report.html.data import Samples, programmed_path, samples_of
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -197,7 +197,7 @@ class PlanFigures:
 
 def _three(position: FloatArray, axes: tuple[str, ...]) -> FloatArray:
     """(n, 3) x, y, z of positions (n, A); 0 for those that are not among the axes."""
-    scaled = position * in_degrees(axes)
+    scaled = position
     columns = [scaled[:, axes.index(axis)] if axis in axes else np.zeros(len(scaled)) for axis in LINEAR_AXES]
     return np.stack(columns, axis=1)
 

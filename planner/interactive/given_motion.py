@@ -33,7 +33,7 @@ def verify(
     """Judge a motion, wherever it comes from, against a program and a machine: `Verdict.faults` says what is wrong with it.
 
     t           : (T,) times of the samples [s]
-    q           : (T, A) positions of the axes then [mm, rotary axes rad]; velocities and so on are taken from their differences
+    q           : (T, A) positions of the axes then [mm, rotary axes degrees]; velocities and so on are taken from their differences
     program     : a file, or a program read before
     machine     : a machine file, the name of a built-in machine, or a machine; None means "mill"
     axes        : letters of the columns of q; "" for the first A of x, y, z

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.base.units import SECONDS_PER_MINUTE
+from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.geometry.curves import CHORD_SHARE
 from planner.geometry.toolpath import Toolpath
 from planner.job.plausible import short_block_notes, unit_notes
-from planner.machine import Machine
+from planner.machine import ROTARY_AXES, Machine
 from planner.nc.program import Kind, Program
 
 # A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is rounded by more has
@@ -28,6 +28,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),
         *_extruder_notes(toolpath),
+        *_radius_notes(toolpath, machine),
         *(_tolerance_notes(toolpath) or short_block_notes(toolpath)),
     ]
 
@@ -67,6 +68,16 @@ def _extruder_notes(toolpath: Toolpath) -> list[str]:
     return [
         f"line {line}: the extruder moves alone behind it while the axes wait ({len(fed.at):,} such moves; with dwells beside them "
         f"{float(toolpath.dwell[at].sum()):.4g} s)"
+    ]
+
+
+def _radius_notes(toolpath: Toolpath, machine: Machine) -> list[str]:
+    if machine.rotary_radius is not None or not set(toolpath.axes) & set(ROTARY_AXES) or not len(toolpath):
+        return []
+    angle = float(toolpath.tolerance.min()) / (machine.radius * RAD_PER_DEG)
+    return [
+        f"rotary axes are measured at {machine.radius:g} mm, so that their tolerance is {angle:.3g} degrees; rotary_radius or "
+        "tolerance_angle in the machine file says another"
     ]
 
 

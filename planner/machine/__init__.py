@@ -6,18 +6,29 @@
     faults.py   what is wrong in a record, in words
     files.py    machine files and built-in machines
 
-Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns rad. `planner machine init FILE` writes a
+Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns lengths at `Machine.radius`.
+`planner machine init FILE` writes a
 template with every key and its unit.
 """
 
 from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict
 from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import Axis, DialectData, Fir, Mode, Plotter, Times, ToolData
-from planner.machine.whole import EXTRUDER, LINEAR_AXES, ROTARY_AXES, WORK_OFFSETS, Machine
+from planner.machine.whole import (
+    ALL_AXES,
+    EXTRUDER,
+    LINEAR_AXES,
+    PARALLEL_AXES,
+    ROTARY_AXES,
+    WORK_OFFSETS,
+    Machine,
+)
 
 __all__ = [
+    "ALL_AXES",
     "EXTRUDER",
     "LINEAR_AXES",
+    "PARALLEL_AXES",
     "ROTARY_AXES",
     "WORK_OFFSETS",
     "Axis",

@@ -34,11 +34,15 @@ class Record(BaseModel):
 
 
 class Axis(Record):
-    """Limits of one axis: velocity [mm/s], acceleration [mm/s2], jerk [mm/s3]; in degrees for rotary axes."""
+    """Limits of one axis: velocity [mm/s], acceleration [mm/s2], jerk [mm/s3]; in degrees for rotary axes.
+
+    wrapped : of a rotary axis: programs give its positions within a turn, with the sign of the direction (LinuxCNC's WRAPPED_ROTARY)
+    """
 
     velocity: Positive
     acceleration: Positive
     jerk: Positive
+    wrapped: bool = False
 
 
 class Fir(Record):

@@ -30,6 +30,10 @@ from planner.machine.parts import (
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
+PARALLEL_AXES = ("u", "v", "w")  # linear too, beside x, y and z
+ALL_AXES = LINEAR_AXES + ROTARY_AXES + PARALLEL_AXES
+# Distance from a rotary axis at which turning counts as a length, where the machine says none [mm]: half of a workpiece of 100 mm.
+ROTARY_RADIUS = 50.0
 EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
@@ -48,6 +52,8 @@ class Machine(Record):
     feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
+    rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is `ROTARY_RADIUS`. A machine
+                          file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
     kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
     """
 
@@ -60,6 +66,7 @@ class Machine(Record):
     feed_default: Positive | None = None
     normal_acceleration: Positive | None = None
     blend_rapids: bool = False
+    rotary_radius: Positive | None = None
     fir: Fir | None = None
     modes: tuple[Mode, ...] = ()
     plotter: Plotter | None = None
@@ -77,13 +84,31 @@ class Machine(Record):
         except ValidationError as fault:
             raise InputError(faults_in_words(fault, _KEYS)) from None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _angle_as_radius(cls, data: Any) -> Any:
+        """`tolerance_angle` [deg], which stands for the radius at which it is the tolerance."""
+        if not isinstance(data, dict) or "tolerance_angle" not in data:
+            return data
+        rest = {key: value for key, value in data.items() if key != "tolerance_angle"}
+        angle, tolerance = data["tolerance_angle"], data.get("tolerance")
+        if not isinstance(angle, int | float) or not 0 < angle < float("inf"):
+            raise ValueError(f"tolerance_angle: must be above 0 [deg], found {angle!r}")
+        if "rotary_radius" in data:
+            raise ValueError("tolerance_angle and rotary_radius say the same thing; write one of them")
+        if not isinstance(tolerance, int | float):
+            return rest
+        return rest | {"rotary_radius": tolerance / (angle * RAD_PER_DEG)}
+
     @field_validator("axes")
     @classmethod
     def _axes_known(cls, axes: dict[str, Axis]) -> dict[str, Axis]:
-        known = (*LINEAR_AXES, *ROTARY_AXES, EXTRUDER)
+        known = (*ALL_AXES, EXTRUDER)
         for letter in axes:
             if letter not in known:
                 raise ValueError(f"axis '{letter}' is not known; allowed are {', '.join(known)}")
+            if axes[letter].wrapped and letter not in ROTARY_AXES:
+                raise ValueError(f"{letter}.wrapped: only rotary axes (a, b, c) can be wrapped")
         for letter in ("x", "y"):
             if letter not in axes:
                 raise ValueError(f"axis '{letter}' is missing; write a table [axes.{letter}]")
@@ -104,8 +129,10 @@ class Machine(Record):
                 if key not in allowed and not (table == "work_offsets" and _FURTHER_OFFSET.fullmatch(key)):
                     raise ValueError(f"{table}: '{key}' is not known; allowed are {', '.join(allowed)}")
                 for letter in values:
-                    if letter not in LINEAR_AXES:
-                        raise ValueError(f"{table}.{key}: axis '{letter}' is not known; allowed are x, y, z")
+                    if letter not in ALL_AXES:
+                        raise ValueError(
+                            f"{table}.{key}: axis '{letter}' is not known; allowed are {', '.join(ALL_AXES)}"
+                        )
         for letter in self.kinematics.axes if self.kinematics else ():
             if letter not in self.axes:
                 raise ValueError(f"kinematics: axis '{letter}' is missing; write a table [axes.{letter}]")
@@ -117,7 +144,7 @@ class Machine(Record):
     def limits(
         self, quantity: Literal["velocity", "acceleration", "jerk"], axes: tuple[str, ...]
     ) -> FloatArray:
-        """Limits (A,) of the axes for one quantity, in mm or rad and s.
+        """Limits (A,) of the axes for one quantity, in mm and s; of rotary axes at `radius`.
 
         Raises InputError if the machine lacks one of the axes.
         """
@@ -127,8 +154,13 @@ class Machine(Record):
                     f"machine '{self.name}' has no axis '{letter}', which the program uses; add a table "
                     f"[axes.{letter}] with velocity, acceleration and jerk"
                 )
-        scale = [RAD_PER_DEG if letter in ROTARY_AXES else 1.0 for letter in axes]
+        scale = [RAD_PER_DEG * self.radius if letter in ROTARY_AXES else 1.0 for letter in axes]
         return np.array([getattr(self.axes[letter], quantity) for letter in axes]) * scale
+
+    @property
+    def radius(self) -> float:
+        """At which angles of rotary axes are lengths [mm]."""
+        return self.rotary_radius or ROTARY_RADIUS
 
     @property
     def own(self) -> tuple[OwnLimit, ...]:
@@ -148,7 +180,7 @@ class Machine(Record):
 
 # The keys of the machine, under "", and of each table, that an unknown one may be meant for.
 _KEYS = {
-    "": [*Machine.model_fields],
+    "": [*Machine.model_fields, "tolerance_angle"],
     "axes": [*Axis.model_fields],
     "fir": [*Fir.model_fields],
     "modes": [*Mode.model_fields],

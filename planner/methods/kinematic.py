@@ -73,7 +73,7 @@ class KinematicMethod(Method):
         job.note(*_curve_notes(job.toolpath, exact))
         with job.stage("solve"):
             chain = self._chain(job.toolpath, job.machine, exact)
-            motion = _motion(chain, job.toolpath.axes)
+            motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
         made = job.deliver(job.behind_filters(motion))
         with job.stage("report"):
             rounded = _corner_table(chain, job.machine)
@@ -177,13 +177,14 @@ def _slower_than_stops(chain: _Chain, toolpath: Toolpath, machine: Machine) -> A
     return np.repeat(lasting > np.add.reduceat(times, first[:-1]), np.diff(first))
 
 
-def _motion(chain: _Chain, axes: tuple[str, ...]) -> AxisMotion:
+def _motion(chain: _Chain, axes: tuple[str, ...], radius: float) -> AxisMotion:
     """The pieces of legs and corners, along the axes."""
     pieces = corner_pieces(chain.passage, chain.legs, chain.path, chain.lines.dwell[chain.path.first])
     position, velocity, acceleration, jerk = along_axes(pieces, chain.path, chain.lines)
     end = np.cumsum(pieces.rows.duration)
     return AxisMotion(
         axes=axes,
+        radius=radius,
         t=np.insert(end[:-1], 0, 0.0),
         position=position,
         velocity=velocity,

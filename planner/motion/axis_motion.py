@@ -60,6 +60,7 @@ class AxisMotion:
     block        : (L,) index of the program's block
     line         : (L,) source line of that block
     end          : end of the last piece [s]
+    radius       : at which the angles of rotary axes are lengths [mm]
     """
 
     axes: tuple[str, ...]
@@ -71,6 +72,7 @@ class AxisMotion:
     block: Array
     line: Array
     end: float
+    radius: float = 1.0
 
     def __post_init__(self) -> None:
         pieces, axes = len(self.t), len(self.axes)
@@ -108,6 +110,7 @@ class AxisMotion:
         columns, s, feed, piece = _sample(pieces, times)
         return Trajectory(
             axes=self.axes,
+            radius=self.radius,
             dt=dt,
             t=times,
             position=columns[0],
@@ -135,6 +138,7 @@ class AxisMotion:
         segment = np.maximum(before - 1, 0)
         return AxisMotion(
             axes=self.axes,
+            radius=self.radius,
             t=np.insert(self.t + later, before, (self.t + later)[before] - by),
             block=np.insert(self.block, before, self.block[segment]),
             line=np.insert(self.line, before, self.line[segment]),

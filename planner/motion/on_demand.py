@@ -36,8 +36,10 @@ class TrajectoryOnDemand(Trajectory):
         return Trajectory(**fields) if "position" in fields else super().__new__(cls)
 
     def __init__(self, motion: _AnyMotion, dt: float, count: int, places: _Places | None = None):
+        first = motion.at(np.zeros(1), dt)
         values = {
-            "axes": motion.at(np.zeros(1), dt).axes,
+            "axes": first.axes,
+            "radius": first.radius,
             "dt": dt,
             "_motion": motion,
             "_count": count,

@@ -24,7 +24,7 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
 from planner.base.kernels import njit
 from planner.base.units import RAD_PER_DEG
-from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 
 HYSTERESIS = 0.05  # H [pulses]; the rounding of coordinates is 1e-10 of a pulse
@@ -148,22 +148,23 @@ def _check(trajectory: Trajectory, steps: dict[str, float]) -> None:
     for k, axis in enumerate(trajectory.axes):
         moved = float(np.abs(np.diff(trajectory.position[:, k])).sum())
         if axis in steps:
-            total += moved * _resolution(axis, steps[axis])
+            total += moved * _resolution(axis, steps[axis], trajectory.radius)
         elif moved > 0:
-            unit = "mm" if axis in LINEAR_AXES else "rad"
+            unit = "degrees" if axis in ROTARY_AXES else "mm"
+            moved *= trajectory.in_degrees[k]
             raise InputError(f"steps: axis {axis} moves by {moved:.6g} {unit} in all; give its steps too")
     if total > PULSES_MAX:
         raise InputError(f"steps: {total:.3g} pulses; at most {PULSES_MAX:.0e} are made: split the program")
 
 
-def _resolution(axis: str, steps: float) -> float:
-    """Pulses per mm or rad."""
-    return steps / RAD_PER_DEG if axis in ROTARY_AXES else steps
+def _resolution(axis: str, steps: float, radius: float) -> float:
+    """Pulses per mm, of rotary axes at a radius [mm]."""
+    return steps / (radius * RAD_PER_DEG) if axis in ROTARY_AXES else steps
 
 
 def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
     """The pulses of axis k."""
-    K = _resolution(trajectory.axes[k], steps)
+    K = _resolution(trajectory.axes[k], steps, trajectory.radius)
     place = K * (trajectory.position[:, k] - trajectory.position[0, k])
     rate = K * trajectory.velocity[:, k]
     per_period, number = np.zeros(len(trajectory) - 1, np.int64), np.zeros(len(trajectory) - 1, np.int64)

@@ -107,7 +107,13 @@ class ShapedMotion:
         at_mean = self._copy(times - self.shaper.middle, dt)
         base = self._ends[0]
         return Trajectory(
-            axes=base.axes, dt=dt, t=times, block=at_mean["block"], line=at_mean["line"], **means
+            axes=base.axes,
+            radius=base.radius,
+            dt=dt,
+            t=times,
+            block=at_mean["block"],
+            line=at_mean["line"],
+            **means,
         )
 
     def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:

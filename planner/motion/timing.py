@@ -173,6 +173,7 @@ def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
     return Trajectory(
         axes=toolpath.axes,
+        radius=toolpath.radius,
         dt=dt,
         t=times,
         block=toolpath.block[segment],

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.units import RAD_PER_DEG
+from planner.machine import ROTARY_AXES
 
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
 
@@ -21,7 +23,7 @@ class Trajectory:
     axes         : axis letters
     dt           : interpolation period [s]
     t            : (T,) time [s], strictly increasing, t[0] = 0
-    position     : (T, A) [mm]; rotary axes here and below in rad
+    position     : (T, A) [mm]; rotary axes here and below in angles times `radius`
     velocity     : (T, A) [mm/s]
     acceleration : (T, A) [mm/s2]; where it jumps, the value after the jump
     jerk         : (T, A) [mm/s3]; where it jumps, the value after the jump
@@ -29,6 +31,7 @@ class Trajectory:
     feed         : (T,) ds/dt [mm/s]
     block        : (T,) index of the block of the program
     line         : (T,) NC line of that block
+    radius       : at which the angles of rotary axes are lengths [mm]; at 1 mm they are in rad
     extruder     : (T, 4) place [mm of filament], velocity, acceleration and jerk of the extruder; (0, 4) without one
     """
 
@@ -43,6 +46,7 @@ class Trajectory:
     feed: FloatArray
     block: Array
     line: Array
+    radius: float = 1.0
     extruder: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
     def __post_init__(self) -> None:
@@ -72,6 +76,11 @@ class Trajectory:
         """Duration of the motion [s]."""
         return float(self.t[-1] - self.t[0])
 
+    @property
+    def in_degrees(self) -> FloatArray:
+        """(A,) what turns positions and their derivatives into mm and degrees."""
+        return in_degrees(self.axes, self.radius)
+
     def chunks(self) -> Iterator[Trajectory]:
         """All samples in order, one part after the other. What goes through a long motion takes its parts, so that only one of them
         has to be in memory (motion/on_demand.py)."""
@@ -89,6 +98,11 @@ class Trajectory:
     def first_not_before(self, times: FloatArray) -> Array:
         """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
         return np.asarray(np.searchsorted(self.t, times))
+
+
+def in_degrees(axes: tuple[str, ...], radius: float) -> FloatArray:
+    """(A,) what turns lengths, and angles times `radius` [mm], into mm and degrees."""
+    return np.array([1.0 / (radius * RAD_PER_DEG) if axis in ROTARY_AXES else 1.0 for axis in axes])
 
 
 def joined(chunks: list[Trajectory]) -> Trajectory:

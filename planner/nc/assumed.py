@@ -21,7 +21,7 @@ from planner.nc.reading import IGNORE, Reading
 from planner.nc.settings import EXTRUDER_ZERO
 
 # How a letter is treated whatever stands beside it, in `Assumed.treatment`.
-READ, REFUSED, LEFT_OUT, PARKED = range(4)
+READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
 
 LEFT_OUT_BY_USER = Assumption("word", "words", "left out with what belongs to them, as --ignore says")
 
@@ -36,14 +36,14 @@ class _Counted:
 class Assumed:
     """What was assumed so far in one program.
 
-    treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT` or `PARKED` by letter
+    treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
     moved     : letters of axes that are not planned and were refused, because they move
     printer   : the program is one for a 3-D printer: it has M82 or M83
     follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
     """
 
-    def __init__(self, reading: Reading, *, extruder: bool = False):
+    def __init__(self, reading: Reading, axes: str = "", *, extruder: bool = False):
         self.reading = reading
         self.follows = extruder and reading.extruder != IGNORE
         self.strict = reading.strict
@@ -51,7 +51,7 @@ class Assumed:
         self.parked = np.full(256, np.nan)
         self.treatment = np.full(256, READ, dtype=np.uint8)
         for letter in LETTERS_REFUSED:
-            self.treatment[ord(letter)] = self._treatment(letter)
+            self.treatment[ord(letter)] = AXIS if letter in axes else self._treatment(letter)
         self._counted: dict[Assumption, _Counted] = {}
         self.moved: set[str] = set()
         self._used: dict[str, int] = {}
@@ -96,15 +96,14 @@ class Assumed:
     def count_letters(self, words: Words, rows: int) -> None:
         """Count the words of letters that were left out or parked in the first `rows` rows of a chunk."""
         letter = words.letter[: words.first[rows]]
-        times = np.bincount(letter, minlength=256)
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
-            times[code] -= self._used.pop(chr(code), 0)
+            times = int(np.count_nonzero(letter == code)) - self._used.pop(chr(code), 0)
             if chr(code) == "E" and self.follows:
                 continue
-            if times[code] > 0 and chr(code) not in self.moved:
+            if times > 0 and chr(code) not in self.moved:
                 word = int(np.argmax(letter == code))
                 line = int(words.line[words.row(word)])
-                self.count(self._of_letter(chr(code)), words.text(word), line, int(times[code]))
+                self.count(self._of_letter(chr(code)), words.text(word), line, times)
 
     def _of_letter(self, letter: str) -> Assumption:
         if self.treatment[ord(letter)] == PARKED:

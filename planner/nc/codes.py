@@ -91,7 +91,7 @@ M_GROUP: dict[int, str] = {
 }
 
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
-_POST = "choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
+_POST = "give the machine a table of this axis, or choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
 _PROBE = Refusal(
     "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
 )

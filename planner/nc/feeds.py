@@ -47,6 +47,7 @@ def set_feed(state: State, block: Block, note: Note) -> None:
         )
     if mode == "inverse time":
         return
+    state.feed_unit = state.unit
     if mode == "per minute":
         state.feed = feed * state.unit / SECONDS_PER_MINUTE
     else:
@@ -64,7 +65,7 @@ def take_default(state: State, default: float | None, block: Block, note: Note) 
     """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
     if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
         return
-    state.feed = default
+    state.feed, state.feed_unit = default, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
     note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 
@@ -135,4 +136,5 @@ def surface_parts(state: State, start: float, end: float) -> list[float]:
 def feed_of_time(state: State, block: Block, length: float) -> None:
     """Under G93 the feed of a block of this length [mm]."""
     if state.feed_mode == "inverse time":
+        state.feed_unit = state.unit
         state.feed = max(length * block.value["F"], _SLOWEST * state.unit) / SECONDS_PER_MINUTE

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, moves
+from planner.nc import codes, further_moves, moves
 from planner.nc.block import Block
 from planner.nc.program import Kind
 from planner.nc.state import State
@@ -25,12 +25,15 @@ def go_home(state: State, store: Store, block: Block, note: Note) -> None:
         state.actual = None
         store.add(Kind.RAPID, block.line, state)
     home = state.homes.get(code, np.zeros(3))
-    if not block.has("XYZ"):
+    everything = not block.has(state.letters)
+    if everything:
         state.position[:] = home
     else:
         state.position[:] = moves.target(state, block)
+        further_moves.move(state, block)
         store.add(Kind.RAPID, block.line, state)
         state.position[:] = _some_axes(state, block, home)
+    further_moves.go_home(state, block, code, everything=everything)
     store.add(Kind.RAPID, block.line, state)
 
 

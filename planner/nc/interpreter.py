@@ -45,8 +45,13 @@ class Interpreter:
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.setup = Setup.of(machine)
-        self.assumed = Assumed(reading, extruder=machine is not None and EXTRUDER in machine.axes)
-        self.mover = Mover(self.setup.start(), Store(), self.assumed, self.setup.feed_default, self.note)
+        state = self.setup.start()
+        state.further.letters = "".join(c for c in state.further.letters if c not in reading.ignore)
+        self.assumed = Assumed(
+            reading, state.further.letters, extruder=machine is not None and EXTRUDER in machine.axes
+        )
+        store = Store(len(state.further.letters))
+        self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.note)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
@@ -80,7 +85,7 @@ class Interpreter:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
         self._end_compensation()
-        return self.store.finish(self.source, self.notes, frames, self.reading)
+        return self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
 
     def go_on_with(self, state: State, store: Store) -> None:
         """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
@@ -266,6 +271,8 @@ class Interpreter:
     def _check_parked(self, block: Block) -> None:
         """Report words of axes that are not planned and would move."""
         for letter in codes.PARKABLE:
+            if letter in self.state.further.letters:
+                continue
             if letter in block.value and not self.assumed.may_stand(
                 letter, block.value[letter], absolute=self.state.absolute
             ):

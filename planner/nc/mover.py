@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, compensation, drilling, feeds, moves, threads
+from planner.nc import codes, compensation, drilling, feeds, further_moves, moves, threads
 from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block
 from planner.nc.cutter import Cutter
@@ -19,6 +19,7 @@ from planner.nc.store import Store
 
 # G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
 COVET_AXES = (100, 280, 300, 520, 920)
+NOWHERE = np.zeros(0)  # where further axes stand that the machine does not have
 _WHY_NO_MOTION = {
     NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
     REFUSED_MOTION: "an axis word under a motion code that is not supported",
@@ -82,14 +83,17 @@ class Mover:
         """A block with a motion code in force, and somewhere to go."""
         state = self.state
         if state.motion < 0:
-            raise WordFault(block.first_of("XYZ"), _WHY_NO_MOTION[state.motion])
+            raise WordFault(block.first_of(state.letters), _WHY_NO_MOTION[state.motion])
         self._take_default_feed(block)
         if state.motion not in codes.CYCLES:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
             threads.stop(state, self.store, block.line)
         if self.cutter is not None:
+            further_moves.refuse(state, block, "under cutter radius compensation")
             compensation.check_motion(state, block)
+        if state.motion > 3:
+            further_moves.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
             threads.thread(state, self.store, block, self.note)
         elif state.motion == codes.THREADING:
@@ -106,11 +110,15 @@ class Mover:
         """G0, G1."""
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
+        begin = state.further.position.copy() if state.further.letters else NOWHERE
+        further_moves.move(state, block)
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
         if kind == Kind.LINE:
             feeds.check_feed(state, block)
-            feeds.feed_of_time(state, block, float(np.linalg.norm(target - state.position)))
+            length = float(np.linalg.norm(target - state.position))
+            feeds.feed_of_time(state, block, further_moves.length_moved(state, begin, length))
         if kind == Kind.LINE and feeds.on_surface(state):
+            further_moves.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
             state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
             if cutter is None:
@@ -138,6 +146,7 @@ class Mover:
         """G2, G3."""
         state = self.state
         target = moves.target(state, block)
+        further_moves.move(state, block)
         feeds.check_feed(state, block)
         if self.cutter is None and state.actual is not None:
             raise WordFault(
@@ -163,6 +172,7 @@ class Mover:
         state = self.state
         if not is_spline_line(block):
             return
+        further_moves.refuse(state, block, "on a spline")
         if self.cutter is not None:
             raise WordFault(
                 block.motion_word(), "a spline under cutter radius compensation; write G40 before it"

@@ -50,7 +50,7 @@ class ArcFault(WordFault):
 def is_move(state: State, block: Block) -> bool:
     """Whether the block moves. A motion code alone does not, except for an arc, which then lacks its words."""
     arc = state.motion in (2, 3) and ("motion" in block.g or block.has("IJKR"))
-    return arc or block.has("XYZ")
+    return arc or block.has(state.letters)
 
 
 def coordinate(state: State, block: Block, axis: int) -> float:
@@ -181,7 +181,7 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
 
 def check_machine_coordinates(state: State, block: Block) -> None:
     """G53 goes with G0 and G1, and with absolute coordinates. Raises WordFault."""
-    if state.motion not in (0, 1) or not ("motion" in block.g or block.has("XYZ")):
+    if state.motion not in (0, 1) or not ("motion" in block.g or block.has(state.letters)):
         raise WordFault(block.at["one-shot"], "G53 goes with G0 or G1 only; write G53 G0 or G53 G1")
     if not state.absolute:
         raise WordFault(block.at["one-shot"], "G53 goes with absolute coordinates only; write G90 before it")

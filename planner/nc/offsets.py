@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes
+from planner.nc import codes, further_moves
 from planner.nc.block import Block
 from planner.nc.moves import WordFault, coordinate, integer
 from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, State, System, Tool
@@ -34,6 +34,8 @@ _FIXTURE = 593  # the system of G10 L11
 def set_tool_offset(state: State, block: Block, note: Note) -> None:
     """G43, G43.1, G43.2, G49. Raises WordFault for words that contradict each other."""
     code = block.g["tool length"]
+    if code in (431, 432) and "motion" not in block.g:
+        further_moves.refuse(state, block, "of a tool offset")
     if code == 490:
         state.tool_offset = np.zeros(3)
     elif code == 431:
@@ -69,6 +71,7 @@ def system_of(block: Block) -> int:
 def store_position(state: State, code: int) -> None:
     """G28.1, G30.1: where the machine stands becomes the position of G28 or G30."""
     state.homes[code - 1] = state.position.copy()
+    state.further.homes[code - 1] = state.further.position.copy()
 
 
 def shift_origin(state: State, block: Block) -> None:
@@ -78,7 +81,7 @@ def shift_origin(state: State, block: Block) -> None:
     """
     code = block.g["one-shot"]
     if code in (520, 920):
-        if not block.has("XYZ"):
+        if not block.has(state.letters):
             what = "the coordinates to give to this place" if code == 920 else "the offsets to set"
             raise WordFault(
                 block.at["one-shot"], f"G{codes.number(code)} needs at least one of X, Y and Z: {what}"
@@ -92,6 +95,7 @@ def shift_origin(state: State, block: Block) -> None:
         state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
         if code == 921:
             state.g92_saved = np.zeros(3)
+    further_moves.shift_origin(state, block, code)
     state.apply_offsets()
 
 
@@ -130,6 +134,7 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
         system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
+    further_moves.set_system(state, block, code, from_place=kind == 20)
 
 
 def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
@@ -147,9 +152,11 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     code = FURTHER_SYSTEMS + number if kind == 20 else _SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
+    further_moves.set_system(state, block, code, from_place=False)
 
 
 def _set_tool(state: State, block: Block, kind: int, note: Note) -> None:
+    further_moves.refuse(state, block, "of a tool offset")
     if "P" not in block.value:
         raise WordFault(block.at["one-shot"], f"G10 L{kind} needs its tool as a P word")
     number = integer(block, "P", 1)

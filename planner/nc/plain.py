@@ -14,9 +14,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.base.units import SECONDS_PER_MINUTE
-from planner.nc.assumed import LEFT_OUT, PARKED, REFUSED, Assumed
+from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
+from planner.nc.assumed import AXIS, LEFT_OUT, PARKED, REFUSED, Assumed
 from planner.nc.block import NUMBER_MAX
+from planner.nc.further import LETTERS, ROTARY
 from planner.nc.lexer import Words
 from planner.nc.program import Kind
 from planner.nc.state import State
@@ -45,6 +46,10 @@ class _Fixed(NamedTuple):
     path_control: int
     tolerance: float
     offset: FloatArray
+    column: Array  # (256,) place of a letter among the F further axes
+    rotary: Array  # (F,) True for rotary ones
+    further_offset: FloatArray  # (F,) in degrees and mm
+    wrapped: Array  # (F,) True for wrapped ones
 
 
 class _Others(NamedTuple):
@@ -63,6 +68,7 @@ class _Counts(NamedTuple):
     refusals: int
     motion: int
     feed: float
+    feed_unit: float  # mm per programmed unit when it was given
 
 
 def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assumed) -> int:
@@ -70,31 +76,64 @@ def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assum
     if not state.is_plain:
         return row
     rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
-    fixed = _Fixed(state.absolute, state.unit, int(state.path_control), state.tolerance, state.offset)
-    begin = _Counts(row, store.blocks, store.events, store.refusals, state.motion, state.feed)
+    further = state.further
+    columns = further.columns
+    place = further.position[columns]
+    fixed = _Fixed(
+        state.absolute,
+        state.unit,
+        int(state.path_control),
+        state.tolerance,
+        state.offset,
+        *_of_further(state),
+    )
+    begin = _Counts(
+        row, store.blocks, store.events, store.refusals, state.motion, state.feed, state.feed_unit
+    )
     others = _Others(assumed.treatment, assumed.parked)
-    end = _run(rows, begin, fixed, state.position, store.block, store.event, store.refused_word, others)
+    end = _run(
+        rows, begin, fixed, state.position, place, store.block, store.event, store.refused_word, others
+    )
+    further.position[columns] = place
     if end.blocks > begin.blocks:
         state.series = None
     if end.events > begin.events:
         state.spindle.speed = float(store.event.value[end.events - 1])  # plain rows have no other events
     store.blocks, store.events, store.refusals = end.blocks, end.events, end.refusals
-    state.motion, state.feed = end.motion, end.feed
+    state.motion, state.feed, state.feed_unit = end.motion, end.feed, end.feed_unit
     return int(end.row)
 
 
+def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
+    """The last four fields of `_Fixed`."""
+    further = state.further
+    column = np.zeros(256, dtype=np.int64)
+    for k, letter in enumerate(further.letters):
+        column[ord(letter)] = k
+    columns = further.columns
+    return (
+        column,
+        np.array([k < ROTARY for k in columns], dtype=np.bool_),
+        further.offset(state.system)[columns],
+        np.array([state.absolute and LETTERS[k] in further.wrapped for k in columns], dtype=np.bool_),
+    )
+
+
 @njit(cache=True)
-def _run(rows, begin, fixed, position, block, event, refused_word, others):  # pragma: no cover - compiled
+def _run(
+    rows, begin, fixed, position, place, block, event, refused_word, others
+):  # pragma: no cover - compiled
     """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
     letter, value, line, first, frame = rows
-    absolute, unit, path_control, tolerance, offset = fixed
+    absolute, unit, path_control, tolerance, offset, column, rotary, further_offset, wrapped = fixed
     treatment, parked = others
-    row, blocks, events, refusals, motion, feed = begin
-    given = np.empty(3)
+    row, blocks, events, refusals, motion, feed, feed_unit = begin
+    given, turned = np.empty(3), np.empty(len(place))
     while row < len(line):
         code, new_feed, speed, moves, is_plain = -1, -1.0, -1.0, False, True
         for axis in range(3):
             given[axis] = np.nan
+        turned[:] = np.nan
         refused = refusals
         for word in range(first[row], first[row + 1]):
             c, v = letter[word], value[word]
@@ -107,6 +146,10 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
                 new_feed = v
             elif c == _S and speed < 0 and 0 <= v <= NUMBER_MAX:
                 speed = v
+            elif treatment[c] == AXIS and np.isnan(turned[column[c]]) and abs(v) <= NUMBER_MAX:
+                turned[column[c]] = v
+                moves = True
+                is_plain &= not wrapped[column[c]]
             elif treatment[c] == PARKED:
                 if absolute and np.isnan(parked[c]):
                     parked[c] = v
@@ -129,24 +172,40 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
         if not is_plain or (moves and (code < 0 or code > 1 or (code == 1 and new_feed == 0.0))):
             break
 
+        if new_feed != feed:
+            feed_unit = unit
         motion, feed, refusals = code, new_feed, refused
         if speed >= 0:
             event.block[events], event.line[events] = blocks, line[row]
             event.letter[events], event.value[events] = _S, speed
             events += 1
         if moves:
+            rests = len(place) > 0  # all linear axes
             for axis in range(3):
+                before = position[axis]
                 if not np.isnan(given[axis]):
                     step = given[axis] * unit
                     position[axis] = step + (offset[axis] if absolute else position[axis])
+                rests &= position[axis] == before
+            turns = False
+            for k in range(len(place)):
+                before = place[k]
+                if not np.isnan(turned[k]):
+                    step = turned[k] * (1.0 if rotary[k] else unit)
+                    place[k] = step + (further_offset[k] if absolute else place[k])
+                rests &= rotary[k] or place[k] == before
+                turns |= place[k] != before
+                block.further[blocks, k] = place[k]
             block.kind[blocks] = _LINE if motion == 1 else _RAPID
             for axis in range(3):  # a slice assignment costs 3 s of compilation for its error message
                 block.end[blocks, axis] = position[axis]
             block.feed[blocks] = feed if motion == 1 else np.inf
+            if motion == 1 and rests and turns:
+                block.feed[blocks] = feed / feed_unit * RAD_PER_DEG
             block.line[blocks] = line[row]
             block.path_control[blocks] = path_control
             block.tolerance[blocks] = tolerance
             block.frame[blocks] = frame[row]
             blocks += 1
         row += 1
-    return _Counts(row, blocks, events, refusals, motion, feed)
+    return _Counts(row, blocks, events, refusals, motion, feed, feed_unit)

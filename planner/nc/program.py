@@ -123,11 +123,12 @@ class Program:
     """An NC program: B blocks over A axes.
 
     source       : name of the file, for messages
-    axes         : axis letters, ("x", "y", "z")
+    axes         : axis letters, x, y, z first; rotary ones (a, b, c) are in rad here and below
     start        : (A,) machine position before the first block [mm]
     kind         : (B,) `Kind`
     end          : (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
-    feed         : (B,) programmed feed [mm/s]; inf for RAPID, DWELL, and STOP without an extruder
+    feed         : (B,) programmed feed [mm/s]: the speed of x, y and z together, where they stand that of u, v and w, where those stand
+                   too that of the rotary axes [rad/s]; inf for RAPID, DWELL, and STOP without an extruder
     dwell        : (B,) standstill [s], > 0 for DWELL only
     line         : (B,) source line, from 1
     path_control : (B,) `PathControl` in force at the end of the block

@@ -17,6 +17,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.units import MM_PER_INCH
 from planner.machine import LINEAR_AXES, Machine
+from planner.nc.further import Further, further_of
 from planner.nc.program import PathControl
 
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
@@ -93,6 +94,7 @@ class State:
     diameters    : X words are diameters (G7)
     feed         : [mm/s], 0 where none has been given
     feed_per_turn : F of G95 [mm]
+    feed_unit    : mm per programmed length unit when the feed was given
     tolerance    : P of G64 [mm], NaN where none
     position     : (3,) machine position [mm]
     offset       : (3,) machine position of the programmed zero, without rotation [mm]
@@ -110,6 +112,7 @@ class State:
     strict       : nothing is assumed (`Reading.strict`)
     fanuc        : G10 L2 and L20 are those of Fanuc and Haas
     in_thread    : the last block was cut in step with the spindle
+    further      : axes beside x, y and z
     """
 
     motion: int = NO_MOTION
@@ -121,6 +124,7 @@ class State:
     feed: float = 0.0
     feed_mode: FeedMode = "per minute"
     feed_per_turn: float = 0.0
+    feed_unit: float = 1.0
     spindle: Spindle = field(default_factory=Spindle)
     path_control: PathControl = PathControl.BLEND
     tolerance: float = np.nan
@@ -144,6 +148,12 @@ class State:
     in_thread: bool = False
     strict: bool = False
     fanuc: bool = False
+    further: Further = field(default_factory=Further)
+
+    @property
+    def letters(self) -> str:
+        """Letters of the axes."""
+        return "XYZ" + self.further.letters
 
     @property
     def place(self) -> FloatArray:
@@ -196,6 +206,7 @@ class Setup:
     positions: dict[int, FloatArray] = field(default_factory=dict)
     tools: dict[int, Tool] = field(default_factory=dict)
     feed_default: float | None = None
+    machine: Machine | None = None
 
     @classmethod
     def of(cls, machine: Machine | None) -> Setup:
@@ -207,6 +218,7 @@ class Setup:
             systems={system_code(name): _vector(given) for name, given in machine.work_offsets.items()},
             positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
             feed_default=machine.feed_default,
+            machine=machine,
             tools={
                 int(number): Tool(np.array([tool.x, 0.0, tool.length]), tool.diameter)
                 for number, tool in machine.tools.items()
@@ -220,6 +232,7 @@ class Setup:
             systems={code: System(origin) for code, origin in self.systems.items()},
             homes=dict(self.positions),
             tools=dict(self.tools),
+            further=further_of(self.machine, system_code),
         )
         state.apply_offsets()
         return state

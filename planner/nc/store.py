@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.units import RAD_PER_DEG
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
+from planner.nc.further import LETTERS, ROTARY, rotary_feed
 from planner.nc.program import FEED_MOVES, Frame, Kind, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
@@ -21,6 +23,7 @@ class BlockColumns(NamedTuple):
 
     kind: Array  # uint8
     end: FloatArray  # (., 3)
+    further: FloatArray  # (., F) of the further axes that are read, in degrees and mm
     feed: FloatArray
     line: Array  # int32
     path_control: Array  # uint8
@@ -28,11 +31,12 @@ class BlockColumns(NamedTuple):
     frame: Array  # int32
 
     @classmethod
-    def of_size(cls, rows: int) -> BlockColumns:
-        """Room for so many blocks."""
+    def of_size(cls, rows: int, further: int) -> BlockColumns:
+        """Room for so many blocks with so many further axes."""
         return cls(
             kind=np.empty(rows, dtype=np.uint8),
             end=np.empty((rows, 3)),
+            further=np.empty((rows, further)),
             feed=np.empty(rows),
             line=np.empty(rows, dtype=np.int32),
             path_control=np.empty(rows, dtype=np.uint8),
@@ -67,12 +71,12 @@ class Store:
     The compiled loop over plain rows writes into the columns directly and sets the counts.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, further: int = 0) -> None:
         self.blocks = 0
         self.events = 0
         self.refusals = 0
         self.frame = 0
-        self.block = BlockColumns.of_size(0)
+        self.block = BlockColumns.of_size(0, further)
         self.event = EventColumns.of_size(0)
         self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
@@ -98,11 +102,25 @@ class Store:
         block.kind[k] = kind
         block.end[k] = state.place
         block.feed[k] = state.feed if kind in FEED_MOVES else np.inf
+        if block.further.shape[1]:
+            self._add_further(kind, state)
         block.line[k] = line
         block.path_control[k] = state.path_control
         block.tolerance[k] = state.tolerance
         block.frame[k] = self.frame
         self.blocks += 1
+
+    def _add_further(self, kind: Kind, state: State) -> None:
+        """The further axes of the block that is being added; its feed, if none of them and of x, y, z is linear and moves."""
+        block, k, columns = self.block, self.blocks, state.further.columns
+        block.further[k] = state.further.position[columns]
+        if kind != Kind.LINE:
+            return
+        begin = (block.end[k - 1], block.further[k - 1]) if k else (np.zeros(3), np.zeros(len(columns)))
+        linear = np.array(columns) >= ROTARY
+        turned = block.further[k] != begin[1]
+        if turned.any() and not turned[linear].any() and (block.end[k] == begin[0]).all():
+            block.feed[k] = rotary_feed(state.feed, state.feed_unit)
 
     def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
         """Append an arc about a normal axis that ends where the tool is."""
@@ -129,23 +147,40 @@ class Store:
         event.value[k] = value
         self.events += 1
 
+    def _spline_points(self, further: FloatArray) -> FloatArray:
+        """(K, 4, A) control points of the splines, along which the further axes (B, F) stand still."""
+        points = np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3)
+        if not further.shape[1]:
+            return points
+        still = further[np.array([spline[0] for spline in self.splines], dtype=np.int64)]
+        return np.concatenate([points, np.repeat(still[:, None], 4, axis=1)], axis=2)
+
     def finish(
-        self, source: str, notes: Sequence[str], frames: Sequence[Frame] = (), reading: Reading = AS_USUAL
+        self,
+        source: str,
+        notes: Sequence[str],
+        frames: Sequence[Frame] = (),
+        reading: Reading = AS_USUAL,
+        further: str = "",
     ) -> Program:
         """The program read so far; the arrays are cut to size, so that the spare room is given back.
 
-        frames : the calls that the blocks stand in, for an expanded program
+        frames  : the calls that the blocks stand in, for an expanded program
+        further : letters of the further axes that are read; those that move become axes of the program, rotary ones in rad
         """
         used, seen = slice(0, self.blocks), slice(0, self.events)
         dwell = np.zeros(self.blocks)
         for block, seconds in self.dwells:
             dwell[block] = seconds
+        names = [c for k, c in enumerate(further) if self.block.further[used, k].any()]
+        units = [RAD_PER_DEG if LETTERS.index(c) < ROTARY else 1.0 for c in names]
+        moved = self.block.further[used][:, [further.index(c) for c in names]] * np.array(units)
         return Program(
             source=source,
-            axes=LINEAR_AXES,
-            start=np.zeros(3),
+            axes=LINEAR_AXES + tuple(letter.lower() for letter in names),
+            start=np.zeros(3 + len(names)),
             kind=self.block.kind[used].copy(),
-            end=self.block.end[used].copy(),
+            end=np.hstack([self.block.end[used], moved]),
             feed=self.block.feed[used].copy(),
             dwell=dwell,
             line=self.block.line[used].copy(),
@@ -153,12 +188,12 @@ class Store:
             tolerance=self.block.tolerance[used].copy(),
             synchronised=np.array(self.synchronised, dtype=np.int64),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
-            arc_center=np.array([arc[1] for arc in self.arcs]).reshape(-1, 3),
+            arc_center=_padded(np.array([arc[1] for arc in self.arcs]).reshape(-1, 3), len(names)),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
             splines=SplineTable(
                 block=np.array([spline[0] for spline in self.splines], dtype=np.int64),
-                points=np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3),
+                points=self._spline_points(moved),
                 weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),
             ),
             events=EventTable(
@@ -172,6 +207,11 @@ class Store:
             frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
             frames=tuple(frames),
         )
+
+
+def _padded(points: FloatArray, further: int) -> FloatArray:
+    """Points (n, 3) with zeros for so many further axes."""
+    return np.pad(points, ((0, 0), (0, further))) if further else points
 
 
 def _grown(array: Array, needed: int) -> Array:

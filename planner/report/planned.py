@@ -14,6 +14,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.geometry.build import path_per_length
+from planner.geometry.toolpath import Toolpath
+from planner.machine import LINEAR_AXES
 from planner.nc.dialects import is_plotter_file
 from planner.nc.points import are_points
 from planner.nc.program import Program
@@ -58,7 +61,7 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
     planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
-    feeds = feeds_of(planned, plan.toolpath, plan.machine, len(plan.program))
+    feeds = _as_programmed(feeds_of(planned, plan.toolpath, plan.machine, len(plan.program)), plan.toolpath)
     if is_plotter_file(data, plan.program.source):
         text = _written_anew(plan, feeds)
     elif plan.program.expansion is not None:
@@ -71,6 +74,16 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     if plan.program.expansion is not None:
         notes.insert(0, "planned.ngc is the expanded program: parameters, loops and calls are written out")
     return text, notes
+
+
+def _as_programmed(feeds: FloatArray, toolpath: Toolpath) -> FloatArray:
+    """Feeds (B,) along the path in all axes as F words have them: of the linear part."""
+    if set(toolpath.axes) <= set(LINEAR_AXES):
+        return feeds
+    found = feeds.copy()
+    per = path_per_length(toolpath.axes, toolpath.radius, toolpath)
+    found[toolpath.block] = feeds[toolpath.block] / per
+    return found
 
 
 def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:

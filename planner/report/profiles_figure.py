@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.units import RAD_PER_DEG
-from planner.machine import LINEAR_AXES
+from planner.machine import ROTARY_AXES
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -65,8 +64,8 @@ def profiles_figure(plan: Plan) -> Figure:
         limits = plan.machine.limits(quantity, trajectory.axes)
         for k in moving:
             axis = trajectory.axes[k]
-            rotary = axis not in LINEAR_AXES
-            per = 1.0 / RAD_PER_DEG if rotary else 1e-3
+            rotary = axis in ROTARY_AXES
+            per = float(trajectory.in_degrees[k]) if rotary else 1e-3
             panel = next(row)
             draw_profile(panel, t, values[:, k] * per, BLUE)
             length = "°" if rotary else "m"

@@ -234,8 +234,7 @@ def _ringing_text(mode: Ringing) -> str:
 
     def said(values: FloatArray) -> str:
         return ", ".join(
-            f"{axis} {value / MICROMETRE:.4g} µm" if axis in LINEAR_AXES else f"{axis} {1e6 * value:.4g} µrad"
-            for axis, value in zip(mode.axes, values, strict=True)
+            f"{axis} {value / MICROMETRE:.4g} µm" for axis, value in zip(mode.axes, values, strict=True)
         )
 
     return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"

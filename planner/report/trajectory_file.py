@@ -2,7 +2,7 @@
 
 A trajectory file is a table, one row per sample:
 
-    t [s], then per axis  x [mm] vx [mm/s] ax [mm/s2] jx [mm/s3]  (rotary axes in rad), s [mm], feed [mm/s],
+    t [s], then per axis  x [mm] vx [mm/s] ax [mm/s2] jx [mm/s3]  (rotary axes in degrees), s [mm], feed [mm/s],
     of an extruder  e [mm of filament] ve ae je,
     line (of the NC program), block (its index; several blocks can come from one line)
 
@@ -54,7 +54,7 @@ def units(axes: tuple[str, ...], *, extruder: bool = False) -> dict[str, str]:
     """The unit of every column, by its name; `extruder`: there are columns of one."""
     said = {"t": "s"}
     for axis in (*axes, EXTRUDER) if extruder else axes:
-        length = "rad" if axis in ROTARY_AXES else "mm"
+        length = "deg" if axis in ROTARY_AXES else "mm"
         for prefix, per in zip(("", "v", "a", "j"), ("", "/s", "/s2", "/s3"), strict=True):
             said[prefix + axis] = length + per
     return said | {"s": "mm", "feed": "mm/s", "line": "1", "block": "1"}
@@ -64,10 +64,13 @@ def trajectory_columns(trajectory: Trajectory) -> dict[str, Array]:
     """The columns of a trajectory file by their names, each (T,)."""
     columns: dict[str, Array] = {"t": trajectory.t}
     for k, axis in enumerate(trajectory.axes):
-        columns[axis] = trajectory.position[:, k]
-        columns["v" + axis] = trajectory.velocity[:, k]
-        columns["a" + axis] = trajectory.acceleration[:, k]
-        columns["j" + axis] = trajectory.jerk[:, k]
+        unit = trajectory.in_degrees[k] if axis in ROTARY_AXES else None
+        for prefix, values in zip(
+            ("", "v", "a", "j"),
+            (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.jerk),
+            strict=True,
+        ):
+            columns[prefix + axis] = values[:, k] if unit is None else values[:, k] * unit
     if len(trajectory.extruder):
         columns |= {
             prefix + EXTRUDER: trajectory.extruder[:, k] for k, prefix in enumerate(("", "v", "a", "j"))

@@ -21,7 +21,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.files import require_ending
-from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
+from planner.base.units import RAD_PER_DEG
+from planner.machine import ALL_AXES, EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.digits import on_grid, rounding
 from planner.verify.given import DERIVATIVES, Given
@@ -30,7 +31,7 @@ Format = Literal["parquet", "csv", "npz"]
 FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")
 CSV_METADATA = ".meta.json"  # takes the place of the suffix .csv
 KNOWN = {"t", "s", "feed", "line", "block"} | {
-    prefix + axis for prefix in ("", "v", "a", "j") for axis in (*LINEAR_AXES, *ROTARY_AXES, EXTRUDER)
+    prefix + axis for prefix in ("", "v", "a", "j") for axis in (*ALL_AXES, EXTRUDER)
 }
 # Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
 # are noise.
@@ -118,11 +119,7 @@ def _one_by_one(given: Mapping[str, Any]) -> dict[str, Any]:
     columns: dict[str, Any] = {}
     for name, column in given.items():
         letters = name.strip().lower()
-        if (
-            np.ndim(column) == 2
-            and np.shape(column)[1] == len(letters) > 1
-            and set(letters) <= {*LINEAR_AXES, *ROTARY_AXES}
-        ):
+        if np.ndim(column) == 2 and np.shape(column)[1] == len(letters) > 1 and set(letters) <= {*ALL_AXES}:
             columns |= {letter: column[:, k] for k, letter in enumerate(letters)}
         else:
             columns[name] = column
@@ -177,19 +174,20 @@ def _assemble(
     source: str, columns: dict[str, Array], found: tuple[str, ...]
 ) -> tuple[Trajectory, Given, tuple[str, ...]]:
     """The trajectory of the known columns; `found` are the names of all that the file has."""
-    axes = tuple(axis for axis in LINEAR_AXES + ROTARY_AXES if axis in columns)
+    axes = tuple(axis for axis in ALL_AXES if axis in columns)
     if "t" not in columns or not axes:
         missing = "column 't' is missing" if "t" not in columns else "there is no column of an axis"
         raise InputError(
             f"{missing}; found are {', '.join(found) or 'none'}; needed are t [s] and "
-            "the positions x, y, ... [mm, rotary axes rad]",
+            "the positions x, y, ... [mm, rotary axes degrees]",
             source=source,
         )
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         raise InputError(f"the columns differ in length: {lengths}", source=source)
     t, time_rounding, end_rounding, notes = _times(source, columns["t"])
-    levels = [np.stack([columns[axis] for axis in axes], axis=1).astype(np.float64)]
+    inside = np.array([RAD_PER_DEG if axis in ROTARY_AXES else 1.0 for axis in axes])  # at a radius of 1 mm
+    levels = [np.stack([columns[axis] for axis in axes], axis=1).astype(np.float64) * inside]
     order_of = [0]  # order of the last level that the file holds, to differentiate from
     for prefix, word in (("v", "velocity"), ("a", "acceleration"), ("j", "jerk")):
         lacking = [prefix + axis for axis in axes if prefix + axis not in columns]
@@ -199,9 +197,11 @@ def _assemble(
             notes.append(f"{word} derived from the {_LEVELS[order_of[-1]]} (no column {', '.join(lacking)})")
         else:
             order_of.append(len(levels))
-            levels.append(np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64))
+            levels.append(
+                np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64) * inside
+            )
     position, velocity, acceleration, jerk = levels
-    linear = [k for k, axis in enumerate(axes) if axis in LINEAR_AXES]
+    linear = [k for k, axis in enumerate(axes) if axis not in ROTARY_AXES]
     fill: dict[str, Callable[[], Array]] = {
         "s": lambda: np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position[:, linear], axis=0), axis=1))),
         "feed": lambda: np.linalg.norm(velocity[:, linear], axis=1),
@@ -210,7 +210,7 @@ def _assemble(
     }
     said = {"s": "length of the polyline", "feed": "speed of the axes", "line": "unknown", "block": "unknown"}
     notes += [f"{name}: {said[name]} (no column {name})" for name in fill if name not in columns]
-    rest = {name: columns[name] if name in columns else make() for name, make in fill.items()}
+    rest: dict[str, Any] = {name: columns[name] if name in columns else make() for name, make in fill.items()}
     trajectory = Trajectory(
         axes=axes,
         dt=float(np.median(np.diff(t))),
@@ -224,7 +224,7 @@ def _assemble(
     )
     delivered = Given(
         columns=tuple(DERIVATIVES[level - 1] for level in order_of[1:]),
-        position_rounding=tuple(rounding(columns[axis]) for axis in axes),
+        position_rounding=tuple(rounding(columns[axis]) * inside[k] for k, axis in enumerate(axes)),
         time_rounding=time_rounding,
         end_rounding=end_rounding,
         extruder_rounding=rounding(columns[EXTRUDER]) if EXTRUDER in columns else 0.0,

@@ -97,6 +97,7 @@ def _motion(toolpath: Toolpath, found: FoundRun, lo: int, hi: int) -> AxisMotion
     t = np.append(0.0, np.cumsum(np.append([before] * standing, steps.h[lo:hi])))
     return AxisMotion(
         axes=toolpath.axes,
+        radius=toolpath.radius,
         t=t[:-1],
         block=toolpath.block[segment],
         line=toolpath.line[segment],

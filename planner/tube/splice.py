@@ -94,6 +94,7 @@ class Spliced:
         names = ("position", "velocity", "acceleration", "jerk", "block", "line")
         return AxisMotion(
             axes=motions[0].axes,
+            radius=motions[0].radius,
             t=np.concatenate([begin + m.t for m, begin in zip(motions, self.begin, strict=False)]),
             end=self.end,
             **{name: np.concatenate([getattr(m, name) for m in motions]) for name in names},

@@ -9,6 +9,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
+from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.matching import STILL
@@ -25,6 +26,7 @@ def fit_axes(
     Raises InputError for an axis that the program moves and the trajectory lacks, and for one that the trajectory moves and the
     program does not have.
     """
+    trajectory, given = _at_radius(trajectory, given, toolpath.radius)
     if trajectory.axes == toolpath.axes:
         return trajectory, given, ()
     notes = []
@@ -61,6 +63,17 @@ def fit_axes(
         **{name: np.stack(column, axis=1) for name, column in columns.items()},  # type: ignore[arg-type]
     )
     return fitted, dataclasses.replace(given, position_rounding=rounding), tuple(notes)
+
+
+def _at_radius(trajectory: Trajectory, given: Given, radius: float) -> tuple[Trajectory, Given]:
+    """The trajectory with its angles as lengths at another radius [mm]."""
+    if trajectory.radius == radius or not set(trajectory.axes) & set(ROTARY_AXES):
+        return dataclasses.replace(trajectory, radius=radius), given
+    scale = np.array([radius / trajectory.radius if a in ROTARY_AXES else 1.0 for a in trajectory.axes])
+    columns = {name: getattr(trajectory, name) * scale for name in ("position", *DERIVATIVES)}
+    if len(given.position_rounding):
+        given = dataclasses.replace(given, position_rounding=np.asarray(given.position_rounding) * scale)
+    return dataclasses.replace(trajectory, radius=radius, **columns), given
 
 
 def _standing(toolpath: Toolpath, axis: int) -> float | None:

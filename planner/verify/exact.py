@@ -106,6 +106,9 @@ def _from_arc(toolpath: Toolpath, q: FloatArray, segment: int) -> FloatArray:
             slope = radius * rate * (cos * e2 - sin * e1) + drift
             bend = -radius * rate**2 * (cos * e1 + sin * e2)
             rise = np.einsum("na,na->n", slope, slope) + np.einsum("na,na->n", gap, bend)
-            x = np.clip(x - np.einsum("na,na->n", gap, slope) / rise, 0.0, length)
+            along = np.einsum(
+                "na,na->n", gap, slope
+            )  # at the centre all points are as near, and none is better
+            x = np.clip(x - np.divide(along, rise, out=np.zeros_like(along), where=rise != 0.0), 0.0, length)
         nearest = np.fmin(nearest, np.linalg.norm(gap, axis=1))
     return nearest

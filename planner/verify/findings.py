@@ -8,7 +8,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
-from planner.machine import LINEAR_AXES, Machine
+from planner.machine import ROTARY_AXES, Machine
+from planner.motion.trajectory import in_degrees
 from planner.verify import limits as rows
 from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
@@ -55,7 +56,7 @@ def limit_checks(
     """The worst of every limit, by name."""
     axes = toolpath.axes
     table = [
-        (f"{quantity}.{letter}", ("mm" if letter in LINEAR_AXES else "rad") + UNITS[quantity], row, limit)
+        (f"{quantity}.{letter}", ("deg" if letter in ROTARY_AXES else "mm") + UNITS[quantity], row, limit)
         for group, quantity in enumerate(QUANTITIES)
         for row, (letter, limit) in enumerate(
             zip(axes, machine.limits(quantity, axes), strict=True),  # type: ignore[arg-type]
@@ -114,14 +115,17 @@ def _limit_check(
     look = max(looks, key=lambda each: each.seen.worst[row, 0])
     ratio, value, limit_there, how = look.seen.worst[row]
     text = "differences of position" if how == rows.DIFFERENCE else "column"
+    degrees = in_degrees(toolpath.axes, toolpath.radius)
+    letter = name.rpartition(".")[2]
+    per = float(degrees[toolpath.axes.index(letter)]) if letter in toolpath.axes else 1.0
     return LimitCheck(
         name=name,
         unit=unit,
         ratio=float(ratio),
-        value=float(value),
-        limit=float(limit_there if ratio > 0 else limit),
+        value=float(value) * per,
+        limit=float(limit_there if ratio > 0 else limit) * per,
         time=float(look.seen.time[row]),
-        position=look.seen.at[row],
+        position=look.seen.at[row] * degrees,
         line=line_of(toolpath, pieces, look.seen.piece[row]),
         limited=name.split(".")[0] not in not_limited,
         note=look.noted(text) if ratio > 0 else "",

@@ -20,7 +20,8 @@ measured, so that a motion beyond a limit is not also called a liar.
 Without a limit on jerk acceleration may jump within every period, and the acceleration column cannot be refuted; nor can the
 jerk column, which may jump anyhow.
 
-Normal acceleration is |a - (a.t) t| with t = v/|v| over the linear axes; its share of the chord error over a period is
+Feed is |v| over all axes, rotary ones at the radius of the path, as its segments have it. Normal acceleration is |a - (a.t) t| with
+t = v/|v| over x, y and z; its share of the chord error over a period is
 |normal acceleration| h^2 / 8. Where velocity or acceleration was not delivered it is taken from the second difference, a mean of
 a(t) over w = t2 - t0, across the chord's direction u. With normal acceleration <= N, |a| <= A and speed >= v the motion's direction
 turns by at most N w / v in that time, and u lies within its turn, so that of the mean
@@ -67,7 +68,7 @@ class Allowed(NamedTuple):
     """What samples are held against.
 
     limits     : (3, A) velocity, acceleration, jerk
-    linear     : (A,) True on linear axes, which make up the feed
+    linear     : (A,) True on x, y and z, of which the normal acceleration is
     normal     : limit of the normal acceleration [mm/s2], or inf
     judged     : (3,) True if velocity, acceleration, jerk were delivered
     digits     : (A+1,) largest error of a position [mm], last of a time [s], by the digits they were written with
@@ -130,7 +131,7 @@ def scan(
         period = t[k] - t[k - 1] if k > first else math.inf
         step_sq = 0.0
         for axis in range(axes):
-            if k > first and linear[axis]:
+            if k > first:
                 step_sq += (position[k, axis] - position[k - 1, axis]) ** 2
         step = math.sqrt(step_sq)
         if k >= max(skip, 1):
@@ -159,7 +160,7 @@ def scan(
             most_feed = max(feed_max[k], feed_max[k - 1])
             rounding_sq = 0.0
             for axis in range(axes):
-                rounding_sq += error_before[axis, 1] ** 2 if linear[axis] else 0.0
+                rounding_sq += error_before[axis, 1] ** 2
             value = max(step / period - math.sqrt(rounding_sq), 0.0)
             _keep(worst, alone + FEED, value, most_feed, k, DIFFERENCE)
             _keep(worst, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
@@ -240,18 +241,19 @@ def _of_columns(
 def _feed_and_normal(
     velocity: FloatArray, acceleration: FloatArray, k: int, linear: Array
 ) -> tuple[float, float]:
-    feed_sq, along = 0.0, 0.0
+    feed_sq, linear_sq, along = 0.0, 0.0, 0.0
     for axis in range(len(linear)):
+        feed_sq += velocity[k, axis] ** 2
         if linear[axis]:
-            feed_sq += velocity[k, axis] ** 2
+            linear_sq += velocity[k, axis] ** 2
             along += velocity[k, axis] * acceleration[k, axis]
     feed = math.sqrt(feed_sq)
-    if feed <= FEED_AT_REST:
+    if linear_sq <= FEED_AT_REST * FEED_AT_REST:
         return feed, 0.0
     normal_sq = 0.0
     for axis in range(len(linear)):
         if linear[axis]:
-            normal_sq += (acceleration[k, axis] - along * velocity[k, axis] / feed_sq) ** 2
+            normal_sq += (acceleration[k, axis] - along * velocity[k, axis] / linear_sq) ** 2
     return feed, math.sqrt(normal_sq)
 
 

@@ -21,7 +21,7 @@ def machine_of(axes: int = 3, **settings) -> Machine:
     made = problems.machine(**({"dt": 1e-7} | settings))
     x = made.axes["x"]
     a = Axis(velocity=x.velocity * RAD, acceleration=x.acceleration * RAD, jerk=x.jerk * RAD)
-    return made.model_copy(update={"axes": made.axes | ({"a": a} if axes == 4 else {})})
+    return made.model_copy(update={"rotary_radius": 1.0, "axes": made.axes | ({"a": a} if axes == 4 else {})})
 
 
 def guide_through(points: FloatArray, machine: Machine, feed: float | FloatArray = 100.0) -> LegGuide:

@@ -36,8 +36,8 @@ def table_machine(**kinematics: float) -> Machine:
 
 def tip_program(machine: Machine, points: np.ndarray, feed: float, tolerance: float) -> Program:
     """Straight moves between points x y z a c (n, 5) of the tip [mm, rad]."""
-    at = points.copy()
-    at[:, 3:] *= getattr(machine, "radius", 1.0)
-    plain = program_of_points(np.ascontiguousarray(at[:, :3]), np.full(len(at) - 1, feed), tolerance)
+    plain = program_of_points(np.ascontiguousarray(points[:, :3]), np.full(len(points) - 1, feed), tolerance)
     known = {f.name: getattr(plain, f.name) for f in dataclasses.fields(plain) if f.name != "splines"}
-    return Program(**(known | {"axes": AXES, "start": at[0], "end": at[1:], "arc_center": np.zeros((0, 5))}))
+    return Program(
+        **(known | {"axes": AXES, "start": points[0], "end": points[1:], "arc_center": np.zeros((0, 5))})
+    )

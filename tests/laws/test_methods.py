@@ -66,7 +66,9 @@ def machine(seed: int = 0, **more) -> Machine:
         letter: Axis(velocity=100.0 * unit, acceleration=a[k] * unit, jerk=j[k] * unit)
         for k, (letter, unit) in enumerate(UNITS.items())
     }
-    return problems.machine(**({"axes": axes, "tolerance": 10 ** rng.uniform(-2.0, -0.7)} | more))
+    return problems.machine(
+        **({"axes": axes, "rotary_radius": 1.0, "tolerance": 10 ** rng.uniform(-2.0, -0.7)} | more)
+    )
 
 
 @pytest.mark.slow

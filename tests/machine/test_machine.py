@@ -48,7 +48,7 @@ def refusal(path: Path) -> str:
         (with_line("tolerance = 0.02", "tolerance = 0"), "tolerance"),
         (with_line("tolerance = 0.02", "tolerance = 'thin'"), "tolerance"),
         (with_line("dt = 0.001", "dt = 0.001\nspeed = 3"), "speed: unknown key"),
-        (with_line("[axes.z]", "[axes.w]"), "axis 'w' is not known"),
+        (with_line("[axes.z]", "[axes.q]"), "axis 'q' is not known"),
         (with_line('path_control = "blend"', 'path_control = "round"'), "path_control"),
         (TEMPLATE.read_text() + "[positions.g99]\nx = 1\n", "'g99' is not known"),
         (TEMPLATE.read_text() + "[tools]\nlong = 1\n", "not a tool number"),

@@ -63,7 +63,7 @@ def test_csv_is_plain(tmp_path: Path) -> None:
 
 
 def test_rotary_columns_are_in_radians() -> None:
-    assert units(("x", "a"))["va"] == "rad/s"
+    assert units(("x", "a"))["va"] == "deg/s"
     assert units(("x", "a"))["jx"] == "mm/s3"
 
 

@@ -87,9 +87,9 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
         return False
     if machine is not None and machine.dialect is not None and machine.dialect.lathe is not None:
         return machine.dialect.lathe
-    letters = {chr(c) for c in np.unique(words.letter) if c}
-    if letters & set("YV"):
+    if _has(words, "Y") or _has(words, "V"):
         return False
+    letters = {chr(c) for c in np.unique(words.letter) if c}
     if letters >= set("XZ") and letters & set("UW"):
         return not letters & set(reading.ignore)
     for codes, needed in (((70.0, 71.0, 72.0, 73.0), "PQ"), ((76.0,), "KD")):
@@ -100,9 +100,13 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     return False
 
 
+def _has(words: Words, letter: str) -> bool:
+    return bool((words.letter == ord(letter)).any())
+
+
 def has_further_systems(words: Words) -> bool:
-    """Whether G54.1 is in a program, which of the controls that are read only Fanuc's and Haas' know."""
-    return bool(((words.value == G_FURTHER) & (words.letter == ord("G"))).any())
+    """Whether a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas' know."""
+    return _has(words, "L") and bool(((words.value == G_FURTHER) & (words.letter == ord("G"))).any())
 
 
 def _first_end(words: Words) -> int:

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.units import RAD_PER_DEG
 from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
-from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
 from planner.report.block_feeds import planned_blocks
 
@@ -200,8 +199,3 @@ def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArra
     points = np.vstack([toolpath.start[:1], points])[:, linear]
     points = points[:: max(1, -(-len(points) // most))]
     return np.pad(points, ((0, 0), (0, 3 - len(linear))))
-
-
-def in_degrees(axes: tuple[str, ...]) -> FloatArray:
-    """(A,) what turns lengths and angles of the package into mm and degrees."""
-    return np.array([1.0 / RAD_PER_DEG if axis in ROTARY_AXES else 1.0 for axis in axes])

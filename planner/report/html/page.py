@@ -16,9 +16,10 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.motion.trajectory import in_degrees
 from planner.report.colours import limit_colours
 from planner.report.export import json_ready, summary
-from planner.report.html.data import in_degrees, lines_of, programmed_path, samples_of
+from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.html.picture import path_picture
 from planner.report.replace import check_file
@@ -68,7 +69,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
     samples = samples_of(plan)
     shown, axes = samples.shown, samples.shown.axes
     lines = lines_of(plan, samples)
-    scale = in_degrees(axes)
+    scale = in_degrees(axes, plan.toolpath.radius)
     columns: dict[str, Array] = {
         "t": shown.t,
         "s": shown.s.astype(np.float32),

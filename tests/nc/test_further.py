@@ -1,0 +1,198 @@
+"""Axes beside x, y and z in programs: against LinuxCNC's interpreter, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_nc import number, pick
+from test_agreement import HERE, PYTHON, SHARED, needs_oracle
+
+from planner.base.errors import InputError
+from planner.base.units import RAD_PER_DEG
+from planner.machine import Machine
+from planner.nc.program import MOVES, Kind, Program
+from planner.nc.reader import parse_program
+
+FURTHER = "abcuvw"
+ALL = "xyz" + FURTHER
+COUNT = 60
+
+
+def machine_of(letters: str = ALL, **axis_of: dict) -> Machine:
+    """A machine with these axes; `axis_of` adds to the table of some."""
+    plain = {"velocity": 100.0, "acceleration": 1000.0, "jerk": 20000.0}
+    return Machine(
+        name="all",
+        dt=0.001,
+        tolerance=0.01,
+        axes={letter: plain | axis_of.get(letter, {}) for letter in letters},
+    )
+
+
+def random_text(rng: np.random.Generator) -> str:
+    """A program of valid lines with words of all nine axes."""
+    lines = ["G21 G0 X1 Y2 Z3 A4", "F120"]
+    inverse = False
+
+    def words(scale: float = 20.0, most: int = 4) -> str:
+        chosen = rng.permutation(list(ALL.upper()))[: rng.integers(1, most + 1)]
+        return " ".join(f"{letter}{number(rng, -scale, scale)}" for letter in chosen)
+
+    for _ in range(rng.integers(5, 25)):
+        choice = rng.integers(12)
+        if choice < 6:
+            code = pick(rng, "G0", "G1", "G1")
+            lines.append(
+                f"{code} {words()}" + (" F" + number(rng, 0.5, 9) if inverse and code == "G1" else "")
+            )
+        elif choice == 6 and not inverse:
+            lines.append(f"G91.1 G91 {pick(rng, 'G2', 'G3')} X4 Y0 I2 J0 {words(90.0, 2).translate(NO_XYZ)}")
+            lines.append("G90")
+        elif choice == 7:
+            lines.append(pick(rng, "G90", "G91"))
+        elif choice == 8:
+            lines.append(pick(rng, "G92 ", "G10 L2 P1 ", "G10 L20 P2 ") + words())
+        elif choice == 9:
+            lines.append(pick(rng, "G54", "G55", "G92.1", "G92.2", "G92.3", "G28.1"))
+        elif choice == 10:
+            lines.append(pick(rng, "G28", "G28 " + words(), "G90 G53 G0 " + words()))
+        else:
+            inverse = not inverse
+            lines.append("G93" if inverse else "G94 F" + number(rng, 50, 900))
+    return "\n".join([*lines, "M2"]) + "\n"
+
+
+NO_XYZ = str.maketrans({"X": "A", "Y": "B", "Z": "C"})
+_ORACLE = """
+import json, os, sys, tempfile
+sys.path.insert(0, sys.argv[1])
+import gcode, lcnc_canon
+
+class Canon(lcnc_canon.Canon):
+    def get_tool(self, index):
+        return (index, *(0.0,) * 12, 0)
+    def _add(self, kind, p9, **kw):
+        machine = self._machine(p9)
+        end = [v if 3 <= k < 6 else v * lcnc_canon.MM for k, v in enumerate(machine)]
+        self.out.append(dict(kind=kind, end=end, feed=self.feed, line=self.line))
+
+found = []
+for path in json.load(open(sys.argv[2])):
+    with tempfile.TemporaryDirectory() as scratch:
+        open(os.path.join(scratch, "p.var"), "w").close()
+        canon = Canon(os.path.join(scratch, "p.var"))
+        status, line = gcode.parse(path, canon, "G21", "G21 G90 G17 G94 G40 G49 G54")
+    error = f"{line}: {gcode.strerror(status)}" if status > gcode.MIN_ERROR else ""
+    moves = [(m["line"], m["kind"], m["end"], m["feed"]) for m in canon.out if "end" in m]
+    found.append([error, moves])
+json.dump(found, open(sys.argv[3], "w"))
+"""
+
+
+def ask(texts: list[str], folder: Path) -> list:
+    paths = []
+    for k, text in enumerate(texts):
+        paths.append(str(folder / f"{k}.ngc"))
+        Path(paths[-1]).write_text(text)
+    (folder / "jobs.json").write_text(json.dumps(paths))
+    (folder / "ask.py").write_text(_ORACLE)
+    asked = [folder / "ask.py", SHARED / "peers", folder / "jobs.json", folder / "out.json"]
+    subprocess.run([PYTHON, *map(str, asked)], check=True, capture_output=True, timeout=300)
+    return json.loads((folder / "out.json").read_text())
+
+
+def in_nine(program: Program) -> np.ndarray:
+    """(B, 9) ends of the blocks in mm and degrees."""
+    ends = np.zeros((len(program), len(ALL)))
+    for k, letter in enumerate(program.axes):
+        ends[:, ALL.index(letter)] = program.end[:, k] / (RAD_PER_DEG if letter in "abc" else 1.0)
+    return ends
+
+
+def assert_same(program: Program, moves: list) -> None:
+    ends = in_nine(program)
+    mine = [k for k in range(len(program)) if program.kind[k] in MOVES and moved(ends, k)]
+    theirs = []
+    place = np.zeros(len(ALL))
+    for move in moves:
+        if np.abs(np.array(move[2]) - place).max() > 1e-9:
+            theirs.append(move)
+        place = np.array(move[2])
+    assert [int(program.line[k]) for k in mine] == [move[0] for move in theirs]
+    np.testing.assert_allclose(ends[mine], [move[2] for move in theirs], rtol=1e-12, atol=1e-9)
+    for k, move in zip(mine, theirs, strict=True):
+        if program.kind[k] == Kind.RAPID:
+            assert move[1] == "rapid"
+            continue
+        change = np.abs(ends[k] - (ends[k - 1] if k else 0.0))
+        turns = change[[0, 1, 2, 6, 7, 8]].max() == 0.0
+        feed = program.feed[k] * 60.0 / RAD_PER_DEG if turns else program.feed[k] * 60.0
+        assert feed == pytest.approx(move[3], rel=1e-9), program.line[k]
+
+
+def moved(ends: np.ndarray, k: int) -> bool:
+    return bool(np.abs(ends[k] - (ends[k - 1] if k else 0.0)).max() > 1e-9)
+
+
+@pytest.mark.slow
+@needs_oracle
+def test_random_programs_in_nine_axes_agree(tmp_path: Path) -> None:
+    assert HERE.exists()
+    rng = np.random.default_rng(19)
+    texts = [random_text(rng) for _ in range(COUNT)]
+    machine, read = machine_of(), 0
+    for text, (error, moves) in zip(texts, ask(texts, tmp_path), strict=True):
+        try:
+            program = parse_program(text, machine)
+        except InputError as fault:
+            refused = str(fault)
+        else:
+            refused = ""
+        assert bool(error) == bool(refused), f"{text}\nthe reader: {refused}; LinuxCNC: {error}"
+        if error:
+            continue
+        try:
+            assert_same(program, moves)
+        except AssertionError as fault:
+            raise AssertionError(f"{text}\n{fault}") from fault
+        read += 1
+    assert read > COUNT / 2
+
+
+def test_f_is_the_speed_of_what_moves() -> None:
+    program = parse_program("G21 F600\nG1 X10 A90\nU5 B3\nC7\nG93 C17 F3\n", machine_of())
+    degrees = program.feed / RAD_PER_DEG
+    np.testing.assert_allclose(program.feed[:2], 10.0)
+    np.testing.assert_allclose(degrees[2:], [10.0, 10.0 * 3.0 / 60.0])
+
+
+def test_a_wrapped_axis_goes_in_the_direction_of_its_sign() -> None:
+    machine = machine_of("xyza", a={"wrapped": True})
+    program = parse_program("G21 G0 A90\nA10\nA-350\nA0\n", machine)
+    np.testing.assert_allclose(program.end[:, 3] / RAD_PER_DEG, [90.0, 370.0, 350.0, 360.0])
+    with pytest.raises(InputError, match=r":1:.*A is wrapped"):
+        parse_program("G21 G0 A360\n", machine)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("G21 F100\nG41.1 D4 G1 X9 A3\n", "A under cutter radius compensation"),
+        ("G21 F100\nG81 X1 Z-3 R2 B9\n", "B in a cycle"),
+        ("G21 F100\nG5 X9 Y9 I1 J1 P-1 Q-1 U4\n", "U on a spline"),
+        ("G21\nG43.1 Z3 W2\n", "W of a tool offset"),
+    ],
+)
+def test_places_that_do_not_know_further_axes_refuse_them(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=f":2:.*{said}"):
+        parse_program(text, machine_of())
+
+
+def test_axes_that_the_machine_lacks_and_that_stand_still_leave_the_program_as_it_is() -> None:
+    with pytest.raises(InputError, match=r":2:.*A5"):
+        parse_program("G21 F100 G1 X1 A0\nX2 A5\n", machine_of("xyz"))
+    assert parse_program("G21 F100\nG1 X2 A0\n", machine_of()).axes == ("x", "y", "z")

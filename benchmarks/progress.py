@@ -91,7 +91,7 @@ planner.plan(program, machine, method=method, **({"effort": effort} if shapes el
     progress=lambda stage, fraction: told.append((clock(), stage, fraction)),
     log=lambda step: told.append((clock(), step)))
 end = clock()
-left, seen, found = TimeLeft(solves=shapes, effort=effort), 0, []
+left, seen, found = TimeLeft(solves=shapes, effort=effort, searched=method == "optimal"), 0, []
 for k in range(int(moments)):
     now = end * k / int(moments)
     while seen < len(told) and told[seen][0] <= now:

@@ -149,7 +149,11 @@ def plan_command(
         trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
     left = TimeLeft(
-        solves=METHODS[method].shapes, effort=effort or NORMAL, rounds=rounds, writes=output is not None
+        solves=METHODS[method].shapes,
+        effort=effort or NORMAL,
+        rounds=rounds,
+        writes=output is not None,
+        searched=method == OPTIMAL and not any(how[name] for name in how if name != "effort"),
     )
 
     def log(step: Step) -> None:

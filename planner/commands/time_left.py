@@ -12,6 +12,9 @@ still expected, counted in a unit that this job has measured itself: one grid an
 less what the stage that is running has had already. Where a stage tells what share of it is done, that takes the place of what was
 expected. Before the first solve tells a share nothing is known, and nothing is said. The numbers were read off plans of a
 dozen programs; `benchmarks/progress.py` says how true the estimates are on these and on others.
+
+Where geometry and feed are searched together (methods/at_once.py) the share of the steps that is done tells the rest of the search, and
+nothing is said before; only the verdict and the files come after it.
 """
 
 from __future__ import annotations
@@ -60,12 +63,14 @@ class TimeLeft:
     effort : of the plan
     rounds : of reshaping that the user asked for, or None
     writes : whether files are written
+    searched : whether a search for geometry and feed together may come
     """
 
     solves: bool = True
     effort: str = NORMAL
     rounds: int | None = None
     writes: bool = False
+    searched: bool = False
     _phase: int = BEGIN
     _began: dict[str, float] = field(default_factory=dict)  # of the stages, the last time
     _now_in: str = ""
@@ -86,6 +91,8 @@ class TimeLeft:
     _gains: list[float] = field(default_factory=list)
     _slower: bool = False  # the last round as a whole
     _verdicts: int = 0
+    _segments: int = 0
+    _in_loop: bool = False  # splines are laid to be reshaped
 
     def stage(self, now: float, name: str, fraction: float) -> None:
         """A stage begins (0), is done to a fraction, or ends (1)."""
@@ -110,8 +117,9 @@ class TimeLeft:
         """A step of the planning (job/trace.py)."""
         if step.name == "programmed feed":
             self._cycle_time, self._dt = SLOWER * (step.found or 0.0), float(step.facts.get("dt") or math.inf)
+            self._segments = int(step.facts.get("segments") or 0)
         elif step.name == "splines":
-            self._splines = bool(step.facts.get("runs"))
+            self._splines, self._in_loop = bool(step.facts.get("runs")), True
         elif step.name == "solve":
             self._solved(now, step)
         elif step.name.startswith("reshape") and self._phase == ROUNDS:
@@ -140,7 +148,13 @@ class TimeLeft:
         write = self._samples() * WRITTEN * self._speed if self.writes else 0.0
         if self._phase == DONE:
             return self._running(now, "write", write) + (self._verdict(now) if self._plans == 1 else 0.0)
+        if self._now_in == "search":
+            return self._searching(now, write)
         unit, later = self._unit, write + self._verdict(now)
+        if self._may_be_searched():
+            return None
+        if "search" in self._began and self._phase >= DELIVER and self._phase < DONE:
+            return later
         if self._phase == BEGIN and self.solves:
             share = self._share if self._now_in == "solve" else 0.0
             if share < SHARE_TOLD:
@@ -163,6 +177,20 @@ class TimeLeft:
             had = now - self._since if self._phase == ROUNDS else 0.0
             later += max(more - 1.0, 0.0) * each + (self._rest(had, each) if more > 0 else 0.0)
         return later
+
+    def _may_be_searched(self) -> bool:
+        """Whether the search may be the next stage, and no other work is on its way before it."""
+        from planner.optimal.effort import EFFORTS
+
+        few = self._segments <= EFFORTS[self.effort].search.steps_max
+        return self.searched and few and not self._in_loop and "search" not in self._began
+
+    def _searching(self, now: float, write: float) -> float | None:
+        """What is left once the search is on."""
+        if self._share < SHARE_TOLD:
+            return None
+        had = now - self._began["search"]
+        return had * (1.0 - self._share) / self._share + self._samples() * SAMPLE * self._speed + write
 
     def _go(self, phase: int, now: float) -> None:
         self._phase, self._since = phase, now

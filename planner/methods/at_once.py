@@ -10,23 +10,23 @@ from __future__ import annotations
 
 from planner.job.job import Job
 from planner.job.plan import Plan
-from planner.methods.free import Start, said, search, tabled
-from planner.optimal.loop import Settings, first_motion
+from planner.methods.free import Start, part_of, said, search, tabled
+from planner.optimal.loop import Settings
 from planner.optimal.notes import path_notes
+from planner.optimal.on_path import OnPath
 from planner.tube.own import TubeOwn
 from planner.tube.parts import FoundRun, parts_of
 from planner.tube.run import tube_runs_of
 from planner.tube.splice import Spliced, SplicedRun
 
 
-def searched_at_once(job: Job, settings: Settings) -> Plan | None:
+def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> Plan | None:
     """The plan of what the search finds from the first motion; None where it does not find all of it.
 
-    job : a searchable one (free.py)
+    job     : a searchable one (free.py)
+    planned : on the first splines (optimal/loop.py, `first_motion`)
     """
-    dial, planned = settings.effort.search, first_motion(job, settings)
-    if planned is None:
-        return None
+    dial = settings.effort.search
     with job.stage("search") as report:
         start = Start(planned.motion(), job, dial)
         runs = list(tube_runs_of(job.toolpath, job.machine))
@@ -36,13 +36,14 @@ def searched_at_once(job: Job, settings: Settings) -> Plan | None:
         found: list[FoundRun] = []
         done, parts = 0, list[SplicedRun]()
         for k, run in enumerate(runs):
-            found.append(search(k, run, [start], TubeOwn(dial.gap, divide=False)))
+            of_run = len(start.guess(k, run))
+            progress = part_of(report, done, of_run, steps)
+            found.append(search(k, run, [start], TubeOwn(dial.gap, divide=False, progress=progress)))
             if not found[-1].whole:
                 job.tell("search", steps=steps, of_runs=len(runs), whole=k)
                 return None
             parts += parts_of(job.toolpath, found[-1], start.spliced(k))
-            done += len(start.guess(k, run))
-            report(done / steps)
+            done += of_run
     made = job.deliver(Spliced(runs=tuple(parts)))
     trajectory, verdict = made
     job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)

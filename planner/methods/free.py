@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -79,9 +79,11 @@ def freed(job: Job, plan: Plan, dial: Search = THOROUGH) -> Freed:
             return Freed(plan, 1.0)
         found, done = [], 0
         for k, run in enumerate(runs):
-            found.append(search(k, run, [start], TubeOwn(dial.gap)))
-            done += len(start.guess(k, run))
-            report(done / steps)
+            of_run = len(start.guess(k, run))
+            found.append(
+                search(k, run, [start], TubeOwn(dial.gap, progress=part_of(report, done, of_run, steps)))
+            )
+            done += of_run
     made, kept, why = delivered(job, start, found)
     better = made[0] is not plan.trajectory
     share = _share_kept(start, found, kept) if better else 1.0
@@ -102,6 +104,11 @@ def freed(job: Job, plan: Plan, dial: Search = THOROUGH) -> Freed:
         timings=job.stages.timings,
     )
     return Freed(faster, share)
+
+
+def part_of(report: Callable[[float], None], done: int, of_run: int, steps: int) -> Callable[[float], None]:
+    """Tells which share of all steps is done, from the share of a run that is."""
+    return lambda share: report((done + share * of_run) / steps)
 
 
 def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:

@@ -97,6 +97,25 @@ def test_time_left_falls_as_time_passes_and_is_never_negative() -> None:
         left.stage(now + 1.0, name, 1.0)
 
 
+def test_a_search_tells_its_share_and_nothing_is_said_before() -> None:
+    """30 % of the search in 3 s leave 7 s of it, whatever its start took; programs too large for it go straight to the loop."""
+    left, now = TimeLeft(searched=True), 3.0
+    left.step(0.0, step("programmed feed", 1e-6, dt=1.0, segments=100))
+    left.stage(1.0, "solve", 0.0)
+    left.stage(2.0, "solve", 1.0)
+    assert left.left(now) is None
+    left.stage(now, "search", 0.0)
+    assert left.left(now + 1.0) is None
+    left.stage(now + 3.0, "search", 0.3)
+    assert left.left(now + 3.0) == pytest.approx(7.0, rel=1e-3)
+    left.stage(now + 10.0, "search", 1.0)
+    left.stage(now + 10.0, "sample", 0.0)
+    assert left.left(now + 10.0) == pytest.approx(0.0, abs=1e-3)
+    large = TimeLeft(searched=True)
+    large.step(0.0, step("programmed feed", 1e-6, dt=1.0, segments=1_000_000))
+    assert large.left(solved(large)) is not None
+
+
 def test_compiling_is_told_once_and_is_no_time_of_the_job(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

@@ -62,7 +62,7 @@ METHODS: dict[str, MethodName] = {
     "fir-spline-plain": MethodName(
         home="planner.methods.fir_spline:FirSplineMethod", settings={"plain": True}
     ),
-    "tube": MethodName(home="planner.methods.tube:TubeMethod", solvers=("own", "ipopt")),
+    "tube": MethodName(home="planner.methods.tube:TubeMethod", solvers=("own", "ipopt", "fatrop")),
     "stop": MethodName(home="planner.methods.stop:StopMethod"),
 }
 # Names of earlier versions, which keep working.

@@ -7,7 +7,7 @@ no certificate that there is no better one elsewhere.
 1. The path is divided into runs between full stops; each is a problem of its own (tube/run.py).
 2. Methods of `starts` make motions from which the search begins (tube/guess.py): the first one's, and where that does not lead to a
    faster one the next one's.
-3. A solver finds the motion: the own one window by window (tube/own.py), ipopt a whole run at a time.
+3. A solver finds the motion: the own one window by window (tube/own.py), ipopt and fatrop a whole run at a time.
 4. Where no search ends faster than the first start, its motion stays, run by run and window by window (tube/parts.py): the plan is
    never slower.
 """
@@ -38,7 +38,7 @@ class TubeMethod(Method):
     """The best motion inside the tolerance near those of other methods.
 
     starts : methods whose motions the search starts from; the first one's is what the plan is never slower than
-    solver : name of the solver, "own" or "ipopt" (tube/solvers.py), or a solver
+    solver : name of the solver, "own", "ipopt" or "fatrop" (tube/solvers.py), or a solver
     """
 
     starts: tuple[Method, ...] = field(

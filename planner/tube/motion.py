@@ -86,13 +86,17 @@ def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) 
 def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
     """By what factor the motion has to be slowed down to keep all limits; <= 1 if it keeps them."""
     h, v, a, j = steps.h[:, None], steps.velocity, steps.acceleration, steps.jerk
+    middle, after = v + h * a / 2, v + h * (a + h * j / 2)
     ordinates = np.concatenate(
-        [v, v + h * a / 2]
+        [v, middle]
     )  # both bound the parabola; every step ends where the next one begins
+    # Bernstein coefficients of the squared feed (rows.py)
+    square = [(v * v).sum(axis=1), (v * middle).sum(axis=1), (middle * after).sum(axis=1)]
+    square.append((2.0 * (middle * middle).sum(axis=1) + (v * after).sum(axis=1)) / 3.0)
     leg = guess.leg
     ratios = [
         (np.abs(ordinates) / run.velocity).max(),
-        (np.linalg.norm(ordinates, axis=1) / np.tile(run.feed[leg], 2)).max(),
+        np.sqrt((np.maximum(np.max(square, axis=0), 0.0) / run.feed[leg] ** 2).max()),
         np.sqrt((np.abs(a) / run.acceleration).max()),
         np.cbrt((np.abs(j) / run.jerk).max()),
     ]

@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -43,8 +43,9 @@ from planner.base.packages import import_needed
 from planner.tube.guess import Guess
 from planner.tube.motion import steps_of
 from planner.tube.numbers import acceleration_along, step_numbers
-from planner.tube.outcome import BROKE_DOWN, OUTCOMES, SOLVED, STUCK, TubeSolution
+from planner.tube.outcome import BROKE_DOWN, SOLVED, STUCK, TubeSolution
 from planner.tube.run import TubeRun
+from planner.tube.stages import FEASIBILITY, Sizes, options, outcome, staged
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
 # iterations on single corners; without it, the pentagon does not converge in 500. 1e-2 costs 5e-4.
@@ -57,22 +58,13 @@ SMOOTH = 3e-4
 LONGER = 4.0
 # The guess is slowed down by these factors in turn until one leads to an optimum [-]: at the guess itself the limits hold, and ipopt
 # begins between them with tiny steps. 1.2 settles 7 of the 8 runs tried (single corners, pentagon, arcs, spiral) in 47 to 295
-# iterations, 1.5 the eighth; that with ipopt's barrier parameter at BARRIER and decreasing monotonely. Adaptive ones drop early, hug
-# the limits and trickle (pentagon: more than 300 iterations instead of 112).
+# iterations, 1.5 the eighth.
 SLOWER = (1.2, 1.5, 1.0)
-BARRIER = 0.1
 # Where normal acceleration is limited it is watched at these places of every step [-], and steps become no more than this much longer:
 # with the others' freedom one step reaches round the whole corner, with twice the limit between two places.
 WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
-# The search ends when the time changes by less than this fraction in each of so many iterations [-], with all rows kept.
-SETTLED, SETTLED_ITERATIONS = 1e-5, 4
 # It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-] does not count.
 NOT_SLOWER = 1e-4
-# Residual of the rows [-]: what is left is integrated away (tube/motion.py).
-FEASIBILITY = 1e-6
-# Complementarity at which the search may end [-]: the time is then good to 1e-4.
-COMPLEMENTARITY = 1e-4
-
 # A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
 # 7 s, one of 400 two minutes and 0.44 GB.
 LEGS_MAX = 500
@@ -80,17 +72,21 @@ LEGS_MAX = 500
 
 @dataclass(frozen=True, kw_only=True)
 class TubeNLP:
-    """The free optimum by ipopt.
+    """The free optimum by ipopt or fatrop.
 
+    solver         : "ipopt", or "fatrop", which uses the stages
     tol            : relative tolerance of optimality [-], > 0
     max_iterations : per run and start
     """
 
-    tol: float = 1e-5
+    solver: Literal["ipopt", "fatrop"] = "ipopt"
+    tol: float = 1e-7
     max_iterations: int = 300
     legs_max: ClassVar[float] = LEGS_MAX
 
     def __post_init__(self) -> None:
+        if self.solver not in ("ipopt", "fatrop"):
+            raise ValueError(f"TubeNLP.solver: '{self.solver}'; there are ipopt and fatrop")
         if not self.tol > 0:
             raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
 
@@ -101,7 +97,7 @@ class TubeNLP:
         """
         iterations, took = 0, 0.0
         for slower in SLOWER:
-            found = self._solve(run, guess.slower(slower))
+            found = self.solve_from(run, guess.slower(slower), guess)
             iterations, took = iterations + found.iterations, took + found.solve_time
             if found.steps is not None and found.steps.h.sum() > guess.h.sum() * (1.0 + NOT_SLOWER):
                 found = TubeSolution(status=STUCK[0], sentence=STUCK[1], iterations=0, solve_time=0.0)
@@ -109,8 +105,9 @@ class TubeNLP:
                 break
         return replace(found, iterations=iterations, solve_time=took)
 
-    def _solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
-        """Transcribe and solve; the whole formulation, from top to bottom."""
+    def solve_from(self, run: TubeRun, guess: Guess, given: Guess) -> TubeSolution:
+        """Transcribe and solve once, from a guess of the same steps as the one given, to whose durations they are pulled. The whole
+        formulation, from top to bottom."""
         ca = import_needed("casadi", "method tube")
 
         began = time.perf_counter()
@@ -124,31 +121,26 @@ class TubeNLP:
 
         watched = len(WATCHED) if np.isfinite(run.across_max).any() else 0
 
-        # ---- variables: state (p, v, a) and place of every node; jerk, duration and two inner places of every step ----------
+        # ---- variables, stage by stage: state (p, v, a) and place of a node; jerk, duration and the other places of its step --------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
         mean_step = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
-        unit = ca.DM(mean_step / length).T
-        w_node, w_step = (
-            ca.MX.sym("node", 3 * axes + 1, steps + 1),
-            ca.MX.sym("step", axes + 3 + watched, steps),
-        )
-        node = ca.vertcat(w_node[:-1, :], w_node[-1, :] * unit)
-        inner = w_step[axes + 1 : axes + 3, :] * ca.repmat(unit[:, :-1], 2, 1)
-        step = ca.vertcat(w_step[: axes + 1, :], inner, w_step[axes + 3 :, :])
+        states, controls = 3 * axes + 1, axes + 4 + watched
+        w = ca.MX.sym("w", (states + controls) * steps + states)
+        stage = ca.reshape(w[: (states + controls) * steps], states + controls, steps)
+        node, step = stage[:states, :], stage[states:, :]
+        after = ca.horzcat(node[:, 1:], w[-states:])
 
         # ---- objective ------------------------------------------------------------------------------------------------------
-        h_guess = guess.h / second
+        h_guess = given.h / second
         h_all = step[axes, :]
         merit = ca.sum2(h_all) + PULL * ca.sumsqr(h_all / ca.DM(h_guess).T - 1)
         used = step[:axes, :] / ca.repmat(ca.DM(j_max), 1, steps)
         merit += SMOOTH * ca.sum2(ca.sum1(used**2) * ca.DM(h_guess).T)
 
         # ---- dynamics of one step -------------------------------------------------------------------------------------------
-        p, v, a, p1, v1, a1, j = (ca.SX.sym(name, axes) for name in ("p", "v", "a", "p1", "v1", "a1", "j"))
-        s0, s1, s2, s3, h = (ca.SX.sym(name) for name in ("s0", "s1", "s2", "s3", "h"))
-        gap = ca.vertcat(
-            p + h * (v + h * (a / 2 + h * j / 6)) - p1, v + h * (a + h * j / 2) - v1, a + h * j - a1
-        )
+        p, v, a, j = (ca.SX.sym(name, axes) for name in ("p", "v", "a", "j"))
+        places, h = [ca.SX.sym(name) for name in ("s0", "s1", "s2", "s3")], ca.SX.sym("h")
+        p1, v1, a1 = p + h * (v + h * (a / 2 + h * j / 6)), v + h * (a + h * j / 2), a + h * j
 
         # ---- constraints of one step; its numbers are parameters -------------------------------------------------------------
         base, drift, e1, e2 = (ca.SX.sym(name, axes) for name in ("base", "drift", "e1", "e2"))
@@ -164,10 +156,13 @@ class TubeNLP:
             "normal",
             "mean_step",
             "pace",
+            "mean_next",
         )
-        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace = map(
-            ca.SX.sym, scalars
+        begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace, mean_next = (
+            map(ca.SX.sym, scalars)
         )
+        s0, s1, s2, s3 = (place * own_mean for place in places)
+        following = ca.vertcat(p1, v1, a1, s3 / mean_next)
 
         def apart(point: Any, place: Any, ahead: Any = 0.0) -> Any:
             """Squared distance of a point from the one so far ahead on the tangent at a place of its leg."""
@@ -178,7 +173,6 @@ class TubeNLP:
 
         ordinate = v + a * h / 2
         rows: list[tuple[Any, float, float]] = [
-            (gap, 0.0, 0.0),
             (apart(p + h * v / 3, s0, s1 - s0) / room**2, -np.inf, 1.0),
             (apart(p1 - h * v1 / 3, s3, s2 - s3) / room**2, -np.inf, 1.0),
             (apart(p1, s3) / room_end**2, -np.inf, 1.0),
@@ -187,8 +181,9 @@ class TubeNLP:
         if (run.feed > run.velocity.min()).any():
             rows.append((ordinate / v_max, -1.0, 1.0))
         if (run.feed < np.linalg.norm(run.velocity)).any():
+            inner = ca.dot(v, ordinate), (2 * ca.sumsqr(ordinate) + ca.dot(v, v1)) / 3, ca.dot(ordinate, v1)
             rows.append(
-                (ca.vertcat(ca.sumsqr(ordinate) / feed**2, ca.sumsqr(v1) / feed_end**2), -np.inf, 1.0)
+                (ca.vertcat(*(row / feed**2 for row in inner), ca.sumsqr(v1) / feed_end**2), -np.inf, 1.0)
             )
         if (run.curvature > 0).any():
             rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
@@ -198,17 +193,20 @@ class TubeNLP:
             across = acceleration - along[k] * velocity / pace
             rows.append((ca.sumsqr(across) / normal**2, -np.inf, 1.0))
 
-        # ---- constraints of all steps ---------------------------------------------------------------------------------------
-        states = [ca.vertcat(p, v, a, s0), ca.vertcat(p1, v1, a1, s3), ca.vertcat(j, h, s1, s2, along)]
-        numbers = ca.vertcat(
-            *(base, drift, e1, e2),
-            *(begin, radius, rate, room, room_end, step_max, feed, feed_end, normal, own_mean, pace),
+        # ---- constraints of all steps, stage by stage: gaps first -----------------------------------------------------------
+        of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
+        numbers = ca.vertcat(*(base, drift, e1, e2, begin, radius, rate, room, room_end, step_max))
+        numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, mean_next)
+        of_step = ca.Function(
+            "step", [*of_stage, numbers], [following, ca.vertcat(*(row for row, _, _ in rows))]
         )
-        of_step = ca.Function("step", [*states, numbers], [ca.vertcat(*(row for row, _, _ in rows))])
-        data = ca.DM(step_numbers(run, guess, mean_step[:-1], length, speed, acc).T)
-        constraints = ca.vec(of_step.map(steps)(node[:, :-1], node[:, 1:], step, data))
-        row_min = np.tile(np.concatenate([np.full(row.numel(), low) for row, low, _ in rows]), steps)
-        row_max = np.tile(np.concatenate([np.full(row.numel(), high) for row, _, high in rows]), steps)
+        data = step_numbers(run, guess, mean_step[:-1], length, speed, acc)
+        reached, limited = of_step.map(steps)(
+            node, step, ca.DM(np.column_stack([data, mean_step[1:] / length]).T)
+        )
+        constraints = ca.vec(ca.vertcat(after - reached, limited))
+        low, high = (np.concatenate([np.full(row[0].numel(), row[k]) for row in rows]) for k in (1, 2))
+        row_min, row_max = (np.tile(np.append(np.zeros(states), bound), steps) for bound in (low, high))
 
         # ---- limits and boundary ----------------------------------------------------------------------------------------------
         node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
@@ -221,10 +219,10 @@ class TubeNLP:
             node_min[end] = node_max[end] = rest
         longer = LONGER_WATCHED if watched else LONGER
         step_high = np.column_stack(
-            [np.tile(j_max, (steps, 1)), h_guess * longer, np.full((steps, 2 + watched), np.inf)]
+            [np.tile(j_max, (steps, 1)), h_guess * longer, np.full((steps, 3 + watched), np.inf)]
         )
         step_low = np.column_stack(
-            [np.tile(-j_max, (steps, 1)), h_guess / LONGER, np.full((steps, 2 + watched), -np.inf)]
+            [np.tile(-j_max, (steps, 1)), h_guess / LONGER, np.full((steps, 3 + watched), -np.inf)]
         )
 
         # ---- initial guess ----------------------------------------------------------------------------------------------------
@@ -233,55 +231,41 @@ class TubeNLP:
         node_start = np.column_stack([p0, v0, a0, place])
         step_start = np.column_stack(
             [
-                np.diff(a0, axis=0) / h_guess[:, None],
-                h_guess,
-                guess.place[:, 1:3] / mean_step[:-1, None],
+                np.diff(a0, axis=0) / (guess.h / second)[:, None],
+                guess.h / second,
+                guess.place[:, 1:] / mean_step[:-1, None],
                 np.tile(acceleration_along(guess)[:, None] / acc, (1, watched)),
             ]
         )
 
         # ---- solve --------------------------------------------------------------------------------------------------------------
-        program = {"x": ca.vertcat(ca.vec(w_node), ca.vec(w_step)), "f": merit, "g": constraints}
-        solver = ca.nlpsol("solver", "ipopt", program, _options(self))
-        lower, upper = (np.append(*pair) for pair in ((node_min, step_low), (node_max, step_high)))
-        result = solver(x0=np.append(node_start, step_start), lbx=lower, ubx=upper, lbg=row_min, ubg=row_max)
-        stats = solver.stats()
-        status, sentence = OUTCOMES.get(stats["return_status"], BROKE_DOWN)
-        g = np.array(result["g"]).ravel()
-        if status in SOLVED and not max((g - row_max).max(), (row_min - g).max()) <= 10 * FEASIBILITY:
+        program = {"x": w, "f": merit, "g": constraints}
+        sizes = Sizes(steps, states, controls, len(low))
+        solver = ca.nlpsol(
+            "solver", self.solver, program, options(self.solver, sizes, self.tol, self.max_iterations)
+        )
+        lower, upper = (staged(*pair) for pair in ((node_min, step_low), (node_max, step_high)))
+        x0 = staged(node_start, step_start)
+        result = solver(x0=x0, lbx=lower, ubx=upper, lbg=row_min, ubg=row_max)
+        status, sentence, iterations = outcome(self.solver, solver.stats(), self.max_iterations)
+        g, x = np.array(result["g"]).ravel(), np.array(result["x"]).ravel()
+        worst = max((g - row_max).max(), (row_min - g).max(), (x - upper).max(), (lower - x).max())
+        if status in SOLVED and not worst <= 10 * FEASIBILITY:
             status, sentence = BROKE_DOWN
-        took, iterations = time.perf_counter() - began, int(stats["iter_count"])
+        took = time.perf_counter() - began
         if status not in SOLVED:
             return TubeSolution(status=status, sentence=sentence, iterations=iterations, solve_time=took)
 
         # ---- unpack -------------------------------------------------------------------------------------------------------------
-        x = np.array(result["x"]).ravel()
-        nodes = x[: node_start.size].reshape(node_start.shape)
-        found = x[node_start.size :].reshape(step_start.shape)
+        found = x[: (states + controls) * steps].reshape(steps, -1)
+        place = np.append(found[:, states - 1], x[-1]) * mean_step
         return TubeSolution(
             status=status,
             sentence=sentence,
             iterations=iterations,
             solve_time=took,
-            steps=steps_of(run, guess, found[:, axes] * second, found[:, :axes] * jerk),
-            place=nodes[:, -1] * mean_step,
+            steps=steps_of(
+                run, guess, found[:, states + axes] * second, found[:, states : states + axes] * jerk
+            ),
+            place=place,
         )
-
-
-def _options(settings: TubeNLP) -> dict[str, Any]:
-    """What ipopt is asked for."""
-    return {
-        "print_time": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.mu_strategy": "monotone",
-        "ipopt.mu_init": BARRIER,
-        "ipopt.tol": settings.tol,
-        "ipopt.max_iter": settings.max_iterations,
-        "ipopt.constr_viol_tol": FEASIBILITY,
-        "ipopt.acceptable_tol": 1e10,  # not asked for: the multipliers of equal optima need not settle
-        "ipopt.acceptable_compl_inf_tol": COMPLEMENTARITY,
-        "ipopt.acceptable_constr_viol_tol": FEASIBILITY,
-        "ipopt.acceptable_obj_change_tol": SETTLED,
-        "ipopt.acceptable_iter": SETTLED_ITERATIONS,
-    }

@@ -57,11 +57,14 @@ class TubeOwn:
     gap      : complementarity at its end, share of the time [-]
     divide   : divide windows that fail; what is found is of use in parts only then
     progress : called with the share of the steps that are done [-]
+    least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: 31
+               runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times the iterations
     """
 
     gap: float = 1e-5
     divide: bool = True
     progress: Callable[[float], None] | None = None
+    least: float = 1.0
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -204,7 +207,7 @@ class _Search:
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed)
+                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning
                 )

@@ -1,4 +1,4 @@
-"""The solvers of the free optimum by name: the own one, and ipopt on the same problem."""
+"""The solvers of the free optimum by name: the own one, and ipopt and fatrop on the same problem."""
 
 from __future__ import annotations
 
@@ -24,7 +24,11 @@ class TubeSolver(Protocol):
         ...
 
 
-SOLVERS: dict[str, TubeSolver] = {"own": TubeOwn(), "ipopt": TubeNLP()}
+SOLVERS: dict[str, TubeSolver] = {
+    "own": TubeOwn(),
+    "ipopt": TubeNLP(),
+    "fatrop": TubeNLP(solver="fatrop"),
+}
 
 
 def tube_solver(solver: str | TubeSolver) -> TubeSolver:

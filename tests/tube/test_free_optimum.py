@@ -33,7 +33,9 @@ def begun(slower: float):
     return line(), guess_from(line(), seen, np.array([0.0, motion.end]))
 
 
-@pytest.mark.parametrize("solver", [TubeOwn(), TubeNLP()], ids=["own", "ipopt"])
+@pytest.mark.parametrize(
+    "solver", [TubeOwn(), TubeNLP(), TubeNLP(solver="fatrop")], ids=["own", "ipopt", "fatrop"]
+)
 @pytest.mark.parametrize("slower", [1.1, 1.5])
 def test_a_line_from_rest_to_rest_takes_its_closed_form(slower, solver):
     """T = 4 (L/2j)^(1/3), from motions that take a tenth and half as long again."""

@@ -34,9 +34,9 @@ from planner.optimal.shaped import shaped_plan
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
 # (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
 SIGMA2 = 0.94
-# A motion that takes no more than this over what its feed asks for is not searched [-]: of 30,000 lines of dense chords the search took
-# half of the computing and found nothing.
-LEAST_LEFT = 1e-3
+# A motion of more steps than the second that takes no more than the first over what its feed asks for is not searched [-]: on 30,000
+# lines of dense chords the search took half of the computing and found nothing; on a random job of ten blocks it found 9e-4.
+LEAST_LEFT, CHEAP = 1e-3, 10_000
 # Steps that a motion has on a leg at least (tube/guess.py).
 LEAST_STEPS = 2
 
@@ -88,7 +88,8 @@ class OptimalMethod(Method):
 def _freed_plan(job: Job, settings: Settings) -> Plan:
     """The plan after the search for geometry and feed together, as far as the effort goes and the search can."""
     dial = settings.effort.search
-    if LEAST_STEPS * len(legs_of(job.toolpath).first) > dial.steps_max:
+    steps = LEAST_STEPS * len(legs_of(job.toolpath).first)
+    if steps > dial.steps_max:
         return fastest_plan(job, settings)
     from planner.methods.at_once import searched_at_once  # other plans need not load what they use
     from planner.methods.free import freed, searchable
@@ -97,7 +98,7 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
         return fastest_plan(job, settings)
     begun = first_motion(job, settings) if dial.at_once else None
     if begun is not None:
-        if begun.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
+        if steps > CHEAP and begun.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
             job.tell("search", left=begun.solution.cycle_time / _at_feed(job) - 1.0)
             return fastest_plan(job.afresh(), settings)
         plan = searched_at_once(job.afresh(), settings, begun)

@@ -6,7 +6,7 @@ counts. On a line the distance is that from the chord, on an arc that from the p
     (p(x) - q) p'(x) = 0,      by Newton's method from the angle at which q is seen from the axis, in each turn,
 
 or from its ends; on a spline of the program the same, from the nearest of `STARTS` places (curves.py). Between samples the tolerance
-counts (contour.py).
+counts (contour.py), and on the half of a block beside one under G64, where the corner between them may be rounded.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.geometry.toolpath import Toolpath
+from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verify.curves import curve_points
 from planner.verify.findings import Look
@@ -38,7 +38,7 @@ def exact_faults(
     worst, when, line = 0.0, 0.0, 0
     for chunk in trajectory.chunks():
         k = np.clip(np.searchsorted(passed, chunk.t, side="right") - 1, 0, len(toolpath) - 1)
-        inside = np.flatnonzero(toolpath.exact[k])
+        inside = np.flatnonzero(toolpath.exact[k] & ~_of_a_corner(toolpath, chunk.position, k))
         if not len(inside):
             continue
         off = np.min(
@@ -54,6 +54,22 @@ def exact_faults(
     if worst <= PLACE_ROUNDING + float(np.linalg.norm(rounding)):
         return []
     return [f"exact path: {worst:.6g} mm off at t = {when:.6g} s, line {line}: G61 asks for the path itself"]
+
+
+def _of_a_corner(toolpath: Toolpath, q: FloatArray, segment: Array) -> Array:
+    """(n,) whether points q (n, A) may belong to a corner with a block that need not be followed exactly: they are on the half of their
+    segment that is beside it, and no full stop is between."""
+    free, moving = np.append(~toolpath.exact, False), toolpath.joint != Joint.STOP
+    half = 0.5 * toolpath.length[segment]
+    before = free[segment - 1] & moving[segment] & (_apart(q, toolpath.start[segment]) < half)
+    behind = free[segment + 1] & moving[segment + 1] & (_apart(q, toolpath.end[segment]) < half)
+    found: Array = before | behind
+    return found
+
+
+def _apart(q: FloatArray, p: FloatArray) -> FloatArray:
+    gap: FloatArray = np.linalg.norm(q - p, axis=1)
+    return gap
 
 
 def _distance(toolpath: Toolpath, q: FloatArray, segment: Array) -> FloatArray:

@@ -137,7 +137,7 @@ def corner_job(theta: float, axes: int, seed: int) -> Program:
 def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
     """`fir-plain`: exactly, or by eps_2, the most that a complete overlap can. By the interior angle it would be another error."""
     limits = problems.machine(
-        tolerance=eps, dt=2e-4,
+        tolerance=eps, dt=2e-4, rotary_radius=1.0,
         axes={k: Axis(velocity=1e4 * u, acceleration=2000.0 * u, jerk=66_667.0 * u) for k, u in UNITS.items()},
     )  # fmt: skip
     made = plan(corner_job(theta, axes, seed), limits, method="fir-plain")

@@ -57,16 +57,17 @@ class Linker:
             binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
         binding.add_symbol("numba_unpickle", ctypes.cast(_unpickle, ctypes.c_void_p).value)
         _initialize()
-        machine = binding.Target.from_triple(binding.get_process_triple()).create_target_machine(jit=True)
-        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
+        self._target = binding.Target.from_triple(binding.get_process_triple())
+        self._engines: list[Any] = []
 
     def function(self, kernel: Kept, named: Callable[..., Any]) -> Callable[..., Any]:
         """The entry for Python of a kernel, made of this function. Raises RuntimeError if it cannot be linked."""
-        self._engine.add_object_file(binding.ObjectFileRef.from_data(kernel.code))
-        self._engine.finalize_object()
+        engine = self._engine()
+        engine.add_object_file(binding.ObjectFileRef.from_data(kernel.code))
+        engine.finalize_object()
         made = []
         for name, module, constants in kernel.environments:
-            address = self._engine.get_global_value_address(name)
+            address = engine.get_global_value_address(name)
             if address:
                 loaded = sys.modules.get(module)
                 environment = self._environment({"__name__": module} if loaded is None else vars(loaded))
@@ -74,11 +75,19 @@ class Linker:
                 _lasting.append(environment)  # machine code refers to it
                 ctypes.c_void_p.from_address(address).value = id(environment)
                 made.append(environment)
-        entry = self._engine.get_function_address(kernel.entry)
+        entry = engine.get_function_address(kernel.entry)
         if not entry or not made:
             raise RuntimeError(f"no kernel {kernel.entry}")
         of = SimpleNamespace(__name__=named.__module__)
         return self._make(of, named.__name__, named.__doc__ or "", entry, made[0], self)
+
+    def _engine(self) -> Any:
+        """An engine of its own for every kernel: numba's names do not tell records of two and of nine axes apart, and of two functions
+        of one name in an engine the first would be called for both."""
+        machine = self._target.create_target_machine(jit=True)
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
+        self._engines.append(engine)  # machine code lasts as long as its engine
+        return engine
 
 
 _lasting: list[Any] = []

@@ -16,6 +16,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.base.packages import import_needed
 from planner.base.series import Series
 from planner.kinematics.chain import LINEAR
 from planner.machine import ROTARY_AXES
@@ -60,8 +61,7 @@ def expression(axes: str, joints: Callable[..., Sequence[Any]]) -> Expression:
 
     Raises InputError for other letters, and unless the function returns three expressions of these symbols.
     """
-    import casadi
-
+    casadi = import_needed("casadi", "kinematics as an expression")
     letters = tuple(axes)
     if letters[:3] != LINEAR or len(set(letters)) < len(letters) or not set(letters[3:]) <= set(ROTARY_AXES):
         raise InputError(

@@ -113,6 +113,56 @@ def test_kernels_from_the_disk(use: Callable[..., str], tmp_path: Path) -> None:
     assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
 
 
+OF_RECORDS = """
+import numpy as np
+
+from planner.base.kernels import njit
+
+
+@njit(cache=True)
+def part(rows, n):
+    found = 0.0
+    for k in range(rows[n]["of"].shape[0]):
+        found += rows[n]["of"][k]
+    if found < 0.0:
+        return part(rows, n + 1)  # a function that calls itself stays one
+    return found
+
+
+@njit(cache=True)
+def total(rows):
+    found = 0.0
+    for n in range(len(rows)):
+        found += part(rows, n)
+    return found
+
+
+def records(count):
+    rows = np.zeros(3, np.dtype([("before", np.float64), ("of", np.float64, (count,))]))
+    rows["of"] = 1.0
+    return rows
+"""
+
+
+@pytest.mark.slow
+def test_kernels_of_records_of_two_sizes_do_not_mix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled by two processes, and loaded by a third: numba gives both the same name."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "sums.py").write_text(OF_RECORDS, encoding="utf-8")
+
+    def said(*counts: int) -> str:
+        code = f"from sums import records, total\nprint(*(total(records(n)) for n in {counts}), total.loaded)"
+        command = [sys.executable, "-c", code]
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    assert said(2) == "6.0 0"
+    assert said(9) == "27.0 0"
+    assert said(2, 9) == "6.0 27.0 2"
+    assert said(9, 2) == "27.0 6.0 2"
+
+
 def test_kernels_that_came_with_the_installation_are_found_and_stay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

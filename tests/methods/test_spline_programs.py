@@ -59,8 +59,9 @@ def test_stop_runs_on_the_curve(text: str) -> None:
     assert 0.7 < max(limit.ratio for limit in verdict.limits.values() if limit.limited) <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize(("method", "near"), [("stop", 1e-9), ("second-order", 1e-4), ("optimal", 1e-4)])
+@pytest.mark.parametrize(("method", "near"), [("stop", 1e-9), ("second-order", 1e-4), ("optimal", 5e-4)])
 def test_a_circle_takes_as_long_as_the_arc(method: str, near: float) -> None:
+    # `optimal` finds geometry and feed together on the arc, and not on splines of the program
     side = np.sqrt(0.5)
     corners = [
         (0, 0, 1),

@@ -21,7 +21,12 @@ def programs(shared_dir: Path) -> list[list[bytes]]:
 def test_mutants_end_in_a_program_or_in_a_message(first: int) -> None:
     found = {outcome(mutant(seed, []), a_reading(seed)) for seed in range(first, first + 100)}
     assert found <= {"read", "refused", "not a program"}
-    assert {"read", "refused"} <= found
+    assert "refused" in found
+
+
+def test_some_mutants_are_read() -> None:
+    """3 to 8 % of them are programs still."""
+    assert "read" in {outcome(mutant(seed, []), a_reading(seed)) for seed in range(200)}
 
 
 def test_mutants_of_real_programs(programs: list[list[bytes]]) -> None:

@@ -5,15 +5,22 @@ leaves it only at corners, and the less, the denser the knots are. Where it uses
 which moves the knots of the whole run a little: on a run of 100,000 corners some site always ends a little beyond `ROOM`. That does no
 harm: what is within `INSIDE` of the tolerance is a start for the relaxation (relax.py). Only spans with sites outside of that are no
 spline, and the run is to be cut there (spline_path.py).
+
+How dense the knots of a long run must be is found in stretches, side by side; with these distances its knots are laid as a whole, and
+made denser only where it uses more than `INSIDE`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
+from planner.base.threads import side_by_side
 from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.knots import graded, spacing, spread
@@ -27,6 +34,7 @@ DENSER = 0.75  # factor on the distance of knots where it uses more [-]
 DENSER_MAX = 16  # so many times at most: knots are 100 times as dense then
 INSIDE = 0.99  # of the tolerance that it may use in the end [-]: the relaxation starts strictly inside of its own corridor, relax.USED
 SPANS_MIN = 8  # of a run: with five control points fixed at either end three are left to move
+STRETCH = 4_000  # vertices of a stretch of a long run; runs of fewer than two stretches are laid as a whole
 
 
 def lay(corridor: Corridor, longest: FloatArray) -> Splines:
@@ -34,7 +42,25 @@ def lay(corridor: Corridor, longest: FloatArray) -> Splines:
 
     longest : (Q,) longest span of each run [mm]
     """
-    return Splines(*_lay(corridor, longest))
+    distance = np.full(len(corridor.place), np.inf)
+    for q in np.flatnonzero(np.diff(corridor.first) >= 2 * STRETCH).tolist():
+        begin, end = int(corridor.first[q]), int(corridor.first[q + 1]) - 1
+        count = (end - begin) // STRETCH
+        cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
+        tasks = [_stretch(corridor, float(longest[q]), a, b, distance) for a, b in pairwise(cuts)]
+        side_by_side(tasks, lambda: None, lambda: None)
+    return Splines(*_lay(corridor, longest, distance))
+
+
+def _stretch(
+    corridor: Corridor, longest: float, first: int, last: int, distance: FloatArray
+) -> Callable[[], None]:
+    """What writes the distances of knots at the vertices inside first..last, as many as that stretch by itself needs."""
+
+    def work() -> None:
+        distance[first + 1 : last] = _distances(corridor, longest, first, last)
+
+    return work
 
 
 @njit(cache=True, error_model="numpy")
@@ -72,17 +98,52 @@ def _denser(h, inner, sites, breaks, used):
 
 
 @njit(cache=True, error_model="numpy")
-def _lay_run(corridor, longest):
-    """The first spline of one run: breaks, control points, sites, and the spans (S,) with one outside."""
-    place, inner = corridor.place, corridor.place[1:-1]
+def _laid(corridor, inner, h, longest):
+    """Breaks, control points and sites of one run whose knots are at the distances h (m,) at the places `inner` (m,), and what the
+    sites use of the tolerance."""
+    breaks = spread(inner, h, corridor.place[0], corridor.place[-1], longest, SPANS_MIN)
+    control = greville_control(corridor, breaks)
+    sites = sites_of_run(corridor, knots_at(breaks))
+    return breaks, control, sites, used_share(sites, control)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _distances(whole, longest, first, last):
+    """The distances of knots (last - first - 1,) at the vertices between two of one run, with which a spline between them by itself
+    uses no more than `ROOM`."""
+    begin, end = first, last + 1
+    corridor = Corridor(
+        whole.first[:0],
+        whole.place[begin:end],
+        whole.point[begin:end],
+        whole.turn[begin:end],
+        whole.along[begin:end],
+        whole.tol[begin:end],
+        whole.tol_chord[begin:end],
+    )
+    inner = corridor.place[1:-1]
     h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
+    for _ in range(DENSER_MAX):
+        breaks, _, sites, used = _laid(corridor, inner, h, longest)
+        if not (used > ROOM).any():
+            break
+        h = _denser(h, inner, sites, breaks, used)
+    return h
+
+
+@njit(cache=True, error_model="numpy")
+def _lay_run(corridor, longest, distance):
+    """The first spline of one run: breaks, control points, sites, and the spans (S,) with one outside. distance : (V,) known ones of
+    knots, infinite where they are not"""
+    inner = corridor.place[1:-1]
+    h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
+    room = ROOM
+    if (distance < np.inf).any():
+        h, room = graded(inner, np.minimum(h, distance[1:-1])), INSIDE
     attempt = 0
     while True:
-        breaks = spread(inner, h, place[0], place[-1], longest, SPANS_MIN)
-        control = greville_control(corridor, breaks)
-        sites = sites_of_run(corridor, knots_at(breaks))
-        used = used_share(sites, control)
-        if attempt == DENSER_MAX or not (used > ROOM).any():
+        breaks, control, sites, used = _laid(corridor, inner, h, longest)
+        if attempt == DENSER_MAX or not (used > room).any():
             break
         attempt += 1
         h = _denser(h, inner, sites, breaks, used)
@@ -94,10 +155,14 @@ def _lay_run(corridor, longest):
 
 
 @njit(cache=True, error_model="numpy")
-def _lay(corridor, longest):
-    """Columns of `Splines`."""
+def _lay(corridor, longest, distance):
+    """Columns of `Splines`. distance : (V,) of knots, as of `_lay_run`"""
     runs, axes = len(longest), corridor.point.shape[1]
-    parts = [_lay_run(run_corridor(corridor, q), longest[q]) for q in range(runs)]
+    first = corridor.first
+    parts = [
+        _lay_run(run_corridor(corridor, q), longest[q], distance[first[q] : first[q + 1]])
+        for q in range(runs)
+    ]
     span_first, site_first = np.zeros(runs + 1, np.int64), np.zeros(runs + 1, np.int64)
     for q in range(runs):
         _, _, own, out = parts[q]

@@ -5,11 +5,16 @@ optimal/reshape.py weights them by what the time-optimal motion pays for.
 
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are tightened by as much as the bound
 is too large, and relaxed again.
+
+A long run is relaxed in stretches, side by side, with `DEGREE` control points between them that stay; then in one window around each
+gap. Control points further away than that are none of a stretch's business, so that it does not matter which one is first. The
+stretches depend on the run alone: the result is the same on any number of threads.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +49,8 @@ WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strict
 WINDOW = 240  # control points relaxed at a time ...
 OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
 SPANS_SHARED = 2_000  # fewer are relaxed by one thread: threads take 1 ms to begin, a span some 20 us
+# Control points of a stretch of a long run; a window more for each of them: 6 % of the work. Runs of fewer than two are relaxed as one.
+STRETCH = 4_000
 
 
 class Goal(NamedTuple):
@@ -195,12 +202,27 @@ def _put_points(values, first, into):
             into[first + i, k] = values[i, k]
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def _sweep(run, goal, gap, begin, end, control, multiplier):
+    """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A), with the multipliers (J,) of their
+    sites. Reads `DEGREE` control points more on both sides."""
+    done = begin
+    while done < end:
+        lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier)
+        window = _window(run, lo, hi)
+        moved, prices = _relaxed_window(window, run, control, run.sites.radius, goal, gap)
+        _put_points(moved, lo, control)
+        _put(prices, window.site, multiplier)
+        done = hi
+
+
 @njit(cache=True, error_model="numpy")
-def _relax_run(run, start, goal, gap, only_outside):
+def _relax_run(run, start, prices, goal, gap, only_outside):
     """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites, or only in windows around the
-    sites where it has no certificate; returns whether the result has a certificate, and the rest of `Relaxed`."""
+    sites where it has no certificate; returns whether the result has a certificate, and the rest of `Relaxed`, with multipliers
+    `prices` (J,) where no window is relaxed."""
     control, radius = start.copy(), run.sites.radius.copy()
-    multiplier, ratio_site = np.zeros(len(radius)), np.zeros(len(radius))
+    multiplier, ratio_site = prices.copy(), np.zeros(len(radius))
     left = np.empty(len(run.knots.breaks) - 1)
     end = len(control) - run.fixed_last
     if only_outside:
@@ -252,21 +274,55 @@ def _run(q, corridor, splines, runs, used, goal):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _begin(q, corridor, splines, runs, used, goal, inside):
+    """Run q, and its control points (n, A) to begin with: those that it has, or a little further inside."""
+    run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
+    if inside:
+        for i in range(len(start)):
+            for k in range(start.shape[1]):
+                start[i, k] += (1.0 - AGAIN) * (run.middle[i, k] - start[i, k])
+    return run, start
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _finish(q, run, start, prices, splines, goal, only_outside, found):
+    """Relax run q and write it into the columns of `Relaxed`, which hold what was before."""
+    certified, control, radius, left, multiplier = found
+    certified[q], moved, smaller, kept, prices = _relax_run(run, start, prices, goal, goal.gap[q], only_outside)
+    if certified[q]:
+        _put_points(moved, control_first(splines, q), control)
+        _put(smaller, splines.site_first[q], radius)
+    _put(kept, splines.span_first[q], left)
+    _put(prices, splines.site_first[q], multiplier)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def _relax(corridor, splines, runs, used, goal, only_outside, own, found):
     """Write the runs `own` (k,) into the columns of `Relaxed`, which hold what was before."""
-    certified, control, radius, left, multiplier = found
     for q in own:
-        run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
-        if not only_outside:
-            for i in range(len(start)):
-                for k in range(start.shape[1]):
-                    start[i, k] += (1.0 - AGAIN) * (run.middle[i, k] - start[i, k])
-        certified[q], moved, smaller, kept, prices = _relax_run(run, start, goal, goal.gap[q], only_outside)
-        if certified[q]:
-            _put_points(moved, control_first(splines, q), control)
-            _put(smaller, splines.site_first[q], radius)
-        _put(kept, splines.span_first[q], left)
-        _put(prices, splines.site_first[q], multiplier)
+        run, start = _begin(q, corridor, splines, runs, used, goal, not only_outside)
+        _finish(q, run, start, np.zeros(len(run.sites.span)), splines, goal, only_outside, found)
+
+
+def _relax_long(
+    q: int, corridor: Corridor, splines: Splines, runs: SplineRuns, used: FloatArray, goal: Goal, found: Relaxed
+) -> None:
+    """Write run q, relaxed in stretches (module text), into the columns of `Relaxed`."""
+    run, control = _begin(q, corridor, splines, runs, used, goal, True)
+    prices, gap = np.zeros(len(run.sites.span)), float(goal.gap[q])
+    first, end = int(run.fixed_first), len(control) - int(run.fixed_last)
+    count = (end - first) // STRETCH
+    cuts = [first + (end - first) * k // count for k in range(count + 1)]
+    stretches = [(a, b - DEGREE) for a, b in pairwise(cuts)]
+    stretches[-1] = (cuts[-2], end)
+    gaps = [(b - WINDOW // 2, b + WINDOW // 2) for b in cuts[1:-1]]
+
+    def work(begin: int, until: int) -> Callable[[], None]:
+        return lambda: _sweep(run, goal, gap, begin, until, control, prices)
+
+    for ranges in (stretches, gaps):
+        side_by_side([work(*own) for own in ranges], lambda: None, lambda: None)
+    _finish(q, run, control, prices, splines, goal, True, found)
 
 
 def _shares(size: Array, count: int) -> list[Array]:
@@ -304,6 +360,10 @@ def relax(
     )
     fitting = np.flatnonzero(splines.fits)
     size = np.diff(splines.span_first)[fitting]
+    if not only_outside:
+        for q in fitting[size >= 2 * STRETCH].tolist():
+            _relax_long(q, corridor, splines, runs, used, goal, found)
+        fitting, size = fitting[size < 2 * STRETCH], size[size < 2 * STRETCH]
     shares = _shares(size, threads() if size.sum() >= SPANS_SHARED else 1)
 
     def work(own: Array) -> Callable[[], None]:

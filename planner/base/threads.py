@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+Here = TypeVar("Here")
+There = TypeVar("There")
 
 _given: int | None = None
 
@@ -59,3 +64,26 @@ def side_by_side(
             for future in running:
                 future.cancel()
             raise
+
+
+def beside(here: Callable[[], Here], there: Callable[[], There]) -> tuple[Here, There]:
+    """The results of `here`, which runs in this thread, and of `there`, which runs in another one meanwhile; without another thread,
+    one after the other. What is raised here is raised at once, what is raised there when `here` has ended."""
+    if threads() == 1:
+        return here(), there()
+    found: list[There] = []
+    raised: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            found.append(there())
+        except BaseException as fault:
+            raised.append(fault)
+
+    other = threading.Thread(target=run, daemon=True)  # does not keep an interrupted program alive
+    other.start()
+    own = here()
+    other.join()
+    if raised:
+        raise raised[0]
+    return own, found[0]

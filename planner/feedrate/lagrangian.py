@@ -74,7 +74,7 @@ def lagrangian(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _lagrangian(columns, interval, profile):
     """Fields of `Lagrangian`, in their order; interval (P,) is False behind the last point of a piece."""
     _, s, x_max, d1, d2_left, d2_right, d3_left, d3_right, acceleration, jerk = columns

@@ -47,6 +47,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.names import AUTO, NORMAL, QUICK, SPLINE
+from planner.base.threads import beside
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.job.job import Delivered, Job
@@ -81,6 +82,7 @@ FIRST_GAP, GAP_SHARE, LAST_GAP = 1e-3, 0.1, 1e-5
 # Of 345 plans 9 exceeded a limit between the places looked at, and one of these once more (benchmarks/retries.py); each time with ten
 # times the margin.
 SEEN_ROUNDS = 2
+PRICED_BESIDE = 30_000  # grid points: with more, prices are found while the motion is judged, by another thread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,8 +143,13 @@ def plan_on_path(job: Job, settings: Settings) -> Plan:
             best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
-        made = _delivered(job, motion, () if settings.order.jerk_limited else ("jerk",))
-        if settings.order.jerk_limited and settings.priced:
+        not_limited = () if settings.order.jerk_limited else ("jerk",)
+        if not (settings.order.jerk_limited and settings.priced):
+            made = _delivered(job, motion, not_limited)
+        elif len(best.samples) > PRICED_BESIDE:
+            made, prices = beside(lambda: _delivered(job, motion, not_limited), lambda: prices_of(best, job.machine))
+        else:
+            made = _delivered(job, motion, not_limited)
             with job.stage("report"):
                 prices = prices_of(best, job.machine)
     else:

@@ -90,7 +90,7 @@ def _on_one_interval(motion: Motion) -> Array:
     return np.asarray(beyond <= grid[np.minimum(interval + 1, len(grid) - 1)])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _worst(feed, motions, limits, smooth, out):
     """The factor of each of n pieces, into out (n,), from what is seen of it at the shares `WATCHED`: feed (3 n,) over the programmed
     one, and velocities, accelerations and jerks (3 n, A) with their limits (3, A); on smooth pieces (n,) of the parabolas through

@@ -80,7 +80,7 @@ def quiet_way(feed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> F
     return np.asarray(feed * (2.0 * feed * slowest + float((acceleration / jerk).max())))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _turning(legs, corners, spans, acceleration, jerk):
     """max_k |r''_k|/a_k (R+S,) [s2/mm2] and max_k |r'''_k|/j_k [s3/mm3] of all legs and spans."""
     elements = len(legs) + len(spans)

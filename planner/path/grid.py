@@ -155,7 +155,7 @@ def _subdivide(table, row, limits, resolution, rest, work, out):
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def divide(table, rows, limits, resolution, shortest):
     """The rows of path/rows.py with those on curves divided into the intervals of the grid.
 
@@ -198,7 +198,7 @@ def _set_part(out, row, w0, w1):
     set_row(out, row.curve, row.segment, w0, w1, begin, end, row.last)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def grade(legs, rows):
     """Halve intervals on curves until they are no longer than `STEEPEST` times their neighbours plus `SLOPE` times the distance from
     them: between a short and a long interval the kinematics of a jerk-limited profile are far from linear."""
@@ -273,7 +273,7 @@ def _effective_curvature(points):
     return left, right
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def evaluate(table, grid, limits):
     """The `Columns` of a grid, from an `ElementTable` (corners/elements.py), `Intervals`, and `PathLimits` (path/rows.py)."""
     legs, corners, spans = table

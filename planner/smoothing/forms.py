@@ -157,7 +157,7 @@ def motion_bands(splines, motion, limits):
     return H, Q
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def add_motion_bands(splines, motion, limits, H, Q):
     """Add the bands of a part of a motion, some of its intervals, to H and Q (`motion_bands`)."""
     for q in range(len(splines.fits)):

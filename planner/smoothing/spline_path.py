@@ -154,7 +154,7 @@ def turns_little(poly, control, i, h):
     return others <= 0.5 * first and first > 2.0 * CUSP * h
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _cusp_spans(splines):
     """(S,) `cusp_spans`."""
     span_first, axes = splines.span_first, splines.control.shape[1]

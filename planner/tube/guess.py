@@ -14,7 +14,6 @@ and each of them has its place on the run, the nearest one, never going back.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -124,17 +123,23 @@ def _steps(
     spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * fine[0] / unit
     least = fine[1] + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
     least = np.maximum(least, run.length / (ARC_STEP * run.step_max))
-    steps, times = np.empty(len(run), np.int64), []
-    for r, (begin, end) in enumerate(pairwise(vertex_time)):
-        inside = motion.t[slice(*np.searchsorted(motion.t, [begin, end], side="right"))]
-        inside = inside[inside < end]
-        t = np.concatenate([[begin], inside, [end]])
-        even = (t - begin) / (end - begin)
-        fraction = np.interp(t, motion.t, spent)
-        fraction += least[r] * even - fraction[0]
-        steps[r] = int(np.ceil(fraction[-1]))
-        times.append(np.interp(fraction[-1] * np.arange(steps[r]) / steps[r], fraction, t))
-    return np.repeat(np.arange(len(run)), steps), np.append(np.concatenate(times), vertex_time[-1])
+    # the share of the steps that is done at the times t, on all legs at once: `done` from the begin of their leg, `share` from that of the run
+    inside = motion.t[(motion.t > vertex_time[0]) & (motion.t < vertex_time[-1])]
+    t = np.union1d(inside, vertex_time)
+    leg = np.minimum(np.searchsorted(vertex_time, t, side="right") - 1, len(run) - 1)
+    spent_at = np.interp(vertex_time, motion.t, spent)
+    even = (t - vertex_time[leg]) / np.diff(vertex_time)[leg]
+    done = np.interp(t, motion.t, spent) + (least[leg] * even - spent_at[leg])
+    whole = spent_at[1:] + (least - spent_at[:-1])
+    before = np.append(0.0, np.cumsum(whole))
+    share = done + before[leg]
+    steps = np.ceil(whole).astype(np.int64)
+    of_step = np.repeat(np.arange(len(run)), steps)
+    first = np.cumsum(steps) - steps
+    number = np.arange(len(of_step)) - first[of_step]
+    times = np.interp(before[of_step] + whole[of_step] * number / steps[of_step], share, t)
+    times[first] = vertex_time[:-1]
+    return of_step, np.append(times, vertex_time[-1])
 
 
 def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArray:

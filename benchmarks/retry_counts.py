@@ -43,7 +43,7 @@ def count_steps(steps: list[dict[str, Any]]) -> None:
 
 def watch() -> None:
     """Count what the trace does not tell."""
-    for module, names in ((relax, ("_relax", "_relax_run")), (initial, ("_lay", "_lay_run"))):
+    for module, names in ((relax, ("_relax", "_finish", "_relax_run")), (initial, ("_lay", "_lay_run"))):
         for name in names:
             setattr(module, name, getattr(module, name).py_func)
     _around(spline_path, "relax", _labelled("first shape"))

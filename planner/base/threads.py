@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import TypeVar
 
 Here = TypeVar("Here")
@@ -64,6 +66,18 @@ def side_by_side(
             for future in running:
                 future.cancel()
             raise
+
+
+def in_parts(count: int, least: int, work: Callable[[int, int], None]) -> None:
+    """Call `work` for parts first, beyond of 0..count, side by side; all at once where there is one thread, or less than two parts of
+    `least`. What is worked on may not depend on the parts."""
+    parts = max(min(threads(), count // least), 1)
+    if parts == 1:
+        work(0, count)
+        return
+    ends = [count * k // parts for k in range(parts + 1)]
+    tasks = [functools.partial(work, *own) for own in pairwise(ends)]
+    side_by_side(tasks, lambda: None, lambda: None)
 
 
 def beside(here: Callable[[], Here], there: Callable[[], There]) -> tuple[Here, There]:

@@ -8,6 +8,8 @@ would have to stay, or what is found does not pass its verdict, there is no plan
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.methods.free import Start, part_of, said, search, tabled
@@ -20,8 +22,19 @@ from planner.tube.run import tube_runs_of
 from planner.tube.splice import Spliced, SplicedRun
 
 
-def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> Plan | None:
-    """The plan of what the search finds from the first motion; None where it does not find all of it.
+class AtOnce(NamedTuple):
+    """What the search finds from the first motion.
+
+    plan      : None where it does not find all of it
+    too_large : whether it was not begun, because the motion has more steps than the effort is for
+    """
+
+    plan: Plan | None
+    too_large: bool = False
+
+
+def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
+    """What the search finds from the first motion.
 
     job     : a searchable one (free.py)
     planned : on the first splines (optimal/loop.py, `first_motion`)
@@ -32,7 +45,8 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> Plan | No
         runs = list(tube_runs_of(job.toolpath, job.machine))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         if steps > dial.steps_max:
-            return None
+            job.tell("search", steps=steps, of=dial.steps_max)
+            return AtOnce(None, too_large=True)
         found: list[FoundRun] = []
         done, parts = 0, list[SplicedRun]()
         for k, run in enumerate(runs):
@@ -41,17 +55,17 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> Plan | No
             found.append(search(k, run, [start], TubeOwn(dial.gap, divide=False, progress=progress)))
             if not found[-1].whole:
                 job.tell("search", steps=steps, of_runs=len(runs), whole=k)
-                return None
+                return AtOnce(None)
             parts += parts_of(job.toolpath, found[-1], start.spliced(k))
             done += of_run
     made = job.deliver(Spliced(runs=tuple(parts)))
     trajectory, verdict = made
     job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)
     if not verdict.passed or trajectory.cycle_time > job.stop_time:
-        return None
+        return AtOnce(None)
     job.note(*path_notes(job.toolpath, planned))
     status, sentence = said(job, start, found, [], "", "a path first, then its feed")
-    return job.plan(
+    plan = job.plan(
         made,
         method=settings.method,
         corner=settings.corner if isinstance(settings.corner, str) else settings.corner.name,
@@ -61,3 +75,4 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> Plan | No
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
         tables=tabled(job, None, trajectory, found, []),
     )
+    return AtOnce(plan)

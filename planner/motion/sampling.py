@@ -21,9 +21,11 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.threads import in_parts
 from planner.corners.elements import (
     GAUSS_NODES,
     GAUSS_WEIGHTS,
+    ElementTable,
     element_length,
     element_point,
     is_straight,
@@ -39,6 +41,7 @@ LENGTH_ROUNDING = 1e-13
 ONE_STEP = 8e-8
 S_ROUNDING = 2.0**-52  # of s itself [-], which is not an error of the polynomial
 COEFFICIENTS = 11  # of an interval's polynomial, with how far it is off
+POINTS_SHARED = 5_000  # intervals that are worth a thread: 2 us each, and threads take 1 ms to begin
 # Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
@@ -146,19 +149,26 @@ def _point(table, on, room, w, out):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def inverses(table, grid, axes):
-    """(P, `COEFFICIENTS`) for the interval to the right of each point: how far the polynomial is off [share of the interval],
-    c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces."""
-    found = np.zeros((len(grid.s), COEFFICIENTS))
+def _inverses(table, grid, axes, first, beyond, found):
+    """The rows first .. beyond - 1 of `inverses`, where they are all 0."""
     room, out = room_for(axes), np.empty((4, axes))
     for g in range(len(grid.piece) - 1):
-        for i in range(grid.piece[g], grid.piece[g + 1] - 1):
+        for i in range(max(grid.piece[g], first), min(grid.piece[g + 1] - 1, beyond)):
             on = interval_of(table, grid, i, room)
             if is_straight(table[0], on.element):
                 found[i, 1] = 1.0
             else:
                 _invert(table, on, room, out, found[i])
                 found[i, 0] = max(found[i, 0] - S_ROUNDING * grid.s[i + 1] / on.h, 0.0)
+
+
+def inverses(table: ElementTable, grid: Grid, axes: int) -> FloatArray:
+    """(P, `COEFFICIENTS`) for the interval to the right of each point: how far the polynomial is off [share of the interval],
+    c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces."""
+    found = np.zeros((len(grid.s), COEFFICIENTS))
+    in_parts(
+        len(found), POINTS_SHARED, lambda first, beyond: _inverses(table, grid, axes, first, beyond, found)
+    )
     return found
 
 

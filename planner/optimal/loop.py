@@ -82,7 +82,9 @@ FIRST_GAP, GAP_SHARE, LAST_GAP = 1e-3, 0.1, 1e-5
 # Of 345 plans 9 exceeded a limit between the places looked at, and one of these once more (benchmarks/retries.py); each time with ten
 # times the margin.
 SEEN_ROUNDS = 2
-PRICED_BESIDE = 30_000  # grid points: with more, prices are found while the motion is judged, by another thread
+PRICED_BESIDE = (
+    30_000  # grid points: with more, prices are found while the motion is judged, by another thread
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +149,9 @@ def plan_on_path(job: Job, settings: Settings) -> Plan:
         if not (settings.order.jerk_limited and settings.priced):
             made = _delivered(job, motion, not_limited)
         elif len(best.samples) > PRICED_BESIDE:
-            made, prices = beside(lambda: _delivered(job, motion, not_limited), lambda: prices_of(best, job.machine))
+            made, prices = beside(
+                lambda: _delivered(job, motion, not_limited), lambda: prices_of(best, job.machine)
+            )
         else:
             made = _delivered(job, motion, not_limited)
             with job.stage("report"):

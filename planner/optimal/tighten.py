@@ -10,11 +10,13 @@ places only. Each run between full stops is then slowed down uniformly by the ex
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.threads import side_by_side
 from planner.constraints.limits import LIMITS
 from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
@@ -60,7 +62,8 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     factor = np.zeros(len(motion.law.t))
     pieces, inside = inside_pieces(motion)
     smooth = _on_one_interval(motion)
-    for first in range(0, len(pieces), CHUNK // len(WATCHED)):
+
+    def look(first: int) -> None:
         part = slice(first, first + CHUNK // len(WATCHED))
         own, times = pieces[part], inside[part]
         seen = motion.at(times.ravel(), machine.dt)
@@ -71,6 +74,14 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
             most = _with_peaks(ratio.reshape(times.shape), smooth[own])
             worst = np.maximum(worst, most ** (1.0 / order))
         factor[own] = worst
+
+    tasks = [functools.partial(look, first) for first in range(0, len(pieces), CHUNK // len(WATCHED))]
+    if len(tasks) > 1:
+        motion.at(motion.t[:1], machine.dt)  # makes what all looks share
+        side_by_side(tasks, lambda: None, lambda: None)
+    else:
+        for task in tasks:
+            task()
     for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)

@@ -13,11 +13,19 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.corners.elements import element_length, element_point, is_straight, to_arc_length
-from planner.path.rows import grown, set_row
+from planner.base.threads import in_parts
+from planner.corners.elements import (
+    ElementTable,
+    element_length,
+    element_point,
+    is_straight,
+    to_arc_length,
+)
+from planner.path.rows import PathLimits, grown, set_row
 
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
 MARGIN_SAFETY = 1.25
+POINTS_SHARED = 5_000  # points that are worth a thread: 2 us each, and threads take 1 ms to begin
 # The jerk between grid points may be off by so many times `resolution` [-]: 1 %, made good by slowing down (methods/optimal.py).
 JERK_SHARE = 5.0
 # Halvings of one interval at most, and so its smallest part; 2^-20 of a corner is below a nanometre.
@@ -273,46 +281,65 @@ def _effective_curvature(points):
     return left, right
 
 
+def evaluate(table: ElementTable, grid: Intervals, limits: PathLimits) -> Columns:
+    """What the path is on a grid."""
+    points, axes = len(grid.w0), len(limits.velocity)
+    found = Columns(np.zeros(points), *np.empty((6, points, axes)), *np.zeros((3, points)))
+
+    def work(first: int, beyond: int) -> None:
+        _evaluate(table, grid, limits, _begin(grid.last, first), _begin(grid.last, beyond), found)
+
+    in_parts(points, POINTS_SHARED, work)
+    _sum_up(grid.last, found.s)
+    return found
+
+
+def _begin(last: Array, point: int) -> int:
+    """The point, or the first one behind it that does not end a piece: what is left of that is found with it."""
+    while point < len(last) and last[point]:
+        point += 1
+    return point
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
-def evaluate(table, grid, limits):
-    """The `Columns` of a grid, from an `ElementTable` (corners/elements.py), `Intervals`, and `PathLimits` (path/rows.py)."""
+def _evaluate(table, grid, limits, first, beyond, found):
+    """The `Columns` of the intervals first .. beyond - 1, with the length of each in place of s of its end."""
     legs, corners, spans = table
     element, w0, w1, segment, last = grid
-    points, axes = len(w0), len(limits.velocity)
-    s = np.zeros(points)
-    position, d1 = np.empty((points, axes)), np.empty((points, axes))
-    d2_left, d2_right = np.empty((points, axes)), np.empty((points, axes))
-    d3_left, d3_right = np.empty((points, axes)), np.empty((points, axes))
-    margin, kappa_left, kappa_right = np.zeros(points), np.zeros(points), np.zeros(points)
+    axes = len(limits.velocity)
     work = np.empty((2, 4, axes))
     ends = np.empty((3, 4, axes))
     left, right = ends[0], ends[2]
-    fresh = True  # the point starts a piece: nothing to its left
-    for i in range(points):
+    fresh = first == 0 or last[first - 1]  # the point starts a piece: nothing to its left
+    for i in range(first, beyond):
         if last[i]:
-            kappa_right[i] = kappa_left[i]
+            found.kappa_right[i] = found.kappa_left[i]
             for k in range(axes):
-                d2_right[i, k], d3_right[i, k] = d2_left[i, k], d3_left[i, k]
-            if i + 1 < points:
-                s[i + 1] = s[i]
+                found.d2_right[i, k], found.d3_right[i, k] = found.d2_left[i, k], found.d3_left[i, k]
             fresh = True
             continue
         error = _measure(table, element[i], segment[i], (w0[i], w1[i]), limits, work, ends)
-        margin[i] = MARGIN_SAFETY * error
-        kappa_right[i], kappa_left[i + 1] = _effective_curvature(ends)
+        found.margin[i] = MARGIN_SAFETY * error
+        found.kappa_right[i], found.kappa_left[i + 1] = _effective_curvature(ends)
         if fresh:
-            kappa_left[i] = kappa_right[i]
+            found.kappa_left[i] = found.kappa_right[i]
         for k in range(axes):
             if fresh:
-                position[i, k], d1[i, k] = left[0, k], left[1, k]
-                d2_left[i, k], d3_left[i, k] = left[2, k], left[3, k]
-            d2_right[i, k], d3_right[i, k] = left[2, k], left[3, k]
-            position[i + 1, k], d1[i + 1, k] = right[0, k], right[1, k]
-            d2_left[i + 1, k], d3_left[i + 1, k] = right[2, k], right[3, k]
+                found.position[i, k], found.d1[i, k] = left[0, k], left[1, k]
+                found.d2_left[i, k], found.d3_left[i, k] = left[2, k], left[3, k]
+            found.d2_right[i, k], found.d3_right[i, k] = left[2, k], left[3, k]
+            found.position[i + 1, k], found.d1[i + 1, k] = right[0, k], right[1, k]
+            found.d2_left[i + 1, k], found.d3_left[i + 1, k] = right[2, k], right[3, k]
         fresh = False
         w_ref = 0.5 * (w0[i] + w1[i])
-        h = element_length(legs, corners, spans, element[i], w0[i], w1[i], w_ref, left)
-        s[i + 1] = max(
-            s[i] + h, np.nextafter(s[i], np.inf)
-        )  # metres into a job h may be below the last digit of s
-    return Columns(s, position, d1, d2_left, d2_right, d3_left, d3_right, margin, kappa_left, kappa_right)
+        found.s[i + 1] = element_length(legs, corners, spans, element[i], w0[i], w1[i], w_ref, left)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _sum_up(last, s):
+    """The arc lengths s (P,) of the points, in place of the lengths of the intervals before them."""
+    for i in range(len(s) - 1):
+        if last[i]:
+            s[i + 1] = s[i]
+        else:  # metres into a job a length may be below the last digit of s
+            s[i + 1] = max(s[i] + s[i + 1], np.nextafter(s[i], np.inf))

@@ -19,11 +19,14 @@ nothing. The third keeps the step where the first order holds. Limits are kept a
 may grow there by what the interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step
 must not promise what it cannot have there.
 
-Long runs are improved window by window (combined_solver.py).
+Long runs are improved window by window (combined_solver.py); the longest in stretches of windows, side by side, with `DEGREE` control
+points between them that stay, and then in one window around each gap, as in relax.py.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +34,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
+from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.combined_objective import gain_of_step, objective_of_window
@@ -39,13 +43,15 @@ from planner.smoothing.combined_rows import rows_of_window
 from planner.smoothing.combined_solver import CombinedProblem, improve_window
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.relax import TIGHTENED, next_window
+from planner.smoothing.relax import TIGHTENED, next_window, shares
 from planner.smoothing.runs import SplineRuns
 from planner.smoothing.sites import Sites, with_radius
 from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
 
 WINDOW = 400  # control points improved at a time ...
 OVERLAP = 40  # ... and of them again with the next window
+STRETCH = 4_000  # control points of a stretch of a long run; a window more for each; runs of fewer than two are improved as one
+SPANS_SHARED = 400  # fewer are improved by one thread: threads take 1 ms to begin, a span some 100 us
 ITERATIONS = 40  # per window; 10 to 25 are the rule
 HELD = (
     3  # control points of theta that stay 0 where a run ends on a straight leg: speed and acceleration go on
@@ -177,19 +183,23 @@ def _improve_window(run, radius, lo, hi, y):
     return iterations
 
 
-@njit(cache=True, error_model="numpy")
-def _improve_run(run):
-    """One run, window by window, and again around sites where the curve leaves the tolerance beside them, which are tightened: the step
-    (n, A+1), the radii (J,), and the iterations."""
-    n, axes = run.control.shape
-    y, radius, total = np.zeros((n, axes + 1)), run.sites.radius.copy(), 0
-    lo = 0
+@njit(cache=True, error_model="numpy", nogil=True)
+def _sweep(run, radius, begin, end, y):
+    """The step y (n, A+1) of a run's control points begin .. end - 1, window by window, overwritten; returns the iterations."""
+    lo, total = begin, 0
     while True:
-        hi = n if n - lo <= WINDOW + OVERLAP else lo + WINDOW
+        hi = end if end - lo <= WINDOW + OVERLAP else lo + WINDOW
         total += _improve_window(run, radius, lo, hi, y)
-        if hi == n:
-            break
+        if hi == end:
+            return total
         lo = hi - OVERLAP
+
+
+@njit(cache=True, error_model="numpy")
+def _tighten(run, radius, y):
+    """A step y (n, A+1) again around sites where the curve leaves the tolerance beside them; both it and the radii (J,) of these sites are
+    overwritten. Returns the iterations."""
+    n, total = len(run.control), 0
     for _ in range(run.again):
         certificate = certify(run.corridor, run.knots, run.sites.place, _moved(run, y))
         if certificate.span.max() <= 1.0:
@@ -204,39 +214,71 @@ def _improve_run(run):
                 break
             total += _improve_window(run, radius, lo, hi, y)
             done = hi
-    return y, radius, total
+    return total
 
 
-@njit(cache=True, error_model="numpy")
-def _improve(corridor, splines, runs, used, motion, limits, aim):
-    """Columns of `Improved`."""
-    count, radius = len(splines.fits), used.copy()
-    control, gain, iterations = splines.control.copy(), np.zeros(count), np.zeros(count)
-    for q in range(count):
-        if not splines.fits[q] or aim.pull[q] == np.inf:
-            continue
-        knots, whole, begin = run_knots(splines, q), run_control(splines, q), control_first(splines, q)
-        first, last = motion.interval[q], motion.interval[q + 1]
-        sites = run_sites(splines, q)
-        moving = _moving(whole, sites)
-        own = _columns(whole, moving)
-        sites = Sites(
-            sites.span, sites.place, sites.weights, _columns(sites.target, moving), _columns(sites.along, moving),
-            sites.slide, used[splines.site_first[q] : splines.site_first[q + 1]],
-        )  # fmt: skip
-        places = places_of_run(knots, own, motion, limits.along, _columns(limits.axes, moving), first, last)
-        free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
-        pulled = limits.pulled[moving]
-        run = CombinedRun(
-            run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, aim.pull[q], aim.gap, aim.again
-        )  # fmt: skip
-        y, radius[splines.site_first[q] : splines.site_first[q + 1]], iterations[q] = _improve_run(run)
-        moved = _moved(run, y)
-        for i in range(len(own)):
-            for k in range(whole.shape[1]):
-                control[begin + i, k] = moved[i, k]
-        gain[q] = gain_of_step(places, y)
-    return control, radius, gain, iterations
+@njit(cache=True, error_model="numpy", nogil=True)
+def _begin(q, corridor, splines, runs, used, motion, limits, aim):
+    """Run q, the radii (J,) of its sites, and a step (n, A+1) to begin with."""
+    knots, whole = run_knots(splines, q), run_control(splines, q)
+    first, last = motion.interval[q], motion.interval[q + 1]
+    sites = run_sites(splines, q)
+    moving = _moving(whole, sites)
+    own = _columns(whole, moving)
+    sites = Sites(
+        sites.span, sites.place, sites.weights, _columns(sites.target, moving), _columns(sites.along, moving),
+        sites.slide, used[splines.site_first[q] : splines.site_first[q + 1]],
+    )  # fmt: skip
+    places = places_of_run(knots, own, motion, limits.along, _columns(limits.axes, moving), first, last)
+    free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
+    pulled = limits.pulled[moving]
+    run = CombinedRun(
+        run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, aim.pull[q], aim.gap, aim.again
+    )  # fmt: skip
+    return run, sites.radius.copy(), np.zeros((len(own), len(moving) + 1))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _finish(q, run, radius, y, total, splines, found):
+    """Write run q after a step of so many iterations into the columns of `Improved`, which hold what was before."""
+    control, used, gain, iterations = found
+    iterations[q] = total + _tighten(run, radius, y)
+    moved, begin, site = _moved(run, y), control_first(splines, q), splines.site_first[q]
+    for i in range(len(moved)):
+        for k in range(moved.shape[1]):
+            control[begin + i, k] = moved[i, k]
+    for j in range(len(radius)):
+        used[site + j] = radius[j]
+    gain[q] = gain_of_step(run.places, y)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _improve(corridor, splines, runs, used, motion, limits, aim, own, found):
+    """Write the runs `own` (k,) into the columns of `Improved`, which hold what was before."""
+    for q in own:
+        run, radius, y = _begin(q, corridor, splines, runs, used, motion, limits, aim)
+        total = _sweep(run, radius, 0, len(y), y)
+        _finish(q, run, radius, y, total, splines, found)
+
+
+def _improve_long(
+    q: int, begun: tuple[CombinedRun, FloatArray, FloatArray], splines: Splines, found: Improved
+) -> None:
+    """Write run q, improved in stretches (module text), into the columns of `Improved`."""
+    run, radius, y = begun
+    count = len(y) // STRETCH
+    cuts = [len(y) * k // count for k in range(count + 1)]
+    stretches = [(a, b - DEGREE) for a, b in pairwise(cuts)]
+    stretches[-1] = (cuts[-2], cuts[-1])
+    gaps = [(b - WINDOW // 2, b + WINDOW // 2) for b in cuts[1:-1]]
+    iterations: list[int] = []
+
+    def work(begin: int, until: int) -> Callable[[], None]:
+        return lambda: iterations.append(_sweep(run, radius, begin, until, y))
+
+    for ranges in (stretches, gaps):
+        side_by_side([work(*own) for own in ranges], lambda: None, lambda: None)
+    _finish(q, run, radius, y, sum(iterations), splines, found)
 
 
 def improve(
@@ -252,4 +294,21 @@ def improve(
 
     used : (J,) radius that each site may use [mm]
     """
-    return Improved(*_improve(corridor, splines, runs, used, motion, limits, aim))
+    count = len(splines.fits)
+    found = Improved(splines.control.copy(), used.copy(), np.zeros(count), np.zeros(count))
+    asked = np.flatnonzero(splines.fits & (aim.pull < np.inf))
+    size = np.diff(splines.span_first)[asked]
+    for q in asked[size >= 2 * STRETCH].tolist():
+        begun = _begin(q, corridor, splines, runs, used, motion, limits, aim)
+        _improve_long(q, begun, splines, found)
+    asked, size = asked[size < 2 * STRETCH], size[size < 2 * STRETCH]
+
+    def work(own: Array) -> Callable[[], None]:
+        return lambda: _improve(corridor, splines, runs, used, motion, limits, aim, own, found)
+
+    tasks = [work(asked[own]) for own in shares(size, threads() if size.sum() >= SPANS_SHARED else 1)]
+    if len(tasks) > 1:
+        side_by_side(tasks, lambda: None, lambda: None)
+    elif tasks:
+        tasks[0]()
+    return found

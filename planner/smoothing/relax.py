@@ -288,7 +288,9 @@ def _begin(q, corridor, splines, runs, used, goal, inside):
 def _finish(q, run, start, prices, splines, goal, only_outside, found):
     """Relax run q and write it into the columns of `Relaxed`, which hold what was before."""
     certified, control, radius, left, multiplier = found
-    certified[q], moved, smaller, kept, prices = _relax_run(run, start, prices, goal, goal.gap[q], only_outside)
+    certified[q], moved, smaller, kept, prices = _relax_run(
+        run, start, prices, goal, goal.gap[q], only_outside
+    )
     if certified[q]:
         _put_points(moved, control_first(splines, q), control)
         _put(smaller, splines.site_first[q], radius)
@@ -305,7 +307,13 @@ def _relax(corridor, splines, runs, used, goal, only_outside, own, found):
 
 
 def _relax_long(
-    q: int, corridor: Corridor, splines: Splines, runs: SplineRuns, used: FloatArray, goal: Goal, found: Relaxed
+    q: int,
+    corridor: Corridor,
+    splines: Splines,
+    runs: SplineRuns,
+    used: FloatArray,
+    goal: Goal,
+    found: Relaxed,
 ) -> None:
     """Write run q, relaxed in stretches (module text), into the columns of `Relaxed`."""
     run, control = _begin(q, corridor, splines, runs, used, goal, True)
@@ -325,7 +333,7 @@ def _relax_long(
     _finish(q, run, control, prices, splines, goal, True, found)
 
 
-def _shares(size: Array, count: int) -> list[Array]:
+def shares(size: Array, count: int) -> list[Array]:
     """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list that has least."""
     lists: list[list[int]] = [[] for _ in range(count)]
     total = [0] * count
@@ -364,12 +372,12 @@ def relax(
         for q in fitting[size >= 2 * STRETCH].tolist():
             _relax_long(q, corridor, splines, runs, used, goal, found)
         fitting, size = fitting[size < 2 * STRETCH], size[size < 2 * STRETCH]
-    shares = _shares(size, threads() if size.sum() >= SPANS_SHARED else 1)
+    lists = shares(size, threads() if size.sum() >= SPANS_SHARED else 1)
 
     def work(own: Array) -> Callable[[], None]:
         return lambda: _relax(corridor, splines, runs, used, goal, only_outside, own, found)
 
-    tasks = [work(fitting[own]) for own in shares]
+    tasks = [work(fitting[own]) for own in lists]
     if len(tasks) > 1:
         side_by_side(tasks, lambda: None, lambda: None)
     elif tasks:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
+from planner.base.threads import use_threads
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -17,6 +18,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.optimal.on_path import OnPath
 from planner.optimal.reshape import reshape, run_times
 from planner.path.samples import sample_path
+from planner.smoothing import combined
 from planner.smoothing.basis import knots_at
 from planner.smoothing.combined_places import places_of_run
 from planner.smoothing.combined_rows import first_state, predict, rows_of_window, weigh
@@ -47,6 +49,34 @@ def pentagon():
     rounded = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     shape = spline_shape(rounded, MACHINE)
     return rounded, shape, planned(rounded, shape)
+
+
+def test_a_run_in_stretches_gains_what_it_gains_as_a_whole(monkeypatch):
+    angle = np.deg2rad(np.random.default_rng(8).uniform(10.0, 40.0, 340)) * np.where(
+        np.arange(340) % 2, 1, -1
+    )
+    points = np.cumsum(0.4 * np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0)
+    toolpath = toolpath_from_program(problems.polyline(points), MACHINE)
+    rounded = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+    start = planned(rounded, spline_shape(rounded, MACHINE))
+    pull = np.full(len(start.shape.splines.fits), 0.5)
+    _, whole = reshape(start, pull, 1e-4)
+    monkeypatch.setattr(combined, "STRETCH", 450)
+    swept = []
+    sweep = combined._sweep
+    monkeypatch.setattr(combined, "_sweep", lambda *given: (swept.append(given[2:4]), sweep(*given))[1])
+    found = []
+    try:
+        for threads in (1, 3):
+            use_threads(threads)
+            found.append(reshape(start, pull, 1e-4))
+    finally:
+        use_threads(None)
+    assert len(swept) == 2 * 3
+    np.testing.assert_array_equal(found[0][0].splines.control, found[1][0].splines.control)
+    np.testing.assert_array_equal(found[0][1], found[1][1])
+    assert whole.sum() > 0.0
+    np.testing.assert_allclose(found[0][1].sum(), whole.sum(), rtol=0.02)
 
 
 def motion(rng, control, knots):

@@ -1,8 +1,9 @@
-"""The shape of splines: cusps seen at first sight, and runs that are relaxed side by side."""
+"""The shape of splines: cusps seen at first sight, and runs and stretches that are laid and relaxed side by side."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from benchmarks import problems
 from planner.base.threads import use_threads
@@ -10,9 +11,13 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
+from planner.smoothing import combined as combined_module
+from planner.smoothing import initial as initial_module
 from planner.smoothing import relax as relax_module
 from planner.smoothing.basis import DEGREE, derivatives, knots_at
+from planner.smoothing.forms import third_derivative_energy
 from planner.smoothing.spline_path import CUSP, spline_shape, turns_little
+from planner.smoothing.splines import run_control, run_knots
 
 MACHINE = problems.machine()
 
@@ -58,3 +63,68 @@ def test_any_number_of_threads_lays_the_same_splines(monkeypatch):
     assert one.splines.fits.any()
     for a, b in ((one.splines.control, many.splines.control), (one.used, many.used), (one.left, many.left)):
         np.testing.assert_array_equal(a, b)
+
+
+@pytest.fixture(scope="module")
+def long_run():
+    """Steps of 0.4 mm, each to the other side by up to 40 degrees: about 1,000 control points."""
+    angle = np.deg2rad(np.random.default_rng(8).uniform(10.0, 40.0, 500)) * np.where(
+        np.arange(500) % 2, 1, -1
+    )
+    points = np.cumsum(0.4 * np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0)
+    toolpath = toolpath_from_program(problems.polyline(points), MACHINE)
+    return round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
+
+
+def energy(shape):
+    """Integral of the squared third derivatives of all runs."""
+    total = 0.0
+    for q in range(len(shape.splines.fits)):
+        knots = run_knots(shape.splines, q)
+        total += third_derivative_energy(
+            knots, np.ones(2), run_control(shape.splines, q), 0, len(knots.breaks) - 1
+        )
+    return total
+
+
+def test_a_run_in_stretches_is_as_smooth_as_one_relaxed_as_a_whole(long_run, monkeypatch):
+    whole = spline_shape(long_run, MACHINE)
+    assert whole.splines.fits.all()
+    monkeypatch.setattr(relax_module, "STRETCH", 300)
+    windows = []
+    sweep = relax_module._sweep
+    monkeypatch.setattr(relax_module, "_sweep", lambda *given: (windows.append(given[3:5]), sweep(*given))[1])
+    shapes = []
+    try:
+        for threads in (1, 3):
+            use_threads(threads)
+            shapes.append(spline_shape(long_run, MACHINE))
+    finally:
+        use_threads(None)
+    one, many = shapes
+    assert len(windows) == 2 * (4 + 3)
+    assert one.splines.fits.all()
+    assert one.left.min() >= 0.0  # the certificate
+    np.testing.assert_array_equal(one.splines.control, many.splines.control)
+    np.testing.assert_array_equal(one.used, many.used)
+    assert (one.splines.control != whole.splines.control).any()
+    assert energy(one) < 1.02 * energy(whole)
+
+
+def test_knots_of_a_run_laid_in_stretches_are_as_dense(long_run, monkeypatch):
+    whole = spline_shape(long_run, MACHINE).splines
+    monkeypatch.setattr(initial_module, "STRETCH", 100)
+    laid = []
+    distances = initial_module._distances
+    monkeypatch.setattr(
+        initial_module, "_distances", lambda *given: (laid.append(given), distances(*given))[1]
+    )
+    stretches = spline_shape(long_run, MACHINE).splines
+    assert len(laid) == 4
+    assert not stretches.outside.any()
+    assert abs(len(stretches.breaks) / len(whole.breaks) - 1.0) < 0.02
+
+
+def test_stretches_are_further_apart_than_their_gaps_are_wide():
+    for module in (relax_module, combined_module):
+        assert module.STRETCH > module.WINDOW + 2 * DEGREE

@@ -19,7 +19,7 @@ nothing. The third keeps the step where the first order holds. Limits are kept a
 may grow there by what the interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step
 must not promise what it cannot have there.
 
-Long runs are improved window by window (combined_solver.py); the longest in stretches of windows, side by side, with `DEGREE` control
+Long runs are improved window by window (combined_solver.py); the longest in ranges of windows, side by side, with `DEGREE` control
 points between them that stay, and then in one window around each gap, as in relax.py.
 """
 
@@ -50,7 +50,7 @@ from planner.smoothing.splines import Splines, control_first, run_control, run_k
 
 WINDOW = 400  # control points improved at a time ...
 OVERLAP = 40  # ... and of them again with the next window
-STRETCH = 4_000  # control points of a stretch of a long run; a window more for each; runs of fewer than two are improved as one
+RANGE = 4_000  # control points of a range of a long run; a window more for each; runs of fewer than two are improved as one
 SPANS_SHARED = 400  # fewer are improved by one thread: threads take 1 ms to begin, a span some 100 us
 ITERATIONS = 40  # per window; 10 to 25 are the rule
 HELD = (
@@ -184,7 +184,7 @@ def _improve_window(run, radius, lo, hi, y):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _sweep(run, radius, begin, end, y):
+def improve_range(run, radius, begin, end, y):
     """The step y (n, A+1) of a run's control points begin .. end - 1, window by window, overwritten; returns the iterations."""
     lo, total = begin, 0
     while True:
@@ -197,8 +197,8 @@ def _sweep(run, radius, begin, end, y):
 
 @njit(cache=True, error_model="numpy")
 def _tighten(run, radius, y):
-    """A step y (n, A+1) again around sites where the curve leaves the tolerance beside them; both it and the radii (J,) of these sites are
-    overwritten. Returns the iterations."""
+    """A step y (n, A+1) again around sites where the curve leaves the tolerance beside them; both it and the radii (J,) of these sites
+    are overwritten. Returns the iterations."""
     n, total = len(run.control), 0
     for _ in range(run.again):
         certificate = certify(run.corridor, run.knots, run.sites.place, _moved(run, y))
@@ -257,27 +257,27 @@ def _improve(corridor, splines, runs, used, motion, limits, aim, own, found):
     """Write the runs `own` (k,) into the columns of `Improved`, which hold what was before."""
     for q in own:
         run, radius, y = _begin(q, corridor, splines, runs, used, motion, limits, aim)
-        total = _sweep(run, radius, 0, len(y), y)
+        total = improve_range(run, radius, 0, len(y), y)
         _finish(q, run, radius, y, total, splines, found)
 
 
 def _improve_long(
     q: int, begun: tuple[CombinedRun, FloatArray, FloatArray], splines: Splines, found: Improved
 ) -> None:
-    """Write run q, improved in stretches (module text), into the columns of `Improved`."""
+    """Write run q, improved in ranges (module text), into the columns of `Improved`."""
     run, radius, y = begun
-    count = len(y) // STRETCH
+    count = len(y) // RANGE
     cuts = [len(y) * k // count for k in range(count + 1)]
-    stretches = [(a, b - DEGREE) for a, b in pairwise(cuts)]
-    stretches[-1] = (cuts[-2], cuts[-1])
+    ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
+    ranges[-1] = (cuts[-2], cuts[-1])
     gaps = [(b - WINDOW // 2, b + WINDOW // 2) for b in cuts[1:-1]]
     iterations: list[int] = []
 
     def work(begin: int, until: int) -> Callable[[], None]:
-        return lambda: iterations.append(_sweep(run, radius, begin, until, y))
+        return lambda: iterations.append(improve_range(run, radius, begin, until, y))
 
-    for ranges in (stretches, gaps):
-        side_by_side([work(*own) for own in ranges], lambda: None, lambda: None)
+    for batch in (ranges, gaps):
+        side_by_side([work(*own) for own in batch], lambda: None, lambda: None)
     _finish(q, run, radius, y, sum(iterations), splines, found)
 
 
@@ -298,10 +298,10 @@ def improve(
     found = Improved(splines.control.copy(), used.copy(), np.zeros(count), np.zeros(count))
     asked = np.flatnonzero(splines.fits & (aim.pull < np.inf))
     size = np.diff(splines.span_first)[asked]
-    for q in asked[size >= 2 * STRETCH].tolist():
+    for q in asked[size >= 2 * RANGE].tolist():
         begun = _begin(q, corridor, splines, runs, used, motion, limits, aim)
         _improve_long(q, begun, splines, found)
-    asked, size = asked[size < 2 * STRETCH], size[size < 2 * STRETCH]
+    asked, size = asked[size < 2 * RANGE], size[size < 2 * RANGE]
 
     def work(own: Array) -> Callable[[], None]:
         return lambda: _improve(corridor, splines, runs, used, motion, limits, aim, own, found)

@@ -6,7 +6,7 @@ which moves the knots of the whole run a little: on a run of 100,000 corners som
 harm: what is within `INSIDE` of the tolerance is a start for the relaxation (relax.py). Only spans with sites outside of that are no
 spline, and the run is to be cut there (spline_path.py).
 
-How dense the knots of a long run must be is found in stretches, side by side; with these distances its knots are laid as a whole, and
+How dense the knots of a long run must be is found in ranges, side by side; with these distances its knots are laid as a whole, and
 made denser only where it uses more than `INSIDE`.
 """
 
@@ -34,7 +34,7 @@ DENSER = 0.75  # factor on the distance of knots where it uses more [-]
 DENSER_MAX = 16  # so many times at most: knots are 100 times as dense then
 INSIDE = 0.99  # of the tolerance that it may use in the end [-]: the relaxation starts strictly inside of its own corridor, relax.USED
 SPANS_MIN = 8  # of a run: with five control points fixed at either end three are left to move
-STRETCH = 4_000  # vertices of a stretch of a long run; runs of fewer than two stretches are laid as a whole
+RANGE = 4_000  # vertices of a range of a long run; runs of fewer than two ranges are laid as a whole
 
 
 def lay(corridor: Corridor, longest: FloatArray) -> Splines:
@@ -43,22 +43,22 @@ def lay(corridor: Corridor, longest: FloatArray) -> Splines:
     longest : (Q,) longest span of each run [mm]
     """
     distance = np.full(len(corridor.place), np.inf)
-    for q in np.flatnonzero(np.diff(corridor.first) >= 2 * STRETCH).tolist():
+    for q in np.flatnonzero(np.diff(corridor.first) >= 2 * RANGE).tolist():
         begin, end = int(corridor.first[q]), int(corridor.first[q + 1]) - 1
-        count = (end - begin) // STRETCH
+        count = (end - begin) // RANGE
         cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
-        tasks = [_stretch(corridor, float(longest[q]), a, b, distance) for a, b in pairwise(cuts)]
+        tasks = [_range(corridor, float(longest[q]), a, b, distance) for a, b in pairwise(cuts)]
         side_by_side(tasks, lambda: None, lambda: None)
     return Splines(*_lay(corridor, longest, distance))
 
 
-def _stretch(
+def _range(
     corridor: Corridor, longest: float, first: int, last: int, distance: FloatArray
 ) -> Callable[[], None]:
-    """What writes the distances of knots at the vertices inside first..last, as many as that stretch by itself needs."""
+    """What writes the distances of knots at the vertices inside first..last, as many as that range by itself needs."""
 
     def work() -> None:
-        distance[first + 1 : last] = _distances(corridor, longest, first, last)
+        distance[first + 1 : last] = needed_distances(corridor, longest, first, last)
 
     return work
 
@@ -108,7 +108,7 @@ def _laid(corridor, inner, h, longest):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _distances(whole, longest, first, last):
+def needed_distances(whole, longest, first, last):
     """The distances of knots (last - first - 1,) at the vertices between two of one run, with which a spline between them by itself
     uses no more than `ROOM`."""
     begin, end = first, last + 1

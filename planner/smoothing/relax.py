@@ -6,9 +6,9 @@ optimal/reshape.py weights them by what the time-optimal motion pays for.
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are tightened by as much as the bound
 is too large, and relaxed again.
 
-A long run is relaxed in stretches, side by side, with `DEGREE` control points between them that stay; then in one window around each
-gap. Control points further away than that are none of a stretch's business, so that it does not matter which one is first. The
-stretches depend on the run alone: the result is the same on any number of threads.
+A long run is relaxed in ranges, side by side, with `DEGREE` control points between them that stay; then in one window around each
+gap. Control points further away than that are none of a range's business, so that it does not matter which one is first. The
+ranges depend on the run alone: the result is the same on any number of threads.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strict
 WINDOW = 240  # control points relaxed at a time ...
 OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
 SPANS_SHARED = 2_000  # fewer are relaxed by one thread: threads take 1 ms to begin, a span some 20 us
-# Control points of a stretch of a long run; a window more for each of them: 6 % of the work. Runs of fewer than two are relaxed as one.
-STRETCH = 4_000
+# Control points of a range of a long run; a window more for each of them: 6 % of the work. Runs of fewer than two are relaxed as one.
+RANGE = 4_000
 
 
 class Goal(NamedTuple):
@@ -203,7 +203,7 @@ def _put_points(values, first, into):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _sweep(run, goal, gap, begin, end, control, multiplier):
+def relax_range(run, goal, gap, begin, end, control, multiplier):
     """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A), with the multipliers (J,) of their
     sites. Reads `DEGREE` control points more on both sides."""
     done = begin
@@ -315,21 +315,21 @@ def _relax_long(
     goal: Goal,
     found: Relaxed,
 ) -> None:
-    """Write run q, relaxed in stretches (module text), into the columns of `Relaxed`."""
+    """Write run q, relaxed in ranges (module text), into the columns of `Relaxed`."""
     run, control = _begin(q, corridor, splines, runs, used, goal, True)
     prices, gap = np.zeros(len(run.sites.span)), float(goal.gap[q])
     first, end = int(run.fixed_first), len(control) - int(run.fixed_last)
-    count = (end - first) // STRETCH
+    count = (end - first) // RANGE
     cuts = [first + (end - first) * k // count for k in range(count + 1)]
-    stretches = [(a, b - DEGREE) for a, b in pairwise(cuts)]
-    stretches[-1] = (cuts[-2], end)
+    ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
+    ranges[-1] = (cuts[-2], end)
     gaps = [(b - WINDOW // 2, b + WINDOW // 2) for b in cuts[1:-1]]
 
     def work(begin: int, until: int) -> Callable[[], None]:
-        return lambda: _sweep(run, goal, gap, begin, until, control, prices)
+        return lambda: relax_range(run, goal, gap, begin, until, control, prices)
 
-    for ranges in (stretches, gaps):
-        side_by_side([work(*own) for own in ranges], lambda: None, lambda: None)
+    for batch in (ranges, gaps):
+        side_by_side([work(*own) for own in batch], lambda: None, lambda: None)
     _finish(q, run, control, prices, splines, goal, True, found)
 
 
@@ -369,9 +369,9 @@ def relax(
     fitting = np.flatnonzero(splines.fits)
     size = np.diff(splines.span_first)[fitting]
     if not only_outside:
-        for q in fitting[size >= 2 * STRETCH].tolist():
+        for q in fitting[size >= 2 * RANGE].tolist():
             _relax_long(q, corridor, splines, runs, used, goal, found)
-        fitting, size = fitting[size < 2 * STRETCH], size[size < 2 * STRETCH]
+        fitting, size = fitting[size < 2 * RANGE], size[size < 2 * RANGE]
     lists = shares(size, threads() if size.sum() >= SPANS_SHARED else 1)
 
     def work(own: Array) -> Callable[[], None]:

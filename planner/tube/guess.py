@@ -123,7 +123,7 @@ def _steps(
     spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * fine[0] / unit
     least = fine[1] + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
     least = np.maximum(least, run.length / (ARC_STEP * run.step_max))
-    # the share of the steps that is done at the times t, on all legs at once: `done` from the begin of their leg, `share` from that of the run
+    # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from that of the run
     inside = motion.t[(motion.t > vertex_time[0]) & (motion.t < vertex_time[-1])]
     t = np.union1d(inside, vertex_time)
     leg = np.minimum(np.searchsorted(vertex_time, t, side="right") - 1, len(run) - 1)

@@ -51,7 +51,7 @@ def pentagon():
     return rounded, shape, planned(rounded, shape)
 
 
-def test_a_run_in_stretches_gains_what_it_gains_as_a_whole(monkeypatch):
+def test_a_run_in_ranges_gains_what_it_gains_as_a_whole(monkeypatch):
     angle = np.deg2rad(np.random.default_rng(8).uniform(10.0, 40.0, 340)) * np.where(
         np.arange(340) % 2, 1, -1
     )
@@ -61,10 +61,12 @@ def test_a_run_in_stretches_gains_what_it_gains_as_a_whole(monkeypatch):
     start = planned(rounded, spline_shape(rounded, MACHINE))
     pull = np.full(len(start.shape.splines.fits), 0.5)
     _, whole = reshape(start, pull, 1e-4)
-    monkeypatch.setattr(combined, "STRETCH", 450)
+    monkeypatch.setattr(combined, "RANGE", 450)
     swept = []
-    sweep = combined._sweep
-    monkeypatch.setattr(combined, "_sweep", lambda *given: (swept.append(given[2:4]), sweep(*given))[1])
+    sweep = combined.improve_range
+    monkeypatch.setattr(
+        combined, "improve_range", lambda *given: (swept.append(given[2:4]), sweep(*given))[1]
+    )
     found = []
     try:
         for threads in (1, 3):

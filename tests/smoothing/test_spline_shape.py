@@ -1,4 +1,4 @@
-"""The shape of splines: cusps seen at first sight, and runs and stretches that are laid and relaxed side by side."""
+"""The shape of splines: cusps seen at first sight, and runs and ranges that are laid and relaxed side by side."""
 
 from __future__ import annotations
 
@@ -87,13 +87,15 @@ def energy(shape):
     return total
 
 
-def test_a_run_in_stretches_is_as_smooth_as_one_relaxed_as_a_whole(long_run, monkeypatch):
+def test_a_run_in_ranges_is_as_smooth_as_one_relaxed_as_a_whole(long_run, monkeypatch):
     whole = spline_shape(long_run, MACHINE)
     assert whole.splines.fits.all()
-    monkeypatch.setattr(relax_module, "STRETCH", 300)
+    monkeypatch.setattr(relax_module, "RANGE", 300)
     windows = []
-    sweep = relax_module._sweep
-    monkeypatch.setattr(relax_module, "_sweep", lambda *given: (windows.append(given[3:5]), sweep(*given))[1])
+    sweep = relax_module.relax_range
+    monkeypatch.setattr(
+        relax_module, "relax_range", lambda *given: (windows.append(given[3:5]), sweep(*given))[1]
+    )
     shapes = []
     try:
         for threads in (1, 3):
@@ -111,20 +113,20 @@ def test_a_run_in_stretches_is_as_smooth_as_one_relaxed_as_a_whole(long_run, mon
     assert energy(one) < 1.02 * energy(whole)
 
 
-def test_knots_of_a_run_laid_in_stretches_are_as_dense(long_run, monkeypatch):
+def test_knots_of_a_run_laid_in_ranges_are_as_dense(long_run, monkeypatch):
     whole = spline_shape(long_run, MACHINE).splines
-    monkeypatch.setattr(initial_module, "STRETCH", 100)
+    monkeypatch.setattr(initial_module, "RANGE", 100)
     laid = []
-    distances = initial_module._distances
+    distances = initial_module.needed_distances
     monkeypatch.setattr(
-        initial_module, "_distances", lambda *given: (laid.append(given), distances(*given))[1]
+        initial_module, "needed_distances", lambda *given: (laid.append(given), distances(*given))[1]
     )
-    stretches = spline_shape(long_run, MACHINE).splines
+    ranges = spline_shape(long_run, MACHINE).splines
     assert len(laid) == 4
-    assert not stretches.outside.any()
-    assert abs(len(stretches.breaks) / len(whole.breaks) - 1.0) < 0.02
+    assert not ranges.outside.any()
+    assert abs(len(ranges.breaks) / len(whole.breaks) - 1.0) < 0.02
 
 
-def test_stretches_are_further_apart_than_their_gaps_are_wide():
+def test_ranges_are_further_apart_than_their_gaps_are_wide():
     for module in (relax_module, combined_module):
-        assert module.STRETCH > module.WINDOW + 2 * DEGREE
+        assert module.RANGE > module.WINDOW + 2 * DEGREE

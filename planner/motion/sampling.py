@@ -163,8 +163,11 @@ def _inverses(table, grid, axes, first, beyond, found):
 
 
 def inverses(table: ElementTable, grid: Grid, axes: int) -> FloatArray:
-    """(P, `COEFFICIENTS`) for the interval to the right of each point: how far the polynomial is off [share of the interval],
-    c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces."""
+    """(P, C) for the interval to the right of each point: how far the polynomial is off [share of the interval],
+    c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces.
+
+    grid : P points over so many axes; C = `COEFFICIENTS`
+    """
     found = np.zeros((len(grid.s), COEFFICIENTS))
     in_parts(
         len(found), POINTS_SHARED, lambda first, beyond: _inverses(table, grid, axes, first, beyond, found)

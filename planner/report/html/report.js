@@ -145,7 +145,7 @@
   };
   const extents = [0, 1, 2].map((a) => [a < linear.length ? c[linear[a]] : [0], Object.values(programmed)[a]].reduce(
     (found, column) => column.reduce(([low, high], v) => (v === null || Number.isNaN(v) ? [low, high] : [Math.min(low, v), Math.max(high, v)]), found), [Infinity, -Infinity]));
-  const axis3d = (title, visible) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, visible });
+  const axis3d = (title, visible) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, tickangle: 0, visible });
   const bare = { displaylogo: false, responsive: true };
   const modebar = { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink };
   const pathPlot = element("path"), profilePlot = element("profile");

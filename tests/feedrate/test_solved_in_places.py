@@ -116,6 +116,27 @@ def test_where_no_solution_is_found_motion_and_limits_are_as_before(before, tigh
     np.testing.assert_allclose(slower, slower[0], rtol=1e-12)
 
 
+def test_a_range_without_a_solution_is_tried_wider(before, tighter, again, monkeypatch):
+    run, tried = Chain.run, []
+
+    def fails_where_narrow(self, room, until):
+        run(self, room, until)
+        tried.append((self.first, self.last))
+        self.failed |= len(tried) <= 3
+
+    monkeypatch.setattr(Chain, "run", fails_where_narrow)
+    problem, solution = JerkLimited().again(*before, tighter)
+    narrow, wide = tried[:3], tried[3:]
+    assert wide
+    for first, last in narrow:
+        assert any(begin <= first and last <= end for begin, end in wide)
+    assert sum(last - first for first, last in wide) > sum(last - first for first, last in narrow)
+    assert np.array_equal(problem.limit_scale, tighter.limit_scale)
+    assert solution.effort["kept again"] == 0
+    assert not faults(problem, solution)
+    assert solution.cycle_time == pytest.approx(again[1].cycle_time, rel=1e-5)
+
+
 def test_a_piece_that_changed_nearly_everywhere_is_solved_as_a_whole(before):
     problem, known = before
     scale = np.full(len(problem), TIGHTER)

@@ -24,7 +24,7 @@ from planner.optimal.order import ThirdOrder
 from planner.optimal.tighten import (
     SEEN_BEFORE,
     SLOWING_MORE,
-    TIGHTENED_LOSS,
+    WORTH,
     excess,
     slowed,
     slower,
@@ -162,9 +162,9 @@ def test_a_joint_that_is_an_axis_has_its_excess(coarse):
 
 def test_long_jobs_are_tightened_while_it_pays_and_slowed_for_what_the_verifier_may_find(coarse, monkeypatch):
     planned, _, toolpath, before = coarse
-    assert before > 1.0 + TIGHTENED_LOSS
+    assert before > 1.0 + WORTH[1]
     _, short = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
     monkeypatch.setattr(tighten, "TIGHTENED_POINTS", 10)
     _, long = within_limits(planned, ThirdOrder(JerkLimited()), toolpath, MACHINE)
-    assert short.end <= long.end <= short.end * (1.0 + TIGHTENED_LOSS) * SEEN_BEFORE
+    assert short.end <= long.end <= short.end * (1.0 + WORTH[1]) * SEEN_BEFORE
     assert excess(long, toolpath, MACHINE).max() <= 1.0 - 0.9 * (SEEN_BEFORE - 1.0)

@@ -46,9 +46,10 @@ from typing import Any
 
 import numpy as np
 
+from planner.base.arrays import Array
 from planner.base.threads import side_by_side, threads
 from planner.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.again import Range, RangeAgain, ranges_of
+from planner.feedrate.jerk.again import WIDER, Range, RangeAgain, ranges_of
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
 from planner.feedrate.jerk.columns import ProblemColumns, columns_of
 from planner.feedrate.jerk.layout import Room
@@ -158,21 +159,19 @@ class JerkLimited:
         for first, beyond in whole:
             profile.forget(first, beyond)
         pieces = self._solve_pieces(whole, task, counted)
-        work = [RangeAgain(task(first=own.first, last=own.last)) for own in ranges]
-        _do([(one.last - one.first, one) for one in work], counted)
-        if not all(one.solved for one in work):
+        work, kept = _ranges_again(before, known, change != 1.0, ranges, task, counted)
+        if kept:
             scale = problem.limit_scale.copy()
-            for one in work:
-                if not one.solved:
-                    own = slice(one.first, one.last + 1)
-                    scale[own] = before.limit_scale[own]
+            for own in kept:
+                points = slice(own.first, own.last + 1)
+                scale[points] = before.limit_scale[points]
             problem = replace(problem, limit_scale=scale)
             columns = columns_of(problem)
         at = np.unique(np.searchsorted(problem.piece, [own.first for own in ranges], side="right") - 1)
         slower = [slowed_piece(profile, columns, problem.piece[g], problem.piece[g + 1] - 1) for g in at]
         most = max([1.0, *slower, *(piece.slower for piece in pieces)])
         stops = sum(len(piece.stops) for piece in pieces)
-        again = {"pieces": len(whole), "ranges": len(ranges), "kept": sum(not one.solved for one in work)}
+        again = {"pieces": len(whole), "ranges": len(ranges), "kept": len(kept)}
         solution = replace(
             known,
             status=Status.ACCEPTABLE if stops else known.status,
@@ -189,6 +188,34 @@ class JerkLimited:
             **_columns_of_solution(profile),
         )
         return problem, _priced(problem, columns, solution, began)
+
+
+def _ranges_again(
+    before: FeedrateProblem,
+    known: FeedrateSolution,
+    changed: Array,
+    ranges: list[Range],
+    task: Callable[..., Task],
+    counted: _Counted,
+) -> tuple[list[RangeAgain], list[Range]]:
+    """Solve ranges again, and wider ones where they have no solution (again.py): what was tried, and the ranges that keep their
+    profile."""
+    work = [RangeAgain(task(first=own.first, last=own.last)) for own in ranges]
+    _do([(one.last - one.first, one) for one in work], counted)
+    failed = [own for own, one in zip(ranges, work, strict=True) if not one.solved]
+    if not failed:
+        return work, []
+    inside = np.zeros(len(changed), dtype=bool)
+    for own in failed:
+        points = slice(own.first, own.last + 1)
+        inside[points] = changed[points]
+    wider = [
+        RangeAgain(task(first=own.first, last=own.last)) for own in ranges_of(before, known, inside, WIDER)
+    ]
+    _do([(one.last - one.first, one) for one in wider], counted)
+    unsolved = [one for one in wider if not one.solved]
+    kept = [own for own in failed if any(one.first <= own.first and own.last <= one.last for one in unsolved)]
+    return work + wider, kept
 
 
 def _whole_pieces(problem: FeedrateProblem, ranges: list[Range]) -> tuple[list[tuple[int, int]], list[Range]]:

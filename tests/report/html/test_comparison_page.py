@@ -54,6 +54,11 @@ def test_a_file_that_is_no_page_is_kept(tmp_path: Path, file: Path) -> None:
 
 
 @pytest.mark.slow
+    page = tmp_path / "page.html"
+    for more in ([], ["--force"]):  # beside a page --force is of use
+        assert run("compare", job, "--method", "stop", "--report", page, "-q", *more).exit_code == 0
+
+
 def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
     pages = opened(file)
     browser: Any = next(pages)  # or skipped

@@ -51,14 +51,12 @@ def test_a_file_that_is_no_page_is_kept(tmp_path: Path, file: Path) -> None:
     assert (tmp_path / "mine.html").read_text() == "mine"
     assert run("compare", job, "--method", "stop", "--report", job, "-q", "--force").exit_code == 2
     assert job.read_text() == JOB
-
-
-@pytest.mark.slow
     page = tmp_path / "page.html"
     for more in ([], ["--force"]):  # beside a page --force is of use
         assert run("compare", job, "--method", "stop", "--report", page, "-q", *more).exit_code == 0
 
 
+@pytest.mark.slow
 def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
     pages = opened(file)
     browser: Any = next(pages)  # or skipped

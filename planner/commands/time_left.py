@@ -94,10 +94,12 @@ class TimeLeft:
     _gains: list[float] = field(default_factory=list)
     _slower: bool = False  # the last round as a whole
     _verdicts: int = 0
+    _told: float = 0.0  # when something was told last
     _search: SearchLeft | None = None  # where the plan goes that way
 
     def stage(self, now: float, name: str, fraction: float) -> None:
         """A stage begins (0), is done to a fraction, or ends (1)."""
+        self._told = now
         if name == "search" and fraction == 0.0 and self._search is None:
             self._search = SearchLeft(phase=PLANNING)
         if self._search is not None:
@@ -123,6 +125,7 @@ class TimeLeft:
 
     def step(self, now: float, step: Step) -> None:
         """A step of the planning (job/trace.py)."""
+        self._told = now
         if step.name == "programmed feed":
             self._cycle_time, self._dt = SLOWER * (step.found or 0.0), float(step.facts.get("dt") or math.inf)
             steps = LEAST_STEPS * int(step.facts.get("segments") or 0)
@@ -160,7 +163,11 @@ class TimeLeft:
             self._cycle_time = self._cycle_time if self._phase > ROUNDS else step.found
 
     def left(self, now: float) -> float | None:
-        """How much time is left [s]; None as long as nothing is known."""
+        """How much time is left [s]; None as long as nothing is known. What tells nothing gets a share of the time since it began."""
+        found = self._expected(now)
+        return None if found is None else max(found, LATE * (now - self._told))
+
+    def _expected(self, now: float) -> float | None:
         write = self._samples() * WRITTEN * self._speed if self.writes else 0.0
         if self._search is not None and "write" not in self._began:
             return self._search.left(now, write)

@@ -9,7 +9,7 @@ import pytest
 from planner.base import kernels
 from planner.commands import progress, search_left
 from planner.commands.progress import ProgressBar, duration_text
-from planner.commands.time_left import MORE_ROUNDS, PRICES, TimeLeft
+from planner.commands.time_left import LATE, MORE_ROUNDS, PRICES, TimeLeft
 from planner.job.trace import Step
 
 
@@ -145,6 +145,18 @@ def test_a_plan_without_a_search_goes_the_way_of_the_rounds(why: str) -> None:
     plain = TimeLeft()
     assert solved(left) == solved(large) == solved(plain)
     assert left.left(3.0) == large.left(3.0) == plain.left(3.0) is not None
+
+
+def test_work_that_tells_nothing_is_not_said_to_be_done() -> None:
+    """However long after its verdict a plan goes on: never no time left."""
+    left = TimeLeft(solves=False)
+    left.step(0.0, step("programmed feed", 1e-6, dt=1.0))
+    left.stage(0.0, "sample", 0.0)
+    left.stage(0.0, "verify", 0.0)
+    left.stage(10.0, "verify", 1.0)
+    assert [left.left(10.0 + silent) for silent in (0.0, 1.0, 10.0)] == pytest.approx(
+        [0.0, LATE, 10.0 * LATE]
+    )
 
 
 def test_compiling_is_told_once_and_is_no_time_of_the_job(

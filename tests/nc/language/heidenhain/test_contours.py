@@ -91,7 +91,7 @@ def test_what_the_tool_cannot_follow_is_refused_with_its_line() -> None:
 
 def test_what_has_no_end_at_the_end_of_a_text_is_said_at_its_last_statement():
     text = "BEGIN PGM 1 MM\nTOOL CALL 1 Z S1000 F100\nL X+0 Y+0 Z+5 R0 FMAX\nAPPR CT X+1 Y+2 Z-3 CCA90 R+4 RR F100\n"
-    with pytest.raises(InputError, match="^a.h:4:1: APPR: APPR is followed by no contour"):
+    with pytest.raises(InputError, match=r"^a\.h:4:1: APPR: APPR is followed by no contour"):
         parse_program(text, None, source="a.h")
 
 

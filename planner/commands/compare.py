@@ -66,8 +66,10 @@ def compare_command(
 
     The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused the job.
     """
-    if force and output is None:
-        raise InputError("--force has no effect without a file to write; name one with -o FILE")
+    if force and output is None and report is None:
+        raise InputError(
+            "--force has no effect without a file to write; name one with -o FILE or --report FILE"
+        )
     methods = parse_methods(method)
     from planner.machine import load_machine
     from planner.nc.reader import read_program

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import length_option
+from planner.commands.options import length_option, time_option
 from planner.commands.terminal import guarded, say, show
 
 
@@ -59,10 +59,9 @@ def import_file(
     ] = None,
     ramp_time: Annotated[
         float | None,
-        typer.Option(
+        time_option(
             "--ramp-time",
-            metavar="S",
-            help="time in which an axis builds up its acceleration [s], for jerks that the control does not know (default 0.04)",
+            "time in which an axis builds up its acceleration [s], for jerks that the control does not know (default 0.04)",
         ),
     ] = None,
     tolerance: Annotated[float | None, length_option("--tolerance", "contour tolerance [mm]")] = None,

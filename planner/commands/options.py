@@ -15,13 +15,14 @@ import typer
 
 from planner.base import names
 from planner.base.errors import InputError
-from planner.base.units import MICROMETRE, MM_PER_INCH
+from planner.base.units import MICROMETRE, MILLISECOND, MM_PER_INCH
 from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore_list
 
 DEFAULT_MACHINE = "mill"
 # Units of a length on the command line [mm].
 LENGTHS = {"mm": 1.0, "um": MICROMETRE, "µm": MICROMETRE, "in": MM_PER_INCH}
-_LENGTH = re.compile(rf"([^a-zµ]+(?:e[-+]?\d+)?)\s*({'|'.join(LENGTHS)})?")
+# Units of a time on the command line [s].
+TIMES = {"s": 1.0, "ms": MILLISECOND}
 
 
 class Format(StrEnum):
@@ -63,21 +64,33 @@ def _choice(
 
 def length_option(name: str, help_text: str) -> Any:
     """An option that takes a length above 0: in mm, or with a unit, such as 20um."""
+    return _with_unit(name, help_text, "length", LENGTHS)
+
+
+def time_option(name: str, help_text: str) -> Any:
+    """An option that takes a time above 0: in s, or with a unit, such as 20ms."""
+    return _with_unit(name, help_text, "time", TIMES)
+
+
+def _with_unit(name: str, help_text: str, what: str, units: dict[str, float]) -> Any:
+    """An option that takes a number above 0, with one of these units or without: then with the first one."""
+    first = next(iter(units))
+    pattern = re.compile(rf"([^a-zµ]+(?:e[-+]?\d+)?)\s*({'|'.join(units)})?")
 
     def parsed(text: str) -> float:
-        found = _LENGTH.fullmatch(text)
+        found = pattern.fullmatch(text)
         try:
-            value = float(found[1]) * LENGTHS[found[2] or "mm"] if found else math.nan
+            value = float(found[1]) * units[found[2] or first] if found else math.nan
         except ValueError:
             value = math.nan
         if not 0.0 < value < math.inf:
-            units = ", ".join(LENGTHS)
+            comma = "; decimals have a point" if "," in text else ""
             raise typer.BadParameter(
-                f"'{text}' is no length above 0; write one in mm, or with a unit: {units}"
+                f"'{text}' is no {what} above 0; write one in {first}, or with a unit: {', '.join(units)}{comma}"
             )
         return value
 
-    return typer.Option(name, metavar="MM", parser=parsed, help=help_text)
+    return typer.Option(name, metavar=first.upper(), parser=parsed, help=help_text)
 
 
 def _machines(incomplete: str) -> list[str]:

@@ -5,7 +5,7 @@ still expected, counted in a unit that this job has measured itself: one grid an
 
     rounds     those that the effort allows, fewer as soon as their gains fall; each as long as the last one
     after      final grid, single corners, tightening:  AFTER units; on corners alone a share of their solve
-    verdict    samples times SAMPLE seconds, at the speed of this machine, which the first solve tells; half of all jobs get another one
+    verdict    samples times SAMPLE seconds, at the speed of this machine, which the first solve tells; of four jobs one gets another
     prices     PRICES units
     files      samples times WRITTEN seconds, if any are written
 
@@ -13,8 +13,7 @@ less what the stage that is running has had already. Where a stage tells what sh
 expected. Before the first solve tells a share nothing is known, and nothing is said. The numbers were read off plans of a
 dozen programs; `benchmarks/progress.py` says how true the estimates are on these and on others.
 
-Where geometry and feed are searched together (methods/at_once.py) the share of the steps that is done tells the rest of the search, and
-nothing is said before; only the verdict and the files come after it.
+Plans whose geometry and feed are searched together go another way (search_left.py).
 """
 
 from __future__ import annotations
@@ -24,12 +23,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from planner.base.names import NORMAL
+from planner.commands.search_left import BEGUN, PLANNING, SearchLeft
 
 if TYPE_CHECKING:
     from planner.job.trace import Step
+    from planner.optimal.effort import Search
 
 ROUND = 4.5  # of the first round, in units
-AFTER, PRICES = 4.5, 2.6  # in units
+AFTER, PRICES = 4.5, 1.5  # in units
 FINAL_AFTER = 2.0  # what comes after the final grid, over that, as soon as it is solved [-]
 MORE_ROUNDS = 1.5  # rounds that there are, over those by which gains would fall to `ENOUGH` [-]
 IN_VAIN = 5, 3.0  # after so many rounds there are so many more: that gain too little before they are given up
@@ -37,7 +38,7 @@ AFTER_CORNERS, PRICES_CORNERS = 0.3, 0.6  # where there are no splines, of the o
 POINT = 0.85e-6  # of a grid point and an iteration of the solver, on the machine where the others were measured [s]
 SAMPLE = 3.2e-6  # of a sample in a verdict [s]
 WRITTEN = 1.5e-6  # of a sample in the files [s]
-AGAIN = 0.5  # further verdicts to be expected
+AGAIN = 0.25  # further verdicts to be expected
 SPEED = (0.2, 20.0)  # how slow a machine may be, against that one [-]
 SLOWER = 1.2  # cycle time over that at the programmed feed, as long as nothing else is known [-]
 RIVAL = 0.5  # further verdicts of other plans on corners alone
@@ -51,6 +52,8 @@ SEEN = (
     5  # rounds that gain next to nothing before they are given up, where they do not keep what they promise
 )
 ENOUGH = 1e-5  # gain after which there are no more rounds [share of the time]
+
+LEAST_STEPS = 2  # of a motion that is searched on a segment of the path (methods/optimal.py)
 
 BEGIN, ROUNDS, FINISH, DELIVER, REPORT, DONE = range(6)  # where a plan is, in this order
 
@@ -91,11 +94,16 @@ class TimeLeft:
     _gains: list[float] = field(default_factory=list)
     _slower: bool = False  # the last round as a whole
     _verdicts: int = 0
-    _segments: int = 0
-    _in_loop: bool = False  # splines are laid to be reshaped
+    _search: SearchLeft | None = None  # where the plan goes that way
 
     def stage(self, now: float, name: str, fraction: float) -> None:
         """A stage begins (0), is done to a fraction, or ends (1)."""
+        if name == "search" and fraction == 0.0 and self._search is None:
+            self._search = SearchLeft(phase=PLANNING)
+        if self._search is not None:
+            self._search.stage(now, name, fraction)
+            if self._search.phase == PLANNING and not self._dial().again:
+                self._without_search(now)
         if fraction == 0.0:
             if name == "solve" and self._now_in == "geometry":
                 self._grid = now - self._began["geometry"]
@@ -117,9 +125,17 @@ class TimeLeft:
         """A step of the planning (job/trace.py)."""
         if step.name == "programmed feed":
             self._cycle_time, self._dt = SLOWER * (step.found or 0.0), float(step.facts.get("dt") or math.inf)
-            self._segments = int(step.facts.get("segments") or 0)
+            steps = LEAST_STEPS * int(step.facts.get("segments") or 0)
+            if self.searched and steps <= self._dial().steps_max:
+                self._search = SearchLeft(_since=now)
         elif step.name == "splines":
-            self._splines, self._in_loop = bool(step.facts.get("runs")), True
+            self._splines = bool(step.facts.get("runs"))
+            if self._search is not None and self._search.phase == BEGUN:
+                self._without_search(now)
+        elif step.name == "search" and self._search is not None:
+            self._search.step(step)
+            if self._search.in_vain:
+                self._without_search(now)
         elif step.name == "solve":
             self._solved(now, step)
         elif step.name.startswith("reshape") and self._phase == ROUNDS:
@@ -146,15 +162,11 @@ class TimeLeft:
     def left(self, now: float) -> float | None:
         """How much time is left [s]; None as long as nothing is known."""
         write = self._samples() * WRITTEN * self._speed if self.writes else 0.0
+        if self._search is not None and "write" not in self._began:
+            return self._search.left(now, write)
         if self._phase == DONE:
             return self._running(now, "write", write) + (self._verdict(now) if self._plans == 1 else 0.0)
-        if self._now_in == "search":
-            return self._searching(now, write)
         unit, later = self._unit, write + self._verdict(now)
-        if self._may_be_searched():
-            return None
-        if "search" in self._began and self._phase >= DELIVER and self._phase < DONE:
-            return later
         if self._phase == BEGIN and self.solves:
             share = self._share if self._now_in == "solve" else 0.0
             if share < SHARE_TOLD:
@@ -178,19 +190,15 @@ class TimeLeft:
             later += max(more - 1.0, 0.0) * each + (self._rest(had, each) if more > 0 else 0.0)
         return later
 
-    def _may_be_searched(self) -> bool:
-        """Whether the search may be the next stage, and no other work is on its way before it."""
+    def _dial(self) -> Search:
         from planner.optimal.effort import EFFORTS
 
-        few = self._segments <= EFFORTS[self.effort].search.steps_max
-        return self.searched and few and not self._in_loop and "search" not in self._began
+        return EFFORTS[self.effort].search
 
-    def _searching(self, now: float, write: float) -> float | None:
-        """What is left once the search is on."""
-        if self._share < SHARE_TOLD:
-            return None
-        had = now - self._began["search"]
-        return had * (1.0 - self._share) / self._share + self._samples() * SAMPLE * self._speed + write
+    def _without_search(self, now: float) -> None:
+        """The plan begins anew, and there is no search in it."""
+        self._search = None
+        self._go(BEGIN, now)
 
     def _go(self, phase: int, now: float) -> None:
         self._phase, self._since = phase, now

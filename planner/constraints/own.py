@@ -164,6 +164,8 @@ class ScaledLimit:
 def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
     """Raise InputError unless every limit has a name of its own."""
     for limit in limits:
+        if isinstance(limit, type):
+            raise InputError(f"limits: {limit.__name__} is a class; give an object of it, {limit.__name__}()")
         for method in ("bounds", "value"):
             if not callable(getattr(limit, method, None)):
                 raise InputError(
@@ -180,9 +182,14 @@ def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
 
 
 def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
-    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive."""
+    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive, or not one for each place."""
     found = np.empty((count, 3))
     for k, bound in enumerate(limit.bounds(at)):
+        if np.ndim(bound) and np.shape(bound) != (count,):
+            raise InputError(
+                f"limit '{limit.name}': {QUANTITIES[k]} has the shape {np.shape(bound)}; it must be one number, or one for each of the "
+                f"{count} places"
+            )
         found[:, k] = bound
         if not (found[:, k] > 0.0).all():
             worst = int((~(found[:, k] > 0.0)).argmax())

@@ -62,18 +62,19 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     control   : "grbl", "klipper", "marlin" or "linuxcnc"
     tolerance : of the path [mm], which plan and chords share
 
-    Raises InputError if the motion leaves the program, and but for LinuxCNC if the plan leaves no room for chords.
+    Where the plan leaves no room for chords the program as it is is written, and a note says so. Raises InputError if the motion leaves
+    the program.
     """
     if control == LINUXCNC:
         return _for_linuxcnc(directory, plan, tolerance)
     room = _room(plan, tolerance)
-    if room is None:
-        raise InputError(_no_room(plan, tolerance))
     candidates: dict[str, Polyline] = {}
-    for share in SHARES:
-        name = f"planned path, chords within {share * room / MICROMETRE:.3g} um"
-        candidates[name] = planned_polyline(plan, share * room)
-    candidates["program as it is"] = programmed_polyline(plan, room)
+    for share in SHARES if room is not None else ():
+        chords = share * (room or 0.0)
+        candidates[f"planned path, chords within {chords / MICROMETRE:.3g} um"] = planned_polyline(
+            plan, chords
+        )
+    candidates["program as it is"] = programmed_polyline(plan, room or tolerance)
     predicted = {name: _predicted(line, plan, control) for name, line in candidates.items()}
     name = min(predicted, key=predicted.__getitem__)
     line, file = candidates[name], f"{control}.gcode"
@@ -82,7 +83,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
         file=file,
         sentence=f"{name}, {len(line.feed):,} moves",
         predicted=predicted,
-        note=_little_room(room, plan, tolerance),
+        note=_no_room(plan, tolerance) if room is None else _little_room(room, plan, tolerance),
     )
 
 

@@ -42,6 +42,10 @@ class PlanFigures:
     def __repr__(self) -> str:
         return f"<figures of {self._plan!r}: .path(color={'|'.join(COLOURINGS)}), .feed(), .profiles()>"
 
+    def __call__(self) -> Figure:
+        """The path, coloured by feed."""
+        return self.path()
+
     def path(self, color: str = "feed") -> Figure:
         """The motion over the programmed path, to turn and to zoom.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -12,12 +13,21 @@ from planner.base.files import require_ending
 from planner.base.names import known_name
 from planner.machine.whole import Machine
 
+# What settings of a control have and no machine file has: sections of LinuxCNC and Klipper, numbers of grbl, commands of Marlin.
+_SETTINGS = re.compile(
+    r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
+)
+
 
 def load_machine(path: str | Path) -> Machine:
     """Read a machine file, or a built-in machine if the path is a name without a suffix.
 
     Raises InputError naming file, key, value and what is allowed, for all faults at once.
     """
+    if not isinstance(path, (str, Path)):
+        raise InputError(
+            f"a machine is a file, the name of a built-in one, or planner.Machine(...); found a {type(path).__name__}"
+        )
     if str(path) in builtin_machines():
         text, source = builtin_text(str(path)), str(path)
     else:
@@ -27,7 +37,12 @@ def load_machine(path: str | Path) -> Machine:
     except RecursionError:
         raise InputError("not a machine file: its values are nested too deep", source=source) from None
     except ValueError as fault:  # a TOMLDecodeError, or a number of more digits than Python reads
-        raise InputError(f"not valid TOML: {fault}", source=source) from fault
+        settings = (
+            "; a machine file is made of a control's settings by: planner machine import"
+            if _SETTINGS.search(text)
+            else ""
+        )
+        raise InputError(f"not valid TOML: {fault}{settings}", source=source) from fault
     return machine_from_dict(data, source=source)
 
 
@@ -60,7 +75,8 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())
-        near = difflib.get_close_matches(str(path), builtin_machines(), n=1)
+        there = [str(file) for file in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        near = difflib.get_close_matches(str(path), [*builtin_machines(), *there], n=1)
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise InputError(
             f"machine file not found; give a TOML file or one of the built-in machines: {names}{hint}",

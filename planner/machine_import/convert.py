@@ -79,7 +79,7 @@ def import_machine(
         eps = Sourced(tolerance, "given")
     dt = found.dt or Sourced(DT, "assumed")
     if eps.place == "assumed":
-        assumed.append(f"tolerance {eps.value:g} mm: {found.control} has none; --tolerance gives another")
+        assumed.append(f"tolerance {eps.value:g} mm: the settings have none; --tolerance gives another")
     if dt.place == "assumed":
         assumed.append(f"interpolation period {dt.value * 1e3:g} ms: the settings do not say it")
     written = _text(found, Path(path), axes, eps, dt, [*found.notes, *assumed])
@@ -136,7 +136,7 @@ def _axes(
         axes[letter] = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
     if missing:
         raise InputError(
-            f"{found.control}'s settings do not say {', '.join(missing)}; give them, e.g. --set {missing[0]}=500",
+            f"{found.control}'s settings do not say {', '.join(missing)}; give them in mm and s, e.g. --set {missing[0]}=500",
             source=source,
         )
     if not no_jerk:

@@ -1,11 +1,12 @@
 """Marlin's settings, as M503 prints them: M203 velocities [mm/s], M201 accelerations of the axes and M204 along the path [mm/s2],
-M593 input shaping. In inches after G20. Marlin's "jerk" (M205 X Y Z) is a jump of velocity at a corner, not a jerk."""
+M593 input shaping. In inches after G20. Marlin's "jerk" (M205 X Y Z) is a jump of velocity at a corner, not a jerk. RepRapFirmware's
+config.g has the same commands, but velocities in mm/min; it is known by M566 or M584, which Marlin has not."""
 
 from __future__ import annotations
 
 import re
 
-from planner.base.units import MM_PER_INCH
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES
 from planner.machine_import.numbers import positive
 from planner.machine_import.settings import ControlSettings, FoundMode, Sourced, least
@@ -44,14 +45,15 @@ def settings(text: str, source: str) -> ControlSettings:
         return Sourced(positive(str(given[code][letter]), place, source, lines[code]) * unit, place)
 
     along = least(length("M204", "T"), length("M204", "P"))
+    per_minute = bool(given.keys() & {"M566", "M584"})
     velocity, acceleration = {}, {}
     for letter in LINEAR_AXES:
         speed, own = length("M203", letter.upper()), length("M201", letter.upper())
         if speed:
-            velocity[letter] = speed
+            velocity[letter] = Sourced(speed.value / SECONDS_PER_MINUTE, speed.place) if per_minute else speed
         if own:
             acceleration[letter] = least(own, along) or own
-    notes = []
+    notes = ["M203 is in mm/min: M566 and M584 are commands of RepRapFirmware"] if per_minute else []
     if given.get("M205", {}).keys() & {"X", "Y"}:
         notes.append("M205 X Y Z are jumps of velocity at corners: here velocity never jumps")
     if "J" in given.get("M205", {}):

@@ -61,7 +61,7 @@ def plan(
     machine: Machine | str | Path | None = None,
     *,
     method: str | Method = "optimal",
-    limits: Sequence[OwnLimit] = (),
+    limits: OwnLimit | Sequence[OwnLimit] = (),
     tolerance: float | None = None,
     reading: Reading = AS_USUAL,
     progress: Progress | None = None,
@@ -74,8 +74,8 @@ def plan(
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
     settings  : geometry, corner, solver, effort, rounds, shaped: `MethodSettings`
-    limits    : limits of your own beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order" keep them,
-                the verdict judges every method by them
+    limits    : of your own, one or several, beside the machine's (constraints/own.py, docs/extending.md): "optimal" and "second-order"
+                keep them, the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
     reading   : what is refused, left out and assumed in a program file
     progress  : called with the stage's name and the fraction done (0 to 1)
@@ -92,6 +92,8 @@ def plan(
         method = make_method(method, **given)
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    if not isinstance(limits, Sequence):
+        limits = (limits,)
     if limits:
         machine = machine.with_own((*machine.own, *limits))
     if isinstance(program, Program):

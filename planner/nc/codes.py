@@ -166,7 +166,8 @@ CHARACTERS: dict[str, str] = {
     "^": "polar coordinates are not supported; write x and y",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
-    ",": "corner roundings and chamfers (,R and ,C) are not supported; write the arc or the line",
+    ",": "corner roundings and chamfers (,R and ,C) are not supported: write the arc or the line; a decimal comma is written as a "
+    "point: 10.5",
     "!": "a comment starts with ( or ;",
 }
 

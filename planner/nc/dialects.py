@@ -52,13 +52,23 @@ _MODELS = (
     ),
     ("a document (PDF)", re.compile(rb"\A%PDF-\d"), _CAM),
     ("an archive (ZIP, 3MF)", re.compile(rb"\APK\x03\x04"), "unpack it and give the program in it"),
+    (
+        "a machine file",
+        re.compile(rb"^\[axes\.[a-z]\]", re.MULTILINE),
+        "give the program, and the machine file as -m FILE",
+    ),
+    (
+        "a file of a control's settings",
+        re.compile(rb"^(?:\[(?:EMC\w*|TRAJ|printer)\]|\$1[12]\d=)", re.MULTILINE),
+        "make a machine file of it (planner machine import) and give that as -m FILE",
+    ),
 )
 # A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
 _STL_HEAD, _STL_TRIANGLE = 84, 50
 
 
 def refuse_models(data: bytes, source: str) -> None:
-    """Raise InputError for a drawing or a model: files that people have beside their programs."""
+    """Raise InputError for drawings, models, settings: files that people have beside their programs."""
     head = data[:_LOOKED_AT]
     triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
     if triangles and len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:

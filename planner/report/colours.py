@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-# Okabe and Ito (2008), without black; then four of Paul Tol's muted scheme, for machines with many limits.
+# Okabe and Ito (2008), without black; then, for machines with many limits and pages with many methods, the four that are farthest from
+# all before them to people with and without red-green blindness, and seen on light and dark ground (tests/report/test_colours.py).
 COLOURS = (
-    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#882255", "#44AA99", "#999933", "#332288",
+    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#0000F0", "#901818", "#6060F0", "#30D878",
 )  # fmt: skip
-GREY, LIGHT = "#8c8c8c", "#c4c4c4"
+GREY, LIGHT = "#606060", "#c4c4c4"
 # Cividis, from low to high, at ten equal steps.
 CIVIDIS = (
     "#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838",
 )  # fmt: skip
+# The same where they have to be seen against a light or a dark page: without its bright or its dark end, at equal steps.
+LOW_TO_HIGH = {
+    "light": ("#00224e", "#3b496c", "#77766f", "#ad9650", "#d9a900"),
+    "dark": ("#4a7ccc", "#6f86b0", "#9a978f", "#cdb969", "#fee838"),
+}
 
 
 def limit_colours(names: Sequence[str]) -> list[str]:

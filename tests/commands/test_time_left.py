@@ -7,7 +7,7 @@ import time
 import pytest
 
 from planner.base import kernels
-from planner.commands import progress
+from planner.commands import progress, search_left
 from planner.commands.progress import ProgressBar, duration_text
 from planner.commands.time_left import MORE_ROUNDS, PRICES, TimeLeft
 from planner.job.trace import Step
@@ -97,23 +97,54 @@ def test_time_left_falls_as_time_passes_and_is_never_negative() -> None:
         left.stage(now + 1.0, name, 1.0)
 
 
-def test_a_search_tells_its_share_and_nothing_is_said_before() -> None:
-    """30 % of the search in 3 s leave 7 s of it, whatever its start took; programs too large for it go straight to the loop."""
+def searched() -> tuple[TimeLeft, float]:
+    """A plan up to the beginning of its search, after 3 s."""
     left, now = TimeLeft(searched=True), 3.0
     left.step(0.0, step("programmed feed", 1e-6, dt=1.0, segments=100))
-    left.stage(1.0, "solve", 0.0)
-    left.stage(2.0, "solve", 1.0)
+    left.stage(1.0, "geometry", 0.0)
+    left.stage(2.0, "solve", 0.0)
     assert left.left(now) is None
     left.stage(now, "search", 0.0)
-    assert left.left(now + 1.0) is None
-    left.stage(now + 3.0, "search", 0.3)
-    assert left.left(now + 3.0) == pytest.approx(7.0, rel=1e-3)
+    return left, now
+
+
+def test_a_search_tells_its_share() -> None:
+    """Half of a search in 5 s leave 5 s of it, whatever its start took; of less is believed what was expected too."""
+    left, now = searched()
+    assert left.left(now + 1.0) == pytest.approx(search_left.FIRST * 3.0 * (1.0 + search_left.DELIVERY) - 1.0)
+    left.stage(now + 5.0, "search", 0.5)
+    delivery = search_left.DELIVERY * 10.0
+    assert left.left(now + 5.0) == pytest.approx(5.0 + delivery)
     left.stage(now + 10.0, "search", 1.0)
     left.stage(now + 10.0, "sample", 0.0)
-    assert left.left(now + 10.0) == pytest.approx(0.0, abs=1e-3)
+    assert left.left(now + 10.0) == pytest.approx(delivery)
+    assert left.left(now + 1e3) > 0.0  # type: ignore[operator]
+
+
+def test_a_search_that_leaves_something_comes_once_more() -> None:
+    """8 s for 80 % of it, and then a plan: 3 s took as much as that needs, and the search 10 s; quick makes no other one."""
+    left, now = searched()
+    left.stage(now + 8.0, "search", 0.8)
+    left.step(now + 8.0, step("search", 1e-6, of_runs=2, whole=1))
+    left.stage(now + 8.0, "geometry", 0.0)
+    more = search_left.PLAN * 3.0 + 10.0 * (1.0 + search_left.DELIVERY)
+    assert left.left(now + 8.0) == pytest.approx(more)
+    assert left.left(now + 9.0) == pytest.approx(more - 1.0)
+    left.stage(now + 20.0, "search", 0.0)
+    assert left.left(now + 20.0) == pytest.approx(10.0 * (1.0 + search_left.DELIVERY))
+
+
+@pytest.mark.parametrize("why", ["left", "of"])
+def test_a_plan_without_a_search_goes_the_way_of_the_rounds(why: str) -> None:
+    """Too many steps for it, said before it begins or then, or nothing to be found: as if nobody had thought of it."""
+    left, now = searched()
+    left.step(now, step("search", 1e-6, **{why: 60_000}))
+    left.stage(now, "search", 1.0)
     large = TimeLeft(searched=True)
     large.step(0.0, step("programmed feed", 1e-6, dt=1.0, segments=1_000_000))
-    assert large.left(solved(large)) is not None
+    plain = TimeLeft()
+    assert solved(left) == solved(large) == solved(plain)
+    assert left.left(3.0) == large.left(3.0) == plain.left(3.0) is not None
 
 
 def test_compiling_is_told_once_and_is_no_time_of_the_job(

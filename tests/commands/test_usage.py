@@ -27,6 +27,11 @@ JOB = "G21 F3000\nG1 X10\nY5\n"
         (["export", "nowhere", "--for", "pvt", "-o", "x"], "nowhere: trajectory file not found"),
         (["pulses", "nowhere"], "Missing option '--steps'. "),
         (["sweep", "part.nc", "-o", "x"], "Missing option '--vary'. "),
+        (
+            ["machine", "import", "x.ini", "-o", "x", "--ramp-time", "20 min"],
+            "'20 min' is no time above 0; write one in s, or",
+        ),
+        (["plan", "part.nc", "--tolerance", "0,05"], "decimals have a point"),
         (["report", "nowhere"], "nowhere: give the directory that 'plan -o' wrote"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -77,3 +82,31 @@ def test_every_command_has_a_line_that_fits() -> None:
     lines = run("--help").output.partition("Commands:")[2].strip().splitlines()
     assert len(lines) == 11
     assert all(line.endswith(".") and not line.endswith("...") for line in lines)
+
+
+def test_files_that_are_not_what_the_option_asks_for_are_recognised(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Settings of a control and machine files as programs, settings as a machine, a machine file with a misspelt name."""
+    monkeypatch.chdir(tmp_path)
+    Path("part.nc").write_text(JOB)
+    Path("grbl.txt").write_text("Grbl 1.1\n$110=5000\n$120=500\n")
+    Path("lathe.toml").write_text('name = "lathe"\n[axes.x]\nvelocity = 1.0\n')
+    for words, said in (
+        (
+            ["lathe.toml"],
+            "this is a machine file, not a program; give the program, and the machine file as -m FILE",
+        ),
+        (
+            ["grbl.txt"],
+            "this is a file of a control's settings, not a program; make a machine file of it (planner machine import)",
+        ),
+        (
+            ["part.nc", "-m", "grbl.txt"],
+            "a machine file is made of a control's settings by: planner machine import",
+        ),
+        (["part.nc", "-m", "lathe.tml"], "did you mean 'lathe.toml'?"),
+    ):
+        done = run("plan", *words)
+        assert done.exit_code == 2
+        assert said in done.output.replace("\n", " ")

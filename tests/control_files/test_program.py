@@ -115,11 +115,19 @@ def test_other_words_stand_where_they_stood(with_words: Plan, control: str, said
         assert float(rapid.group(1)) == pytest.approx(70 * 60, rel=1e-3)
 
 
-def test_a_plan_that_leaves_no_room_is_refused(plan: Plan, tmp_path: Path) -> None:
+def test_a_plan_that_leaves_no_room_gives_the_program_as_it_is_and_says_so(
+    plan: Plan, tmp_path: Path
+) -> None:
     assert plan.verdict is not None
     assert plan.verdict.contour_error_mm is not None
-    with pytest.raises(planner.InputError, match=r"leaves no room for chords: plan with --tolerance 0\.0405"):
-        write_program(tmp_path, plan, "grbl", 0.045)
+    made = write_program(tmp_path, plan, "grbl", 0.045)
+    assert made.sentence.startswith("program as it is")
+    assert made.note is not None
+    assert (
+        "leaves no room for chords: plan with --tolerance 0.0405, and export with --tolerance 0.045"
+        in made.note
+    )
+    (tmp_path / made.file).unlink()
     lost = dataclasses.replace(plan, verdict=dataclasses.replace(plan.verdict, contour_error_mm=None))
     with pytest.raises(planner.InputError, match="leaves the program"):
         write_program(tmp_path, lost, "grbl", TOLERANCE)

@@ -16,6 +16,18 @@ def corner() -> planner.Program:
     return planner.path(CORNER, feed=50.0)
 
 
+class Slow(planner.PathLimit):
+    name = "slow"
+
+    def velocity(self, at: Any) -> Any:
+        return 5.0
+
+
+class Two(Slow):
+    def velocity(self, at: Any) -> Any:
+        return [5.0, 3.0]
+
+
 @pytest.mark.parametrize(
     ("wrong", "error", "said"),
     [
@@ -26,6 +38,9 @@ def corner() -> planner.Program:
         (lambda: planner.plan(corner(), tolerance="20um"), planner.InputError, r"'20um'; give a number, in mm"),
         (lambda: planner.compare(corner(), "mill", ["stopp"]), planner.InputError, r"did you mean 'stop'"),
         (lambda: planner.plan(corner(), "mil"), planner.InputError, r"did you mean 'mill'"),
+        (lambda: planner.plan(corner(), {"x": 1}), planner.InputError, r"a machine is a file.*found a dict"),
+        (lambda: planner.plan(corner(), limits=[Slow]), planner.InputError, r"Slow is a class; give .* Slow\(\)"),
+        (lambda: planner.plan(corner(), limits=Two()), planner.InputError, r"velocity has the shape \(2,\); .*one for each"),
         (lambda: planner.plan(corner(), method="optimum"), planner.InputError, r"did you mean 'optimal'"),
     ],
 )  # fmt: skip
@@ -34,3 +49,8 @@ def test_a_wrong_turn_is_answered_with_the_right_one(
 ) -> None:
     with pytest.raises(error, match=said):
         wrong()
+
+
+def test_one_limit_of_ones_own_needs_no_list() -> None:
+    made = planner.plan(corner(), "mill", method="second-order", limits=Slow())
+    assert "velocity.slow" in made.require().verdict.limits  # type: ignore[union-attr]

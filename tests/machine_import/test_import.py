@@ -148,6 +148,15 @@ def test_marlin_has_the_smaller_of_axis_and_path_acceleration(tmp_path: Path) ->
     assert inches.machine.axes["x"].velocity == pytest.approx(500.0 * 25.4)
 
 
+def test_reprapfirmware_has_the_same_commands_but_velocities_per_minute(tmp_path: Path) -> None:
+    found = imported(tmp_path, MARLIN + "M566 X600 Y600\n")
+    assert [found.machine.axes[letter].velocity for letter in "xyz"] == pytest.approx(
+        [500.0 / 60, 400.0 / 60, 5.0 / 60]
+    )
+    assert found.machine.axes["x"].acceleration == 400.0
+    assert any("RepRapFirmware" in said for said in found.assumed)
+
+
 def test_limits_can_be_given_and_replace_those_of_the_settings(tmp_path: Path) -> None:
     found = imported(tmp_path, GRBL, given={"x.jerk": 9000.0, "y.velocity": 70.0}, tolerance=0.01)
     assert (found.machine.axes["x"].jerk, found.machine.axes["y"].velocity) == (9000.0, 70.0)
@@ -159,7 +168,7 @@ def test_limits_can_be_given_and_replace_those_of_the_settings(tmp_path: Path) -
     ("text", "options", "said"),
     [
         ("G0 X1\n", {}, "no settings found"),
-        (GRBL.replace("$121=400.000", ""), {}, "do not say y.acceleration"),
+        (GRBL.replace("$121=400.000", ""), {}, "do not say y.acceleration; give them in mm and s"),
         (GRBL.replace("400.000", "0"), {}, r"settings\.txt:8: \$121: must be above 0, found 0"),
         (GRBL.replace("400.000", "fast"), {}, r"settings\.txt:8: \$121: a number is needed, found 'fast'"),
         (LINUXCNC.replace("inch", "miles"), {}, "LINEAR_UNITS is 'miles'"),

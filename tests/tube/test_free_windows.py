@@ -276,6 +276,34 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
         assert np.abs(np.diff(column, axis=0)).max() <= rate * dt * (1 + 1e-6)
 
 
+@pytest.mark.parametrize(("divide", "asked_for"), [(True, 9), (False, 2)])
+def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
+    monkeypatch, divide, asked_for
+):
+    """The second of five fails: neither the others nor the joins are asked for; where parts are of use, all are."""
+    run, guess = begun("pentagon")
+    monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
+    monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
+    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
+    monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
+    windows, asked = [], own.solve_window
+
+    def second_fails(legs, limits, x, u, place, tuning):
+        if not windows or windows[-1] != x[0].tobytes():
+            windows.append(x[0].tobytes())
+        return (False, 0, None) if len(windows) == 2 else asked(legs, limits, x, u, place, tuning)
+
+    monkeypatch.setattr(own, "solve_window", second_fails)
+    use_threads(1)
+    try:
+        found = TubeOwn(divide=divide).solve(run, guess)
+    finally:
+        use_threads(None)
+    assert found.kept is not None
+    assert found.kept.any()
+    assert len(windows) == asked_for
+
+
 @pytest.mark.parametrize("k", [0.1, 7.0])
 def test_scaled_lengths_and_limits_take_the_same_time(k):
     machine = problems.machine(velocity=100 * k, acceleration=2000 * k, jerk=2e5 * k, tolerance=0.05 * k)

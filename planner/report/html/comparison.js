@@ -17,12 +17,12 @@
     key.style.color = row.shown ? about.colours[k] : "transparent";
     name.prepend(key);
     if (row.method === about.best) name.style.fontWeight = "600";
-    line.append(name, make("td", digits(row.cycle_time, 6)), make("td", digits(row.ratio, 5)));
+    line.append(name, make("td", fixed(row.cycle_time, 4)), make("td", fixed(row.ratio, 4)));
     for (const quantity of quantities) {
-      const ratio = row.worst[quantity], text = digits(ratio, 4), free = row.free.includes(quantity);
+      const ratio = row.worst[quantity], free = row.free.includes(quantity), text = free ? digits(ratio, 4) : fixed(ratio, 4);
       line.append(make("td", free ? `(${text})` : text, !free && ratio > 1 + 1e-6 ? "bad" : ""));
     }
-    line.append(make("td", row.contour_error === null ? "–" : digits(1000 * row.contour_error, 4)), make("td", digits(row.planning_time, 3)));
+    line.append(make("td", row.contour_error === null ? "–" : digits(1000 * row.contour_error, 4)), make("td", fixed(row.planning_time, 2)));
     line.append(make("td", row.outcome, row.outcome === "passed" ? "" : "bad"));
     if (row.shown) line.onclick = () => {
       if (!hidden.delete(k)) hidden.add(k);
@@ -39,7 +39,7 @@
   const bare = { displaylogo: false, responsive: true };
   const look = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, showlegend: false,
     modebar: { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink }, uirevision: "keep" };
-  const axis3d = (title, visible = true) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, visible });
+  const axis3d = (title, visible = true) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, tickangle: 0, visible });
   function paths() {
     return shown.map((k) => {
       const n = column(k, "t").length, step = Math.max(1, Math.ceil(n / POINTS_OF_PATH)), keep = (name) => column(k, name).filter((_, i) => i % step === 0 || i === n - 1);

@@ -17,7 +17,7 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import in_degrees
-from planner.report.colours import limit_colours
+from planner.report.colours import LOW_TO_HIGH, limit_colours
 from planner.report.export import json_ready, summary
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
@@ -105,6 +105,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         "rotary": [axis for axis in axes if axis in ROTARY_AXES],
         "limits": list(samples.limits),
         "colours": limit_colours(samples.limits),
+        "scales": {ground: list(colours) for ground, colours in LOW_TO_HIGH.items()},
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "machine": {axis: machine.axes[axis].model_dump() for axis in axes},

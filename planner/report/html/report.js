@@ -3,8 +3,7 @@
   const summary = about.summary;
   // Okabe and Ito's colours, told apart with red-green blindness too; axes take them in order, limits have theirs from colours.py.
   const COLOURS = [dark ? "#56B4E9" : "#0072B2", "#E69F00", dark ? "#2fc49a" : "#009E73", "#CC79A7", dark ? "#0072B2" : "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
-  // Cividis; on a dark ground its dark end would not be seen.
-  const LOW_TO_HIGH = dark ? [[0, "#4a7ccc"], [0.25, "#6f86b0"], [0.5, "#9a978f"], [0.75, "#cdb969"], [1, "#fee838"]] : "Cividis";
+  const LOW_TO_HIGH = about.scales[dark ? "dark" : "light"].map((colour, k, all) => [k / (all.length - 1), colour]);
   const POINTS_OF_PATH = 20000, BUCKETS = 1200;
   const mark = (name) => performance.mark(name);
 
@@ -145,7 +144,7 @@
   };
   const extents = [0, 1, 2].map((a) => [a < linear.length ? c[linear[a]] : [0], Object.values(programmed)[a]].reduce(
     (found, column) => column.reduce(([low, high], v) => (v === null || Number.isNaN(v) ? [low, high] : [Math.min(low, v), Math.max(high, v)]), found), [Infinity, -Infinity]));
-  const axis3d = (title, visible) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, visible });
+  const axis3d = (title, visible) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, tickangle: 0, visible });
   const bare = { displaylogo: false, responsive: true };
   const modebar = { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink };
   const pathPlot = element("path"), profilePlot = element("profile");
@@ -355,7 +354,7 @@
   {
     const held = Object.entries(summary.held_by || {}).filter(([, share]) => share > 0.0005).reverse();
     const named = about.limits;
-    const colour = (name) => (named.includes(name) ? limitColour(named.indexOf(name)) : "#8c8c8c");
+    const colour = (name) => (named.includes(name) ? limitColour(named.indexOf(name)) : "#606060");
     if (held.length) {
       await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(name)), x: held.map(([, share]) => 100 * share),
         marker: { color: held.map(([name]) => colour(name)) }, hovertemplate: "%{y}: %{x:.3g} % of the time<extra></extra>" }],

@@ -1,6 +1,6 @@
 // The first view of a path in 3-D, for both pages: along its thinnest direction if it is flat, and as large as the box allows.
 // plotly's orthographic camera shows two units of its scene to the height of the box, from any distance; zooming scales the scene.
-const FLAT = 0.12, MARGIN = 1.08, COLOURBAR = 120, FILLED = 0.86, DISTANCE = 2;
+const FLAT = 0.12, MARGIN = 1.08, COLOURBAR = 120, FILLED = 0.8, DISTANCE = 2;
 const crossed = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const named = ([x, y, z]) => ({ x, y, z });
 

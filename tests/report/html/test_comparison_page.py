@@ -51,6 +51,9 @@ def test_a_file_that_is_no_page_is_kept(tmp_path: Path, file: Path) -> None:
     assert (tmp_path / "mine.html").read_text() == "mine"
     assert run("compare", job, "--method", "stop", "--report", job, "-q", "--force").exit_code == 2
     assert job.read_text() == JOB
+    page = tmp_path / "page.html"
+    for more in ([], ["--force"]):  # beside a page --force is of use
+        assert run("compare", job, "--method", "stop", "--report", page, "-q", *more).exit_code == 0
 
 
 @pytest.mark.slow

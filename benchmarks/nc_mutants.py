@@ -3,8 +3,8 @@
     python -m benchmarks.nc_mutants [COUNT] [--seed N] [--folder FOLDER]
 
 The programs are pieces of those in FOLDER and of a list of constructs of all dialects, with lines, words and bytes changed, doubled,
-swapped and cut, read with settings by chance. Each has `SECONDS` and the process `MEMORY`. Writes results/nc-mutants.json and .md;
-exit code 1 for a crash or a hang, with the program's seed.
+swapped and cut, read with settings by chance, half of them on a machine with nine axes and an extruder. Each has `SECONDS` and the
+process `MEMORY`. Writes results/nc-mutants.json and .md; exit code 1 for a crash or a hang, with the program's seed.
 """
 
 from __future__ import annotations
@@ -133,6 +133,17 @@ def outcome(data: bytes, reading: Any, machine: Any = None) -> str:
     return "refused" if faults else "read"
 
 
+def a_machine(seed: int) -> Any:
+    """None, or a machine with all axes and an extruder, by chance."""
+    from planner.machine.files import machine_from_dict
+
+    if np.random.default_rng([seed, 1]).random() < 0.5:
+        return None
+    axis = {"velocity": 100.0, "acceleration": 1000.0, "jerk": 1e5}
+    axes = {letter: dict(axis) for letter in "xyzabcuvwe"}
+    return machine_from_dict({"name": "all axes", "tolerance": 0.02, "dt": 1e-3, "axes": axes})
+
+
 def load_programs(folder: Path) -> list[list[bytes]]:
     """The lines of the programs of a folder; of long ones the first 3,000."""
     files = sorted(f for f in folder.glob("*") if f.suffix not in (".csv", ".md", ".txt"))
@@ -162,7 +173,7 @@ def main() -> None:
     for seed in range(options.seed, options.seed + options.count):
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
         try:
-            found[outcome(mutant(seed, programs), a_reading(seed))] += 1
+            found[outcome(mutant(seed, programs), a_reading(seed), a_machine(seed))] += 1
         except (Exception, _Hung) as fault:
             found["hung" if isinstance(fault, _Hung) else "crashed"] += 1
             bad.append(seed)

@@ -133,7 +133,7 @@ class Interpreter:
         self.mover.splines.keep(words)
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
-        self.assumed.moved |= {chr(letter) for letter in np.unique(letters)}
+        self.assumed.moved |= {chr(letter) for letter in np.flatnonzero(np.bincount(letters))}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         self.found.keep(words, found)
         self.assumed.count_letters(words, row)

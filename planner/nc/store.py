@@ -180,7 +180,7 @@ class Store:
             axes=LINEAR_AXES + tuple(letter.lower() for letter in names),
             start=np.zeros(3 + len(names)),
             kind=self.block.kind[used].copy(),
-            end=np.hstack([self.block.end[used], moved]),
+            end=np.hstack([self.block.end[used], moved]) if names else self.block.end[used].copy(),
             feed=self.block.feed[used].copy(),
             dwell=dwell,
             line=self.block.line[used].copy(),

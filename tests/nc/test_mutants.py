@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.nc_mutants import a_reading, load_programs, mutant, outcome
+from benchmarks.nc_mutants import a_machine, a_reading, load_programs, mutant, outcome
 
 COUNT = 400
 
@@ -19,19 +19,21 @@ def programs(shared_dir: Path) -> list[list[bytes]]:
 
 @pytest.mark.parametrize("first", range(0, COUNT, 100))
 def test_mutants_end_in_a_program_or_in_a_message(first: int) -> None:
-    found = {outcome(mutant(seed, []), a_reading(seed)) for seed in range(first, first + 100)}
+    found = {
+        outcome(mutant(seed, []), a_reading(seed), a_machine(seed)) for seed in range(first, first + 100)
+    }
     assert found <= {"read", "refused", "not a program"}
     assert "refused" in found
 
 
 def test_some_mutants_are_read() -> None:
     """3 to 8 % of them are programs still."""
-    assert "read" in {outcome(mutant(seed, []), a_reading(seed)) for seed in range(200)}
+    assert "read" in {outcome(mutant(seed, []), a_reading(seed), a_machine(seed)) for seed in range(200)}
 
 
 def test_mutants_of_real_programs(programs: list[list[bytes]]) -> None:
     for seed in range(COUNT, COUNT + 100):
-        outcome(mutant(seed, programs), a_reading(seed))
+        outcome(mutant(seed, programs), a_reading(seed), a_machine(seed))
 
 
 def test_the_same_seed_makes_the_same_mutant() -> None:

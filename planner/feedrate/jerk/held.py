@@ -51,9 +51,11 @@ def held_ranges(columns: ProblemColumns, first: int, last: int) -> list[Held]:
     own = slice(first, last + 1)
     a, j, s = columns.acceleration[own].min(), columns.jerk[own].min(), columns.s
     free = _could_be_held(columns, first, last)
-    edges = np.flatnonzero(free[1:] != free[:-1])  # the last point before, the last point of each
+    edges = np.flatnonzero(free[1:] != free[:-1]).reshape(
+        -1, 2
+    )  # the last point before, the last point of each
     found = []
-    for before, end in (edges.reshape(-1, 2) + first).tolist():
+    for before, end in (edges[edges[:, 1] - edges[:, 0] >= POINTS] + first).tolist():
         x = float(columns.x_max[before + 1 : end + 1].min())
         reach = reach_of_end(x, a, j)
         begin = max(int(np.searchsorted(s[own], s[before] + reach)) + first, before + EDGE)

@@ -89,7 +89,10 @@ class ProgramRun:
         try:
             self.functions[main](self, {})
             self.flush()
-            left = self.travel.end()
+            try:
+                left = self.travel.end()
+            except ValueError as fault:  # what a statement began has no end: no statement of its own to name
+                return self._stopped(ProgramFault(self._last_place(), str(fault)))
             if left:
                 self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
         except Ended:
@@ -337,6 +340,11 @@ class ProgramRun:
             traceback = traceback.tb_next
         assert place is not None
         return place
+
+    def _last_place(self) -> SourcePlace:
+        """The last statement of the main program."""
+        main = next(iter(self.units.values()))
+        return max((place for place in main.places if place.file == 0), key=lambda place: place.at)
 
     def _file_at(self, at: int) -> int:
         return sum(begin <= at for begin, _ in self.rows.files)

@@ -12,6 +12,7 @@ from moved import machine_with, read_twice, sampled
 
 from planner.base.errors import InputError
 from planner.nc.program import Kind, Program
+from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
 
 RADIUS = 4.0
@@ -86,6 +87,12 @@ def test_what_the_tool_cannot_follow_is_refused_with_its_line() -> None:
     ):
         with pytest.raises(InputError, match=said):
             read(f"L X+0 Y+0 FMAX\n{body}")
+
+
+def test_what_has_no_end_at_the_end_of_a_text_is_said_at_its_last_statement():
+    text = "BEGIN PGM 1 MM\nTOOL CALL 1 Z S1000 F100\nL X+0 Y+0 Z+5 R0 FMAX\nAPPR CT X+1 Y+2 Z-3 CCA90 R+4 RR F100\n"
+    with pytest.raises(InputError, match=r"^a\.h:4:1: APPR: APPR is followed by no contour"):
+        parse_program(text, None, source="a.h")
 
 
 @pytest.mark.parametrize("side", ["RL", "RR"])

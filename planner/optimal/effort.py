@@ -82,7 +82,7 @@ EFFORTS = {
         work=25_000,
         rounds=2,
         left=1e-3,
-        search=Search(steps_max=30_000, per_unit=2.0, of_leg=1.0, gap=1e-3, again=False),
+        search=Search(steps_max=30_000, per_unit=1.0, of_leg=1.0, gap=1e-3, again=False),
         sizes=(_LARGE,),
     ),
     NORMAL: Effort(

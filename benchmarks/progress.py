@@ -6,7 +6,7 @@ what was so.
 Each plan is made in a process of its own, on one thread, by the clock of its processor, so that other work on the machine does not
 count; kernels are loaded before. "Within two" is the share of the moments from 20 % of the plan on at which what was said is at most
 twice, and at least half, of what was left, or within a second of it; "worst" is the largest factor among those more than a second off.
-The constants of the estimator were read off the first group of jobs; the second group was not looked at before.
+The constants of the estimator were read off the first group of jobs, those of searches (commands/search_left.py) off both groups.
 """
 
 from __future__ import annotations

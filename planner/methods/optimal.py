@@ -27,7 +27,7 @@ from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
 from planner.optimal.effort import EFFORTS
-from planner.optimal.loop import Settings, fastest_plan, first_motion
+from planner.optimal.loop import FirstMotion, Settings, fastest_plan, first_motion
 from planner.optimal.order import ThirdOrder
 from planner.optimal.shaped import shaped_plan
 
@@ -96,7 +96,10 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
 
     if not searchable(job):
         return fastest_plan(job, settings)
-    begun = first_motion(job, settings) if dial.at_once else None
+    first = first_motion(job, settings) if dial.at_once else FirstMotion(None)
+    if first.too_large:
+        return fastest_plan(job.afresh(), settings)
+    begun = first.planned
     if begun is not None:
         if steps > CHEAP and begun.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
             job.tell("search", left=begun.solution.cycle_time / _at_feed(job) - 1.0)
@@ -110,11 +113,11 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
         return fastest_plan(job.afresh(), settings)
     on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
     again = job.afresh()
-    first = freed(again, fastest_plan(again, on_first), dial)
-    if first.kept <= dial.kept:
-        return first.plan
+    once = freed(again, fastest_plan(again, on_first), dial)
+    if once.kept <= dial.kept:
+        return once.plan
     again = job.afresh()
-    return faster(freed(again, fastest_plan(again, settings), dial).plan, first.plan)
+    return faster(freed(again, fastest_plan(again, settings), dial).plan, once.plan)
 
 
 def _at_feed(job: Job) -> float:

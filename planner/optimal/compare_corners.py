@@ -44,12 +44,19 @@ def corner_bounds(
     path: SmoothPath, machine: Machine, jerk_limited: bool = True, most: float = COMPARED_POINTS
 ) -> CornerBounds:
     """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk limits on a coarse grid, the
-    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see."""
+    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see. Corners
+    that no grid follows have no motion: their runs take forever."""
     bounds = corner_times(path, machine, jerk_limited=jerk_limited)
     if bounds.points.sum() > most:
         return bounds
     samples = sample_path(path, machine, COARSER * RESOLUTION, third_order=True)
     points = FEWER * np.diff(samples.piece)
+    followed = np.maximum.reduceat(samples.margin, samples.piece[:-1]) < 1.0
+    if not followed.all():
+        time = np.full(len(points), np.inf)
+        if followed.any():
+            time[followed] = corner_bounds(path.part(followed), machine, jerk_limited, most).time
+        return CornerBounds(time, points)
     planned = second_order(path, samples, machine, Reachability())
     if not planned.solution.solved:
         return CornerBounds(np.zeros(len(points)), points)

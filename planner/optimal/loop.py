@@ -208,18 +208,30 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     return dataclasses.replace(best, notes=notes)
 
 
-def first_motion(job: Job, settings: Settings) -> OnPath | None:
-    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points only: enough to search
-    from (methods/at_once.py). None where a run gets no spline, where their spans are more than the steps that are searched, and where
-    there is no solution."""
+@dataclass(frozen=True)
+class FirstMotion:
+    """A motion to search from (methods/at_once.py).
+
+    planned   : None where a run gets no spline, and where there is no solution
+    too_large : whether it was not planned, because the splines have more spans than the steps that are searched
+    """
+
+    planned: OnPath | None
+    too_large: bool = False
+
+
+def first_motion(job: Job, settings: Settings) -> FirstMotion:
+    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points only."""
     rounded = _rounded(job, settings)
     with job.stage("geometry"):
         shape = spline_shape(rounded, job.machine)
         whole = shape.splines.fits.all() and not len(lost_joints(rounded, shape, fence=False))
-    if not whole or shape.splines.span_first[-1] > settings.effort.search.steps_max:
-        return None
+    if shape.splines.span_first[-1] > settings.effort.search.steps_max:
+        return FirstMotion(None, too_large=True)
+    if not whole:
+        return FirstMotion(None)
     planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
-    return planned if planned.solution.solved else None
+    return FirstMotion(planned if planned.solution.solved else None)
 
 
 def _rounded(job: Job, settings: Settings) -> SmoothPath:

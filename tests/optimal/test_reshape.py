@@ -22,7 +22,7 @@ from planner.geometry.toolpath import Joint
 from planner.job.trace import tell_nobody
 from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program
-from planner.optimal import reshape
+from planner.optimal import compare_corners, reshape
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.corner_times import CornerBounds, corner_times
 from planner.optimal.effort import COARSE, Grids
@@ -217,3 +217,25 @@ def test_bands_are_the_same_in_parts_of_any_size(monkeypatch):
     monkeypatch.setattr(reshape, "PRICED", 17)
     for one, other in zip(price_bands(planned), whole, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+def test_corners_that_no_grid_follows_are_no_rivals(monkeypatch):
+    toolpath = toolpath_from_program(problems.star_spiral(60), MACHINE)
+    stopping = toolpath.with_joints(np.array([20, 40]), Joint.STOP)
+    path = round_corners(stopping, MACHINE, BezierCorner(), blend_tangents=True)
+    known = corner_bounds(path, MACHINE)
+    assert np.isfinite(known.time).all()
+    sampled = compare_corners.sample_path
+
+    def too_coarse_in_the_middle(path, *given, **named):
+        samples = sampled(path, *given, **named)
+        margin = samples.margin.copy()
+        if len(samples.piece) == 4:
+            margin[samples.piece[1]] = 1.0
+        return dataclasses.replace(samples, margin=margin)
+
+    monkeypatch.setattr(compare_corners, "sample_path", too_coarse_in_the_middle)
+    bounds = corner_bounds(path, MACHINE)
+    assert bounds.time[1] == np.inf
+    np.testing.assert_allclose(bounds.time[[0, 2]], known.time[[0, 2]], rtol=1e-9)
+    np.testing.assert_array_equal(bounds.points, known.points)

@@ -44,8 +44,9 @@ def corner_bounds(
     path: SmoothPath, machine: Machine, jerk_limited: bool = True, most: float = COMPARED_POINTS
 ) -> CornerBounds:
     """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk limits on a coarse grid, the
-    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see. Corners
-    that no grid follows have no motion: their runs take forever."""
+    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see.
+    Corners that no grid follows have no motion: their runs take forever.
+    """
     bounds = corner_times(path, machine, jerk_limited=jerk_limited)
     if bounds.points.sum() > most:
         return bounds

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterator
 
@@ -67,43 +68,52 @@ class Reader:
         samples: Iterator[Trajectory],
         progress: Callable[[float], None],
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes: a part of the motion and, side by side, the samples of the part before,
-        which are then compared. What is seen does not depend on the number of threads."""
+        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the motion is evaluated, the
+        one before is read, and the samples of the one before that, which are then compared. What is seen does not depend on the
+        number of threads."""
         assert self.motion is not None
         assert self.comparison is not None
         between = Watch(pieces, self.limits, middles=False)
         self.comparison.begin()
         parts = look(self.motion, *self._times)
-        part: Trajectory | None = None  # read, but not compared yet
-        while True:
-            new: list[Trajectory] = []
-
-            def go_on(new: list[Trajectory] = new) -> None:
-                for one in itertools.islice(parts, 1):
-                    between.take(one)
-                    new.append(one)
-
-            def catch_up(part: Trajectory | None = part) -> None:
-                while part is not None and seen.seen.t_last < part.t[-1]:
-                    chunk = next(samples, None)
-                    if chunk is None:
-                        break
-                    self._take(seen, chunk)
-
+        evaluated, taken = next(parts, None), None  # not read yet; read, but not compared yet
+        while evaluated is not None or taken is not None:
+            found: list[Trajectory] = []
+            tasks = [
+                functools.partial(_evaluate, parts, found),
+                functools.partial(_read, between, evaluated),
+                functools.partial(self._catch_up, seen, samples, taken),
+            ]
             if len(self.trajectory) > SIDE_BY_SIDE and threads() > 1:
-                side_by_side([go_on, catch_up], lambda: None, lambda: None)
+                side_by_side(tasks, lambda: None, lambda: None)
             else:
-                go_on()
-                catch_up()
-            if part is not None:
-                self.comparison.compare(part)
-                progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
-            if not new:
-                return between
-            part = new[0]
+                for task in tasks:
+                    task()
+            if taken is not None:
+                self.comparison.compare(taken)
+                progress(min(1.0, float(taken.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+            evaluated, taken = next(iter(found), None), evaluated
+        return between
+
+    def _catch_up(self, seen: Watch, samples: Iterator[Trajectory], part: Trajectory | None) -> None:
+        """Read the samples as far as a part of the motion goes."""
+        while part is not None and seen.seen.t_last < part.t[-1]:
+            chunk = next(samples, None)
+            if chunk is None:
+                break
+            self._take(seen, chunk)
 
     def _take(self, seen: Watch, chunk: Trajectory) -> None:
         seen.take(chunk)
         self.delivered.take(chunk)
         if self.comparison is not None:
             self.comparison.deliver(chunk)
+
+
+def _evaluate(parts: Iterator[Trajectory], found: list[Trajectory]) -> None:
+    found.extend(itertools.islice(parts, 1))
+
+
+def _read(watch: Watch, part: Trajectory | None) -> None:
+    if part is not None:
+        watch.take(part)

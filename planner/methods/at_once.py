@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 from planner.job.job import Job
 from planner.job.plan import Plan
-from planner.methods.free import Start, part_of, said, search, tabled
+from planner.methods.free import Start, part_of, said, search, solver_of, tabled
 from planner.optimal.loop import Settings
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.tube.own import TubeOwn
 from planner.tube.parts import FoundRun, parts_of
 from planner.tube.run import tube_runs_of
 from planner.tube.splice import Spliced, SplicedRun
@@ -41,7 +40,7 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
     """
     dial = settings.effort.search
     with job.stage("search") as report:
-        start = Start(planned.motion(), job, dial)
+        start = Start(planned.motion(), job, dial.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         if steps > dial.steps_max:
@@ -52,7 +51,7 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
         for k, run in enumerate(runs):
             of_run = len(start.guess(k, run))
             progress = part_of(report, done, of_run, steps)
-            found.append(search(k, run, [start], TubeOwn(dial.gap, divide=False, progress=progress)))
+            found.append(search(k, run, [start], solver_of(dial, progress, divide=False)))
             if not found[-1].whole:
                 job.tell("search", steps=steps, of_runs=len(runs), whole=k)
                 return AtOnce(None)

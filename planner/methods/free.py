@@ -19,12 +19,14 @@ from planner.job.records import NO_TABLES, Tables
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import passing_times, standstills
-from planner.optimal.effort import THOROUGH, Search
+from planner.optimal.effort import Search
 from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
-from planner.tube.guess import Guess, guess_from
+from planner.tube.guess import DEFAULT_CUT, Cut, Guess, guess_from
+from planner.tube.outcome import TubeSolution
 from planner.tube.own import TubeOwn
 from planner.tube.parts import FoundRun, parts_of
+from planner.tube.refine import divided, searched_again
 from planner.tube.run import TubeRun, tube_runs_of
 from planner.tube.solvers import TubeSolver
 from planner.tube.splice import Spliced, SplicedRun
@@ -33,6 +35,8 @@ from planner.tube.splice import Spliced, SplicedRun
 START_PERIOD, START_SAMPLES = 0.02, 200_000
 # Times nearer to each other than this share of a leg's mean time are one [-].
 LEAST_APART = 1e-6
+# What a search in long steps takes of one that goes on in shorter ones [-].
+FIRST_SEARCH = 0.3
 # Share of the time without prices from which that is said, and from which those of the start say more [-].
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
 
@@ -60,7 +64,7 @@ def searchable(job: Job) -> bool:
     )
 
 
-def freed(job: Job, plan: Plan, dial: Search = THOROUGH) -> Freed:
+def freed(job: Job, plan: Plan, dial: Search) -> Freed:
     """The plan with a faster motion near its own where one is found (tube/own.py), else the plan.
 
     job  : a searchable one
@@ -72,7 +76,7 @@ def freed(job: Job, plan: Plan, dial: Search = THOROUGH) -> Freed:
         return Freed(plan, 1.0)
     with job.stage("search") as report:
         runs = list(tube_runs_of(job.toolpath, job.machine))
-        start = Start(job.motion_of[plan.trajectory], job, dial, plan)
+        start = Start(job.motion_of[plan.trajectory], job, dial.cut, plan)
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         if steps > dial.steps_max:
             job.tell("search", steps=steps, of=dial.steps_max)
@@ -80,9 +84,8 @@ def freed(job: Job, plan: Plan, dial: Search = THOROUGH) -> Freed:
         found, done = [], 0
         for k, run in enumerate(runs):
             of_run = len(start.guess(k, run))
-            found.append(
-                search(k, run, [start], TubeOwn(dial.gap, progress=part_of(report, done, of_run, steps)))
-            )
+            solver = solver_of(dial, part_of(report, done, of_run, steps), divide=True)
+            found.append(search(k, run, [start], solver))
             done += of_run
     made, kept, why = delivered(job, start, found)
     better = made[0] is not plan.trajectory
@@ -111,6 +114,28 @@ def part_of(report: Callable[[float], None], done: int, of_run: int, steps: int)
     return lambda share: report((done + share * of_run) / steps)
 
 
+class InTwo(NamedTuple):
+    """A search in long steps, and from what it finds, if that is all of a run, in shorter ones; else in those from the start."""
+
+    first: TubeOwn
+    cut: Cut
+    second: TubeOwn
+
+
+def solver_of(dial: Search, report: Callable[[float], None], *, divide: bool) -> TubeOwn | InTwo:
+    """The search as the effort has it; `divide` windows that fail."""
+    if dial.finer is None:
+        return TubeOwn(dial.gap, divide=divide, progress=report)
+    cut, gap = dial.finer
+    return InTwo(
+        TubeOwn(dial.gap, divide=False, progress=lambda share: report(FIRST_SEARCH * share)),
+        cut,
+        TubeOwn(
+            gap, divide=divide, progress=lambda share: report(FIRST_SEARCH + (1.0 - FIRST_SEARCH) * share)
+        ),
+    )
+
+
 def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
     """Share of the time on which the start's motion stays [-]."""
     stays = 0.0
@@ -127,16 +152,16 @@ def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
 class Start:
     """A motion from which the search begins, and where in it the runs are.
 
-    dial : how finely it is cut into steps
+    cut  : how finely it is cut into steps
     plan : of the motion; None for one that is searched from and not delivered
     """
 
-    def __init__(self, motion: MotionInTime, job: Job, dial: Search = THOROUGH, plan: Plan | None = None):
+    def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT, plan: Plan | None = None):
         acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
         period = max(START_PERIOD * float((acceleration / jerk).min()), motion.end / START_SAMPLES)
         even = np.arange(0.0, motion.end, period)
         edges = np.append(motion.t, motion.end)
-        self.plan, self.motion, self.dial = plan, motion, dial
+        self.plan, self.motion, self.cut = plan, motion, cut
         self.seen = joined(list(in_chunks(motion, period, np.concatenate([even, edges]))))
         self.times = passing_times(self.seen, job.toolpath)
         self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
@@ -157,14 +182,14 @@ class Start:
         )
 
     def guess(self, k: int, run: TubeRun) -> Guess:
-        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts of it can stay."""
+        """The motion along run k, cut into steps."""
         if k not in self._guesses:
-            self._guesses[k] = self._guess(k, run)
+            self._guesses[k] = self.guess_in(k, run, self.cut)
         return self._guesses[k]
 
-    def _guess(self, k: int, run: TubeRun) -> Guess:
-        """The same, made."""
-        guess = guess_from(run, *self.window(k, run), (self.dial.per_unit, self.dial.of_leg))
+    def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
+        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts of it can stay."""
+        guess = guess_from(run, *self.window(k, run), cut)
         inner = self.departure[k] + np.cumsum(guess.h[:-1])
         seen = self.motion.at(inner, 1.0)
         state = guess.state.copy()
@@ -209,7 +234,7 @@ class Starts:
             yield self.made[-1]
 
 
-def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) -> FoundRun:
+def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver | InTwo) -> FoundRun:
     """What the search along run k leads to from one start after the other, until it is faster than the first start."""
     least: float = np.inf
     why: list[str] = []
@@ -220,7 +245,10 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) ->
             why.append("G61 asks for the exact path")
             break
         guess = start.guess(k, run)
-        solution = solver.solve(run, guess)
+        if isinstance(solver, InTwo):
+            guess, solution = _in_two(k, run, start, solver)
+        else:
+            solution = solver.solve(run, guess)
         steps, kept = solution.steps, solution.kept
         if steps is None:
             why.append(solution.sentence)
@@ -235,6 +263,18 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver) ->
             run, solution.status, solution.sentence, steps, solution.place, times, kept, solution.price
         )
     return FoundRun(run, Status.ACCEPTABLE, why[0])
+
+
+def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[Guess, TubeSolution]:
+    """What the two searches find, and the steps from which the last one began."""
+    guess = start.guess(k, run)
+    found = solver.first.solve(run, guess)
+    if found.steps is None or (found.kept is not None and found.kept.any()):
+        guess = start.guess_in(k, run, solver.cut)
+        return guess, solver.second.solve(run, guess)
+    finer = divided(run, guess.leg, found, solver.cut)
+    again = searched_again(run, found, finer, solver.second)
+    return (guess, found) if again is None else (finer.guess, again)
 
 
 def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered, list[int], str]:

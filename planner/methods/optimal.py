@@ -96,7 +96,7 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
 
     if not searchable(job):
         return fastest_plan(job, settings)
-    first = first_motion(job, settings) if dial.at_once else FirstMotion(None)
+    first = first_motion(job, settings)
     if first.too_large:
         return fastest_plan(job.afresh(), settings)
     begun = first.planned

@@ -1,8 +1,8 @@
 """Where the search begins: the motion of another method, cut into steps.
 
 A corner is shaped by jerk, within the time in which full jerk moves an axis by the tolerance, (eps/j)^(1/3), or takes it to its
-full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it has `STEPS_PER_UNIT` steps, and all of a leg
-at least `STEPS_OF_LEG` and one in `LONGEST` units. So phases of full jerk get short steps and cruises a few long ones.
+full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it has `Cut.per_unit` steps, and all of a leg
+at least `Cut.of_leg` and one in `LONGEST` units. So phases of full jerk get short steps and cruises a few long ones.
 
 Every step is a cubic in time with the control points
 
@@ -14,7 +14,7 @@ and each of them has its place on the run, the nearest one, never going back.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,15 +22,26 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.motion.trajectory import Trajectory
 from planner.tube.run import TubeRun
 
-# Twice as many find motions 2e-5 to 5e-5 faster in three times the time; half as many do not converge (corner of 90 degrees, pentagon).
-STEPS_PER_UNIT = 4.0
-STEPS_OF_LEG = 2.0
 # Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
 LONGEST, MOST_FOR_LENGTH = 4.0, 60
 # Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to move.
 ARC_STEP = 0.8
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
+
+
+class Cut(NamedTuple):
+    """How finely a motion is cut into steps.
+
+    Twice as many find motions 2e-5 to 5e-5 faster in three times the time; begun with half as many, a corner of 90 degrees and a
+    pentagon do not converge.
+    """
+
+    per_unit: float = 4.0  # steps in a unit of time where the jerk is at its limit (module text) [-]
+    of_leg: float = 2.0  # steps of a leg at least [-]
+
+
+DEFAULT_CUT = Cut()
 
 
 class CutMotion(Protocol):
@@ -95,15 +106,14 @@ def guess_from(
     run: TubeRun,
     motion: Trajectory,
     vertex_time: FloatArray,
-    fine: tuple[float, float] = (STEPS_PER_UNIT, STEPS_OF_LEG),
+    cut: Cut = DEFAULT_CUT,
 ) -> Guess:
     """Cut a motion along a run of R legs into steps.
 
     motion      : along this run alone, at rest at both ends
     vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
-    fine        : steps in a unit where the jerk is at its limit, and of a leg at least (module text) [-]
     """
-    leg, nodes = _steps(run, motion, vertex_time, fine)
+    leg, nodes = _steps(run, motion, vertex_time, cut)
     of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
     state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
     state[[0, -1], 1:] = 0.0
@@ -113,16 +123,25 @@ def guess_from(
     return Guess(leg=leg, h=h, state=state, place=place)
 
 
-def _steps(
-    run: TubeRun, motion: Trajectory, vertex_time: FloatArray, fine: tuple[float, float]
-) -> tuple[Array, FloatArray]:
+def unit_of(run: TubeRun) -> float:
+    """The unit of time in which a corner is shaped (module text) [s]."""
+    return float(min((run.acceleration / run.jerk).min(), np.cbrt(run.budget.min() / run.jerk.max())))
+
+
+def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
+    """(R,) steps of each leg at least, whatever its jerks are; lasting: (R,) [s]."""
+    of_time = cut.of_leg + np.minimum(lasting / (LONGEST * unit_of(run)), MOST_FOR_LENGTH)
+    least: FloatArray = np.maximum(of_time, run.length / (ARC_STEP * run.step_max))
+    return least
+
+
+def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
-    unit = float(min((run.acceleration / run.jerk).min(), np.cbrt(run.budget.min() / run.jerk.max())))
+    unit = unit_of(run)
     busy = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
     lasting = np.diff(motion.t)
-    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * fine[0] / unit
-    least = fine[1] + np.minimum(np.diff(vertex_time) / (LONGEST * unit), MOST_FOR_LENGTH)
-    least = np.maximum(least, run.length / (ARC_STEP * run.step_max))
+    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * cut.per_unit / unit
+    least = least_of_legs(run, np.diff(vertex_time), cut)
     # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from that of the run
     inside = motion.t[(motion.t > vertex_time[0]) & (motion.t < vertex_time[-1])]
     t = np.union1d(inside, vertex_time)

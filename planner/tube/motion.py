@@ -8,6 +8,7 @@ by lam^2 and jerks by lam^3 and leaves the path as it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from planner.base.arrays import FloatArray
 from planner.tube.guess import Guess
 from planner.tube.run import TubeRun
 
+# Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their square from acceleration to
+# position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
+CLOSED_EVERY = 50
 # Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.
 MEASURED_AT = np.linspace(0.0, 1.0, 257)
 
@@ -81,6 +85,21 @@ def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) 
     )  # of p, v, a, in those units
     missed = (integrated(begin, h, jerk)[-1] - end) / lasts ** np.array([[3.0], [2.0], [1.0]])
     return jerk - np.linalg.lstsq(to_end, missed, rcond=None)[0]
+
+
+def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The motion that meets every `CLOSED_EVERY`th of the nodes, state (N+1, 3, A), and the last one: its nodes, and the jerks (N, A),
+    those given changed least between two of them.
+
+    h    : (N,) durations [s]
+    jerk : (N, A) [mm/s3]
+    """
+    ends = np.linspace(0, len(h), max(len(h) // CLOSED_EVERY, 1) + 1).astype(int)
+    nodes, jerks = state.copy(), np.empty_like(jerk)
+    for lo, hi in pairwise(ends.tolist()):
+        jerks[lo:hi] = closed(state[lo], state[hi], h[lo:hi], jerk[lo:hi])
+        nodes[lo:hi] = integrated(state[lo], h[lo:hi], jerks[lo:hi])[:-1]
+    return nodes, jerks
 
 
 def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:

@@ -26,11 +26,18 @@ class StepWindow(NamedTuple):
 
     legs: LegFormulas
     limits: StepLimits
-    x: FloatArray  # (N+1, S) position, velocity, acceleration of the nodes; the first and the last one stay
+    x: FloatArray  # (N+1, S) position from the first node, velocity, acceleration of the nodes; the first and the last one stay
     u: FloatArray  # (N, C) jerk and duration
     place: FloatArray  # (N, 3) of the node and the inner control points along the leg
     second: float  # unit of time [s]
     length: float  # unit of length [mm]
+    origin: FloatArray  # (A,) [mm]
+
+    def nodes(self) -> FloatArray:
+        """(N+1, 3, A) position, velocity and acceleration [mm, s]."""
+        state = self.x.reshape(len(self.x), 3, -1) * (self.length / self.second ** np.arange(3)[:, None])
+        state[:, 0] += self.origin
+        return state
 
 
 def window_of(
@@ -46,16 +53,17 @@ def window_of(
     second = float(h.mean())
     length = float(np.abs(np.diff(state[:, 0], axis=0)).sum() / len(h))
     speed, acc, jerk = length / second, length / second**2, length / second**3
+    origin = state[0, 0]  # far from it, gaps of the kinematics would not get below the rounding of positions
     legs = LegFormulas(
         length=run.length / length,
-        base=run.base / length,
+        base=(run.base - origin) / length,
         drift=run.drift,
         e1=run.e1,
         e2=run.e2,
         radius=run.radius / length,
         rate=run.rate * length,
     )
-    x = np.concatenate([state[:, 0] / length, state[:, 1] / speed, state[:, 2] / acc], axis=1)
+    x = np.concatenate([(state[:, 0] - origin) / length, state[:, 1] / speed, state[:, 2] / acc], axis=1)
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
     place = (guess.place[part, :3] - run.offset[leg][:, None]) / length
     return StepWindow(
@@ -66,6 +74,7 @@ def window_of(
         place=np.ascontiguousarray(place),
         second=second,
         length=length,
+        origin=origin,
     )
 
 

@@ -27,7 +27,7 @@ from planner.job.plan import Plan
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
 from planner.optimal.effort import EFFORTS
-from planner.optimal.loop import FirstMotion, Settings, fastest_plan, first_motion
+from planner.optimal.loop import Settings, fastest_plan, first_motion
 from planner.optimal.order import ThirdOrder
 from planner.optimal.shaped import shaped_plan
 

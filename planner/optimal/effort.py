@@ -18,8 +18,8 @@ from planner.tube.guess import Cut
 COARSE = 3.2e-2
 
 
-# The first steps of a search, those of the second one, and the gaps of both [-]. On bracket, star and spiral, 2,000 chords and a relief of
-# 2,000 blocks two steps of a leg at least find 1e-6 to 1.7e-5 more in 1.07 to 1.34 times the time.
+# The first steps of a search, those of the second one, and the gaps of both [-]. On bracket, star and spiral, 2,000 chords and a relief
+# of 2,000 blocks two steps of a leg at least find 1e-6 to 1.7e-5 more in 1.07 to 1.34 times the time.
 FIRST_CUT, SECOND_CUT = Cut(per_unit=1.0, of_leg=1.0), Cut(per_unit=4.0, of_leg=1.0)
 FIRST_GAP, SECOND_GAP = 1e-3, 1e-5
 # For the best of efforts: on those jobs 1.2e-5 to 2e-5 more.

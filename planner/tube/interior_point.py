@@ -37,8 +37,8 @@ MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two starts of the bracket all
 # of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
 PREDICTED = 0.3
-# Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up. With 1e-10 for all steps of
-# a window 18 of 71 of a relief of 10,000 blocks went on to the last iteration: the last gap stays at 1e-9 once durations hardly change.
+# Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up. With 1e-10 for all steps
+# 18 of 71 windows of a relief of 10,000 blocks went on to the last iteration: the last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule

@@ -130,7 +130,7 @@ def test_the_verdict_is_the_same_on_any_number_of_threads(monkeypatch):
             verdicts.append(planner.plan(problems.pentagon(), problems.machine(), method="bezier").verdict)
         finally:
             threads.use_threads(None)
-    assert set(used) == {2}
+    assert set(used) == {3}
     assert verdicts[0].passed
     for verdict in verdicts[1:]:
         assert verdict.summary() == verdicts[0].summary()

@@ -164,9 +164,7 @@ def _numbers(source: str, name: str, column: Any) -> Array:
             f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed",
             source=source,
         )
-    bad = (
-        np.flatnonzero(~(np.abs(column.astype(np.float64)) <= VALUE_MAX)) if column.dtype.kind == "f" else []
-    )
+    bad = np.flatnonzero(~(np.abs(column.astype(np.float64)) <= VALUE_MAX))
     if len(bad):
         needed = "between -1e30 and 1e30" if np.isfinite(column[bad[0]]) else "a finite number"
         raise InputError(

@@ -7,6 +7,7 @@ import re
 import tomllib
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from planner.base.errors import InputError
 from planner.base.files import require_ending
@@ -46,7 +47,7 @@ def load_machine(path: str | Path) -> Machine:
     return machine_from_dict(data, source=source)
 
 
-def machine_from_dict(data: dict, *, source: str | None = None) -> Machine:
+def machine_from_dict(data: dict[str, Any], *, source: str | None = None) -> Machine:
     """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at once."""
     try:
         return Machine(**data)

@@ -44,7 +44,8 @@ def extruder_alone(program: Program) -> Array:
     """(B,) True for the blocks on which the extruder moves and nothing else."""
     if not len(program.extruded):
         return np.zeros(len(program), dtype=bool)
-    return (program.kind == Kind.STOP) & (program.extruded != 0.0)
+    alone: Array = (program.kind == Kind.STOP) & (program.extruded != 0.0)
+    return alone
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

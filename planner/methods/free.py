@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -115,25 +116,31 @@ def part_of(report: Callable[[float], None], done: int, of_run: int, steps: int)
 
 
 class InTwo(NamedTuple):
-    """A search in long steps, and from what it finds, if that is all of a run, in shorter ones; else in those from the start."""
+    """A search in long steps, and from what it finds, if that is all of a run, in shorter and shorter ones; else in the first of
+    those from the start."""
 
     first: TubeOwn
-    cut: Cut
-    second: TubeOwn
+    finer: tuple[tuple[Cut, TubeOwn], ...]
 
 
 def solver_of(dial: Search, report: Callable[[float], None], *, divide: bool) -> TubeOwn | InTwo:
     """The search as the effort has it; `divide` windows that fail."""
-    if dial.finer is None:
+    if not dial.finer:
         return TubeOwn(dial.gap, divide=divide, progress=report)
-    cut, gap = dial.finer
+    ends = np.linspace(FIRST_SEARCH, 1.0, len(dial.finer) + 1).tolist()
+    parts = [_part(report, *own) for own in pairwise([0.0, *ends])]
     return InTwo(
-        TubeOwn(dial.gap, divide=False, progress=lambda share: report(FIRST_SEARCH * share)),
-        cut,
-        TubeOwn(
-            gap, divide=divide, progress=lambda share: report(FIRST_SEARCH + (1.0 - FIRST_SEARCH) * share)
+        TubeOwn(dial.gap, divide=False, progress=parts[0]),
+        tuple(
+            (cut, TubeOwn(gap, divide=divide, progress=part))
+            for (cut, gap), part in zip(dial.finer, parts[1:], strict=True)
         ),
     )
+
+
+def _part(report: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
+    """Tells the share of the whole, from that of the part between two shares of it."""
+    return lambda share: report(begin + share * (end - begin))
 
 
 def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
@@ -270,11 +277,15 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[Guess, T
     guess = start.guess(k, run)
     found = solver.first.solve(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
-        guess = start.guess_in(k, run, solver.cut)
-        return guess, solver.second.solve(run, guess)
-    finer = divided(run, guess.leg, found, solver.cut)
-    again = searched_again(run, found, finer, solver.second)
-    return (guess, found) if again is None else (finer.guess, again)
+        cut, own = solver.finer[0]
+        guess = start.guess_in(k, run, cut)
+        return guess, own.solve(run, guess)
+    for cut, own in solver.finer:
+        finer = divided(run, guess.leg, found, cut)
+        again = searched_again(run, found, finer, own)
+        if again is not None:
+            guess, found = finer.guess, again
+    return guess, found
 
 
 def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered, list[int], str]:

@@ -42,7 +42,7 @@ class Search:
     kept      : share of the time that this may leave as it was; where it leaves more it begins on reshaped splines too [-]
     cut       : how finely the first motion is cut into steps
     gap       : complementarity at the end, share of the time [-]
-    finer     : how finely what is found is cut once more, and the gap of the search from there; None for no other search
+    finer     : how finely what is found is cut once more, and the gap of the search from there, one after the other
     again     : begin with a plan where that leaves something
     """
 
@@ -50,11 +50,11 @@ class Search:
     kept: float = 0.05
     cut: Cut = FIRST_CUT
     gap: float = FIRST_GAP
-    finer: tuple[Cut, float] | None = (SECOND_CUT, SECOND_GAP)
+    finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
     again: bool = True
 
 
-THOROUGH = Search(steps_max=float("inf"), kept=-1.0, finer=(BEST_CUT, BEST_GAP))
+THOROUGH = Search(steps_max=float("inf"), kept=-1.0, finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +89,7 @@ EFFORTS = {
         work=25_000,
         rounds=2,
         left=1e-3,
-        search=Search(steps_max=30_000, finer=None, again=False),
+        search=Search(steps_max=30_000, finer=(), again=False),
         sizes=(_LARGE,),
     ),
     NORMAL: Effort(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
+from starts import MACHINE, PROGRAMS, begun
 
 from benchmarks import never_slower, problems, tube_solvers
 from planner.base.threads import use_threads
@@ -13,38 +12,22 @@ from planner.geometry.build import toolpath_from_program
 from planner.methods.optimal import OptimalMethod
 from planner.methods.tube import TubeMethod
 from planner.motion.vertex_times import passing_times
-from planner.nc.reader import parse_program
 from planner.tube import own, rows
 from planner.tube.checks import normal_shares, worst_shares
 from planner.tube.curvature import Barrier
-from planner.tube.guess import Guess, guess_from
+from planner.tube.guess import guess_from
 from planner.tube.motion import integrated
 from planner.tube.nlp import TubeNLP
 from planner.tube.own import TubeOwn
 from planner.tube.problem import window_of
 from planner.tube.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
-from planner.tube.run import TubeRun, tube_runs_of
+from planner.tube.run import tube_runs_of
 from planner.tube.solvers import SOLVERS
 
-MACHINE = problems.machine()
-CORNER = problems.polyline([[0, 0], [4, 0], [4, 4]])
-ARCS = parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n")
+CORNER, ARCS = PROGRAMS["corner"], PROGRAMS["arcs"]
 # Share of the time by which ipopt may end elsewhere, begun where the own solver ended [-]; 1.5e-4 was seen (pentagon).
 SAME = {"corner": 2e-4, "arcs": 2e-4, "pentagon": 2e-4}
 MISSED = own.TRIES[0][1]
-
-
-@cache
-def begun(name: str) -> tuple[TubeRun, Guess]:
-    """A run, and its motion on Bezier corners cut into steps."""
-    program = {"corner": CORNER, "arcs": ARCS, "pentagon": problems.pentagon(side=6.0)}[name]
-    toolpath = toolpath_from_program(program, MACHINE)
-    (run,) = tube_runs_of(toolpath, MACHINE)
-    plan = OptimalMethod(corner="bezier").plan(program, MACHINE)
-    seen = plan.trajectory
-    times = np.maximum.accumulate(passing_times(seen, toolpath))
-    times[-1] = seen.t[-1]
-    return run, guess_from(run, seen, times[run.first])
 
 
 def linear_of(window, x, u):

@@ -1,0 +1,33 @@
+"""Runs from which searches of these tests begin."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from benchmarks import problems
+from planner.geometry.build import toolpath_from_program
+from planner.methods.optimal import OptimalMethod
+from planner.motion.vertex_times import passing_times
+from planner.nc.reader import parse_program
+from planner.tube.guess import DEFAULT_CUT, Cut, Guess, guess_from
+from planner.tube.run import TubeRun, tube_runs_of
+
+MACHINE = problems.machine()
+PROGRAMS = {
+    "corner": problems.polyline([[0, 0], [4, 0], [4, 4]]),
+    "arcs": parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n"),
+    "pentagon": problems.pentagon(side=6.0),
+}
+
+
+@cache
+def begun(name: str, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
+    """A run, and its motion on Bezier corners cut into steps."""
+    toolpath = toolpath_from_program(PROGRAMS[name], MACHINE)
+    (run,) = tube_runs_of(toolpath, MACHINE)
+    seen = OptimalMethod(corner="bezier").plan(PROGRAMS[name], MACHINE).require().trajectory
+    times = np.maximum.accumulate(passing_times(seen, toolpath))
+    times[-1] = seen.t[-1]
+    return run, guess_from(run, seen, times[run.first], cut)

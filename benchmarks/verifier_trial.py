@@ -5,9 +5,10 @@
 Faults: so many mutations (benchmarks/mutations.py) of each of so many plans, of random polylines in three axes on random machines, by
 methods in turn. Each mutation is a fault by a proof of its own. Only the positions are delivered, except where columns are in question.
 
-Correct motions: each plan itself, the plans of `kinematic` and `stop`, and one in closed form: every line from rest to rest in seven
-phases of constant jerk. They are written to files as other programs write them (positions only, in CSV with 6 and 9 digits, as 32-bit
-floats, as 64-bit floats), read from there and judged. None may be refused except for too few digits, which the verdict says.
+Correct motions: each plan itself, the plans of `kinematic` and `stop`, one in closed form (every line from rest to rest in seven phases
+of constant jerk), and those of other programs: ruckig and TOPP-RA (benchmarks/foreign.py). They are written to files as other programs
+write them (positions only, in CSV with 6 and 9 digits, as 32-bit floats, as 64-bit floats), read from there and judged. None may be
+refused except for too few digits, which the verdict says.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.foreign import PROGRAMS, along
 from benchmarks.mutations import KINDS, Case, program_of
 from benchmarks.record import markdown, write_results
 from planner.base.arrays import FloatArray
@@ -38,6 +40,7 @@ from planner.verify import Given, Verdict, verify
 DRAWS = 40  # of a mutation until one is proved to be a fault
 POSITIONS = Given(columns=())
 TOO_FEW_DIGITS = "too few digits"
+CLOSED_FORM = "closed form"
 
 
 def methods() -> tuple[tuple[Method, bool], ...]:
@@ -190,12 +193,14 @@ def correct_of(seed: int) -> list[dict[str, Any]]:
     subject = case(seed)
     rows: list[dict[str, Any]] = []
     program = program_of(subject.points, subject.feed)
-    motions = {"closed form": (*from_rest_to_rest(subject.points, subject.feed, subject.machine), True)}
+    motions = {CLOSED_FORM: (*from_rest_to_rest(subject.points, subject.feed, subject.machine), True)}
     for name, method in (("kinematic", KinematicMethod()), ("stop", StopMethod())):
         made = method.plan(program, subject.machine).require().trajectory
         assert made is not None
         motions[name] = (made.t, made.position, True)
     motions[subject.plan.method] = (subject.trajectory.t, subject.trajectory.position, subject.jerk)
+    for name, (line, jerk) in PROGRAMS.items():
+        motions[name] = (*along(subject.points, subject.feed, subject.machine, line), jerk)
     with tempfile.TemporaryDirectory() as folder:
         for name, (t, x, jerk) in motions.items():
             for written, path in files(Path(folder), t, x).items():
@@ -241,13 +246,16 @@ def main() -> None:
     text += markdown(
         ["fault", "made", "found"], [[kind, str(n), str(found[kind])] for kind, n in made.items()]
     )
-    text += f"\n{len(correct)} correct motions:\n\n"
+    elsewhere = sum(row["motion"] in (*PROGRAMS, CLOSED_FORM) for row in correct)
+    text += f"\n{len(correct)} correct motions, {elsewhere} of them not by this planner:\n\n"
     answers = ("passed", TOO_FEW_DIGITS, "refused")
-    table = []
-    for written in dict.fromkeys(row["written"] for row in correct):
-        count = Counter(row["answer"] for row in correct if row["written"] == written)
-        table.append([written, *(str(count[answer]) for answer in answers)])
-    text += markdown(["written as", *answers], table)
+    for by, heading in (("written", "written as"), ("motion", "made by")):
+        table = []
+        for one in dict.fromkeys(row[by] for row in correct):
+            count = Counter(row["answer"] for row in correct if row[by] == one)
+            table.append([one, *(str(count[answer]) for answer in answers)])
+        text += markdown([heading, *answers], table) + "\n"
+    text = text.rstrip("\n") + "\n"
     write_results("verifier-trial", {"faults": faults, "correct": correct}, text)
 
 

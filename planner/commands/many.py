@@ -25,11 +25,14 @@ from planner.base.files import STDIN
 from planner.base.threads import cores
 from planner.commands.interrupt import INTERRUPTED, interrupts_raise
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import BUG, say, show
+from planner.commands.terminal import BUG, NOT_SOLVED, say, show
 
 # By the exit code of a program's process.
 OUTCOMES = {0: "passed", 1: "failed", 2: "refused", 3: "not solved", INTERRUPTED: "interrupted"}
 CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
+# Signals that no fault of a process raises: of a system whose memory is used up, of a batch system, of `kill`.
+FROM_OUTSIDE = (signal.SIGTERM, 9)  # 9 is SIGKILL, which Windows does not have
+PERHAPS_MEMORY = "perhaps because the memory is used up; plan it alone, or with fewer --threads"
 ENDING = 5.0  # that processes get to remove what they have half written [s]
 
 
@@ -159,7 +162,9 @@ class _Task:
         with suppress(ValueError):
             summary = json.loads(text)
         said = "".join(errors).strip()
-        if code < 0:
+        if -code in FROM_OUTSIDE:
+            said, code = f"its process was ended from outside (signal {-code}), {PERHAPS_MEMORY}", NOT_SOLVED
+        elif code < 0:
             said, code = f"its process was ended by signal {-code}; {said}".rstrip("; "), BUG
         return Done(job=self.job, code=code, summary=summary, said=said)
 

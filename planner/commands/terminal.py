@@ -73,7 +73,12 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(BROKEN_PIPE) from None
         except typer.Exit:
             raise
-        except Exception:
+        except Exception as fault:
+            from planner.commands.memory import is_of_memory
+
+            if is_of_memory(fault):
+                say(f"not solved: {memory_used_up(MemoryError())}", err=True)
+                raise typer.Exit(NOT_SOLVED) from None
             import traceback
 
             say(traceback.format_exc(), err=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
 M_DIGITS = 5  # of an M code: no control has more
 TIMED_BY_NAME = {
@@ -14,9 +15,31 @@ TIMED_BY_NAME = {
     6: "tool_change",
 }  # keys of [times]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+# Smallest and largest magnitude of a number of a machine file, in the unit of its key. No machine has any beyond them, and their
+# products and quotients are numbers: third powers of a magnitude beyond 1e100 are not.
+MAGNITUDE_MIN, MAGNITUDE_MAX = 1e-12, 1e12
+# Of velocities and accelerations, 1e5 times gravity [mm/s, mm/s2]: how closely the verifier looks between samples, and how long it
+# takes, grows with the acceleration.
+AXIS_LIMIT_MAX = 1e9
+
+
+def _up_to(largest: float) -> Callable[[float], float]:
+    """A check that a number is 0 or of a magnitude between `MAGNITUDE_MIN` and `largest`."""
+
+    def checked(value: float) -> float:
+        if value and not MAGNITUDE_MIN <= abs(value) <= largest:
+            raise ValueError(
+                f"must be of a magnitude between {MAGNITUDE_MIN:g} and {largest:g}, found {value:g}"
+            )
+        return value
+
+    return checked
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
+Finite = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
+AxisLimit = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_up_to(AXIS_LIMIT_MAX))]
 
 
 class Record(BaseModel):
@@ -39,8 +62,8 @@ class Axis(Record):
     wrapped : of a rotary axis: programs give its positions within a turn, with the sign of the direction (LinuxCNC's WRAPPED_ROTARY)
     """
 
-    velocity: Positive
-    acceleration: Positive
+    velocity: AxisLimit
+    acceleration: AxisLimit
     jerk: Positive
     wrapped: bool = False
 

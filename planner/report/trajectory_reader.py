@@ -36,6 +36,8 @@ KNOWN = {"t", "s", "feed", "line", "block"} | {
 # Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
 # are noise.
 TIME_STEP_MIN = 1e-9
+# Largest magnitude of a value, whatever its unit: third derivatives of larger positions, squared, are no numbers any more.
+VALUE_MAX = 1e30
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -144,13 +146,14 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
-    file = np.load(path, allow_pickle=False)
-    if not isinstance(file, np.lib.npyio.NpzFile):
-        raise ValueError("a single array (.npy), not a .npz file")
-    with file:
-        return {name: file[name] for name in file.files if name != "metadata"}, (
-            str(file["metadata"]) if "metadata" in file.files else ""
-        )
+    with open(path, "rb") as stream:  # numpy leaves a file open that is damaged
+        file = np.load(stream, allow_pickle=False)
+        if not isinstance(file, np.lib.npyio.NpzFile):
+            raise ValueError("a single array (.npy), not a .npz file")
+        with file:
+            return {name: file[name] for name in file.files if name != "metadata"}, (
+                str(file["metadata"]) if "metadata" in file.files else ""
+            )
 
 
 def _numbers(source: str, name: str, column: Any) -> Array:
@@ -161,10 +164,11 @@ def _numbers(source: str, name: str, column: Any) -> Array:
             f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed",
             source=source,
         )
-    bad = np.flatnonzero(~np.isfinite(column))
+    bad = np.flatnonzero(~(np.abs(column.astype(np.float64)) <= VALUE_MAX))
     if len(bad):
+        needed = "between -1e30 and 1e30" if np.isfinite(column[bad[0]]) else "a finite number"
         raise InputError(
-            f"column '{name}', row {bad[0] + 1}: {column[bad[0]]}; every value must be a finite number",
+            f"column '{name}', row {bad[0] + 1}: {column[bad[0]]}; every value must be {needed}",
             source=source,
         )
     return column

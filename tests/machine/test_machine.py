@@ -143,6 +143,27 @@ def test_linuxcncs_own_configurations_say_the_same(name: str, file: str) -> None
     assert machine.feed_max == pytest.approx(said.feed_max.value)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("dt", 5e-324, "dt: must be of a magnitude between 1e-12 and 1e+12, found 4.94066e-324"),
+        ("tolerance", 1e300, "tolerance: must be of a magnitude between 1e-12 and 1e+12, found 1e+300"),
+        ("velocity", 1e12, "axes.x.velocity: must be of a magnitude between 1e-12 and 1e+09, found 1e+12"),
+        ("jerk", 1e13, "axes.x.jerk: must be of a magnitude between 1e-12 and 1e+12, found 1e+13"),
+        ("length", -1e300, "tools.1.length: must be of a magnitude between 1e-12 and 1e+12, found -1e+300"),
+    ],
+)
+def test_numbers_that_no_machine_has(key: str, value: float, said: str) -> None:
+    """Found by benchmarks/fuzz.py: their powers are no numbers, and ended as a bug."""
+    axis = {"velocity": 1.0, "acceleration": 1.0, "jerk": 1.0}
+    of_x = {name: value if name == key else each for name, each in axis.items()}
+    top = {"dt": 0.001, "tolerance": 0.01} | ({key: value} if key in ("dt", "tolerance") else {})
+    tools = {"1": {"length": value}} if key == "length" else {}
+    with pytest.raises(InputError) as caught:
+        planner.Machine(name="m", axes={"x": of_x, "y": axis}, tools=tools, **top)
+    assert str(caught.value) == said
+
+
 def test_faults_are_told_in_the_words_of_the_file() -> None:
     axis = {"velocity": 1.0, "acceleration": 1.0, "jerk": 1.0}
     bad = {

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +17,11 @@ from planner.machine import machine_from_dict
 from planner.nc.points import are_points
 from planner.nc.reader import load, parse_program
 from planner.nc.reading import Reading
-from planner.report.export import program_file
+from planner.report.export import json_ready, program_file
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
 from planner.verify import verify
+from planner.verify.judge import NOT_LIMITED_NAMES
 
 
 def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
@@ -39,19 +42,19 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
     read = read_trajectory(files[0])
     if read.metadata.get("run_id") != summary.get("run_id"):
         raise InputError("the trajectory and the summary are of two runs; plan again", source=str(directory))
+    about = _About.of(read.metadata, files[0])
     source = program_file(directory, summary["program"])
     text = load(source)
-    machine = machine_from_dict(read.metadata["machine"], source=f"{files[0]} (its own machine)")
+    machine = machine_from_dict(about.machine, source=f"{files[0]} (its own machine)")
     reading = Reading.saved(read.metadata.get("reading"))
     program = parse_program(text, machine, reading, source=source)
-    toolpath = toolpath_from_program(program, machine, read.metadata.get("tolerance_mm"))
+    toolpath = toolpath_from_program(program, machine, about.tolerance)
     if len(program) != summary["blocks"]:
         raise InputError(
             f"the program has {len(program):,} blocks now, and had {summary['blocks']:,} when it was planned; plan again",
             source=source,
         )
-    free = tuple(read.metadata.get("not_limited", ()))
-    verdict = verify(read.trajectory, toolpath, machine, given=read.given, not_limited=free)
+    verdict = verify(read.trajectory, toolpath, machine, given=read.given, not_limited=about.not_limited)
     stop_time = summary.get("stop_time_s")
     plan = Plan(
         method=summary["method"],
@@ -74,18 +77,55 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
     return plan, summary, None if are_points(text) else text
 
 
-_KEYS = (
-    "program",
-    "method",
-    "corner",
-    "solver",
-    "status",
-    "sentence",
-    "blocks",
-    "grid_points",
-    "notes",
-    "timings_s",
-)
+@dataclass(frozen=True)
+class _About:
+    """What the trajectory says about itself: its machine, tolerance [mm] and quantities that its plan did not limit."""
+
+    machine: dict[str, Any]
+    tolerance: float | None
+    not_limited: tuple[str, ...]
+
+    @classmethod
+    def of(cls, metadata: Mapping[str, Any], file: Path) -> _About:
+        """From the metadata of a file. Raises InputError for what a plan does not write."""
+        machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
+        free = metadata.get("not_limited", [])
+        for right, name in (
+            (isinstance(machine, dict), "machine"),
+            (tolerance is None or (_is_number(tolerance) and 0.0 < tolerance < math.inf), "tolerance_mm"),
+            (
+                isinstance(free, list)
+                and all(isinstance(name, str) and name in NOT_LIMITED_NAMES for name in free),
+                "not_limited",
+            ),
+        ):
+            if not right:
+                raise InputError(
+                    f"its metadata are not those of a plan: {name} is {str(metadata.get(name))[:40]}; plan again",
+                    source=str(file),
+                )
+        return cls(machine or {}, tolerance, tuple(free))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+# What the summary of a plan has, and of which kind.
+_KINDS: dict[str, Callable[[Any], bool]] = {
+    "run_id": lambda value: isinstance(value, str),
+    "program": lambda value: isinstance(value, str),
+    "method": lambda value: isinstance(value, str),
+    "corner": lambda value: value is None or isinstance(value, str),
+    "solver": lambda value: isinstance(value, str),
+    "status": lambda value: isinstance(value, str) and value in Status.__members__,
+    "sentence": lambda value: isinstance(value, str),
+    "blocks": lambda value: isinstance(value, int),
+    "grid_points": lambda value: isinstance(value, int),
+    "notes": lambda value: isinstance(value, list) and all(isinstance(note, str) for note in value),
+    "timings_s": lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
+    "stop_time_s": lambda value: value is None or _is_number(value),
+}
 
 
 def _summary(file: Path) -> dict[str, Any]:
@@ -97,7 +137,10 @@ def _summary(file: Path) -> dict[str, Any]:
         ) from fault
     except (OSError, ValueError, RecursionError) as fault:
         raise InputError(f"cannot be read: {fault}", source=str(file)) from fault
-    missing = [key for key in _KEYS if not isinstance(said, dict) or key not in said]
+    missing = [key for key in _KINDS if not isinstance(said, dict) or key not in said]
     if missing:
         raise InputError(f"no summary of a plan: {', '.join(missing)} missing", source=str(file))
-    return dict(said)
+    for key, right in _KINDS.items():
+        if not right(said[key]):
+            raise InputError(f"no summary of a plan: {key} is {str(said[key])[:40]}", source=str(file))
+    return dict(json_ready(said))

@@ -1,0 +1,55 @@
+"""Commands of the planner run inside this process, and what counts as a finding."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from pathlib import Path
+from typing import Protocol
+
+ENDS = (0, 1, 2, 3)  # done, verdict failed, bad input, not solved: the exit codes of a proper end
+SENTENCE_MAX = 2_000_000  # characters of one run's output: more is a flood
+
+
+class Finding(Exception):
+    """An end that is none: a bug, a warning of a library, a traceback, a refusal without a sentence."""
+
+
+class Command(Protocol):
+    """A command line without `planner`; returns its exit code, and raises Finding."""
+
+    def __call__(self, *words: str | Path) -> int:
+        """Run it."""
+        ...
+
+
+def command(*words: str | Path) -> int:
+    """Run a command line of the planner; its exit code. Raises Finding for a bug, a warning, a refusal without a sentence."""
+    from planner.cli import app
+    from planner.commands.usage import UsageError
+
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        warnings.catch_warnings(record=True) as warned,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        warnings.simplefilter("always")
+        try:
+            code = app([str(word) for word in words], prog_name="planner", standalone_mode=False)
+        except UsageError as fault:  # of which typer writes the message, outside standalone mode not
+            code = 2
+            print(fault.format_message(), file=err)
+    code = code if isinstance(code, int) else 0
+    said = err.getvalue()
+    if code not in ENDS or "Traceback" in said or "bug" in said:
+        raise Finding(f"exit code {code}: {said[-3000:]}")
+    if warned:
+        one = warned[0]
+        raise Finding(f"warning: {one.message} at {one.filename}:{one.lineno}")
+    if code in (2, 3) and not (said + out.getvalue()).strip():
+        raise Finding(f"exit code {code} without a sentence")
+    if len(said) + len(out.getvalue()) > SENTENCE_MAX:
+        raise Finding(f"{len(said) + len(out.getvalue()):,} characters of output")
+    return code

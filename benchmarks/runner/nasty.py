@@ -78,7 +78,7 @@ PROGRAMS: dict[str, str] = {
     "a weak axis": _moves([(8.0, 0.0, 1.0), (8.0, 8.0, -1.0), (16.0, 8.0, 0.0)]),
     "a long period": _moves([(1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (3.0, 2.0)]),
 }
-QUICK = ("almost a reversal", "long, short, long", "modes mixed", "arcs against each other")
+QUICK = ("almost a reversal", "long, short, long", "rapids between", "arcs against each other")
 
 
 def _weak() -> Machine:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -159,13 +159,13 @@ def about_line(about: dict[str, Any]) -> str:
     return json.dumps({"about": about})
 
 
-def compact(file: Path) -> None:
-    """Write a file anew with the last row of each pair, and the last environment of each commit before them."""
+def compact(file: Path, jobs: Collection[str]) -> None:
+    """Write a file anew with the last row of each pair of these jobs, and the last environment of each command and commit before
+    them."""
     found = read(file)
+    kept = [row for row in found.rows.values() if row.job in jobs]
     by_commit = {(about.get("commit"), about.get("command")): about for about in found.abouts}
-    lines = [about_line(about) for about in by_commit.values()] + [
-        line_of(row) for row in found.rows.values()
-    ]
+    lines = [*map(about_line, by_commit.values()), *map(line_of, kept)]
     beside = file.with_suffix(".new")
     beside.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
     beside.replace(file)

@@ -1,4 +1,4 @@
-"""A run: suites by ways, a process for each way, rows appended to results/runs/SUITE.jsonl as soon as they are measured."""
+"""A run: suites by ways, a process for each way, rows appended to results/SUITE.jsonl as soon as they are measured."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from benchmarks.runner.ways import MODELS, PEERS, way_of
 from benchmarks.runner.worker import READY
 from planner.base.errors import InputError
 
-FOLDER = RESULTS / "runs"
+FOLDER = RESULTS
 LIMIT = 120.0  # of one call [CPU s]
 # A process is killed where it does not answer: repeats of a call within its limit, on a core that others use too.
 PATIENCE, START = 6.0, 900.0  # times the limit [-]; for warm-up with kernels to compile [s]
@@ -115,7 +115,7 @@ def run(request: Request) -> dict[str, list[Row]]:
             rows.append(file, [line_of(row)])
             made[suite].append(row)
             print(_told(row), flush=True)
-        rows.compact(file)
+        rows.compact(file, {job.name for job in SUITES[suite].jobs()})
     return made
 
 
@@ -146,7 +146,7 @@ class Worker:
     """A process that serves one way (worker.py); it is dead after an answer that it owed."""
 
     def __init__(self, way: str) -> None:
-        self.way = way_of(way)
+        self.way, self._words = way_of(way), ""
         self._errors = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
         self._process = subprocess.Popen(
             [sys.executable, "-m", "benchmarks.runner.worker", way],
@@ -156,7 +156,7 @@ class Worker:
 
     def answer(self, asked: dict[str, object], patience: float) -> Row:
         """The row of a request; a process that dies or does not answer within `patience` [s] is the row's message."""
-        line = None
+        line: str | None = ""
         if self.alive:
             stream = _stream(self._process.stdin)
             with contextlib.suppress(BrokenPipeError):
@@ -165,29 +165,31 @@ class Worker:
                 line = self._line(patience)
         if line:
             return rows.row_of_line(json.loads(line), "worker")
-        late = self._process.poll() is None
         self.close()
         blank = Row(
             suite=str(asked["suite"]), job=str(asked["job"]), way=self.way.name, kind=self.way.kind,
-            status=OVER_LIMIT if late else ERROR, commit=str(asked["commit"]),
+            status=OVER_LIMIT if line is None else ERROR, commit=str(asked["commit"]),
         )  # fmt: skip
-        said = f"no answer within {patience:g} s" if late else f"the process died: {self._last_words()}"
-        return dataclasses.replace(blank, message=said)
+        late, died = f"no answer within {patience:g} s", f"the process died: {self._words}"
+        return dataclasses.replace(blank, message=late if line is None else died)
 
     def close(self) -> None:
         """End the process."""
         self.alive = False
         self._process.kill()
         self._process.communicate()
+        if not self._errors.closed:
+            self._words = self._last_words()
+            self._errors.close()
 
     def _line(self, patience: float) -> str | None:
-        """The next line, or None after `patience` seconds or at the end."""
+        """The next line, "" at the end, or None after `patience` seconds."""
         stream = _stream(self._process.stdout)
         with selectors.DefaultSelector() as waiting:
             waiting.register(stream, selectors.EVENT_READ)
             if not waiting.select(patience):
                 return None
-        return stream.readline().strip() or None
+        return stream.readline().strip()
 
     def _last_words(self) -> str:
         self._errors.seek(0)

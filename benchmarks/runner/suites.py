@@ -83,12 +83,14 @@ class Suite:
     """Jobs, what they say, and the ways that are run unless others are asked for.
 
     absent : why there are no jobs here; None where there are
+    scales : whether its jobs differ in their number of blocks, so that planning time over it says something
     """
 
     says: str
     jobs: Callable[[], list[Job]]
     ways: tuple[str, ...]
     absent: Callable[[], str | None] = lambda: None
+    scales: bool = False
 
 
 MODELS = ("linuxcnc (model)", "grbl (model)", "klipper (model)")
@@ -313,7 +315,9 @@ SUITES: dict[str, Suite] = {
     "corners": Suite(says="single corners of 1 to 179 degrees", jobs=corners, ways=(*USUAL, "tube")),
     "curves": Suite(says="butterfly and trident as chords, three tolerances", jobs=curves, ways=USUAL),
     "dense": Suite(says="chords of 1 um to 0.2 mm, carving and micro blocks", jobs=dense, ways=LARGE),
-    "relief": Suite(says="a relief of 1,000 to 100,000 blocks: how planning grows", jobs=relief, ways=LARGE),
+    "relief": Suite(
+        says="a relief of 1,000 to 100,000 blocks: how planning grows", scales=True, jobs=relief, ways=LARGE
+    ),
     "axes7": Suite(says="random jobs in seven axes", jobs=axes7, ways=QUICK_WAYS),
     "five-axis": Suite(
         says="an S-shaped piece on a tilting rotary table",
@@ -322,5 +326,7 @@ SUITES: dict[str, Suite] = {
     ),
     "nasty": Suite(says="what has broken planners before", jobs=difficult, ways=USUAL),
     "random": Suite(says="random lines and arcs on random machines", jobs=random, ways=USUAL),
-    "programs": Suite(says="real programs of ../shared/nc", jobs=programs, ways=LARGE, absent=_no_programs),
+    "programs": Suite(
+        says="real programs of ../shared/nc", scales=True, jobs=programs, ways=LARGE, absent=_no_programs
+    ),
 }

@@ -11,7 +11,8 @@ Clarabel's tolerances let its times be off by 1 to 4 % on the curves here, and i
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from types import ModuleType
 
 import numpy as np
@@ -19,6 +20,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
+from planner.feedrate.reference.exact_motion import slowed_to_limits, with_exact_kinematics
 from planner.feedrate.solution import FeedrateSolution, Status
 
 INSTALL = "copp-py is not installed (pip install '.[bench]'): its columns are left out"
@@ -93,6 +95,41 @@ class CoppSocp:
             iterations=iterations,
             jerk_limited=True,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoppMotion:
+    """Copp for whole plans: every piece by `CoppSocp`, then brought onto constant jerks within all limits (exact_motion.py).
+
+    solver : for one piece
+    """
+
+    solver: CoppSocp = field(default_factory=CoppSocp)
+
+    def solve(
+        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
+    ) -> FeedrateSolution:
+        """Jerk-limited profile of all pieces; a failure of any piece is the status of the whole."""
+        found = []
+        for g in range(len(problem.piece) - 1):
+            found.append(self.solver.solve(problem.part(np.array([g]))))
+            if not found[-1].solved:
+                return FeedrateSolution.failed(
+                    problem, found[-1].status, found[-1].sentence, repr(self), found[-1].solve_time
+                )
+            if progress is not None:
+                progress((g + 1) / (len(problem.piece) - 1))
+        columns = {
+            name: np.concatenate([getattr(one, name) for one in found])
+            for name in ("feed_sq", "acc_s", "jerk_s", "duration")
+        }
+        took = sum(one.solve_time for one in found)
+        whole = replace(found[0], **columns, solve_time=took, iterations=max(one.iterations for one in found))
+        exact = with_exact_kinematics(problem, whole)
+        if exact is None:
+            reason = "no motion with constant jerk on every interval is near the profile that copp found"
+            return FeedrateSolution.failed(problem, Status.NUMERICAL_ERROR, reason, repr(self), took)
+        return slowed_to_limits(problem, exact)
 
 
 def _constraints(package: ModuleType, problem: FeedrateProblem, length: float, second: float) -> object:

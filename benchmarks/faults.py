@@ -22,7 +22,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.faults_kinds import KINDS, Bench
+from benchmarks.faults_bench import Bench
+from benchmarks.faults_kinds import KINDS
 from benchmarks.record import RESULTS, markdown, provenance, write_results
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 RESULTS = Path(__file__).parent / "results"
-PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig")
+PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "copp-py")
 
 
 def provenance() -> dict[str, Any]:
@@ -54,7 +54,7 @@ def markdown(columns: list[str], rows: list[list[str]]) -> str:
 
 def _module() -> str:
     spec = getattr(sys.modules["__main__"], "__spec__", None)
-    return spec.name if spec is not None else Path(sys.argv[0]).stem
+    return spec.name.removesuffix(".__main__") if spec is not None else Path(sys.argv[0]).stem
 
 
 def _version(name: str) -> str | None:

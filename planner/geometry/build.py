@@ -52,8 +52,8 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     """
     if isinstance(tolerance, str):
         raise InputError(f"tolerance '{tolerance}'; give a number, in mm")
-    if tolerance is not None and not (0 < tolerance < np.inf):
-        raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
+    if tolerance is not None and not (0 < tolerance <= COORDINATE_MAX):
+        raise InputError(f"tolerance {tolerance} mm; it must be above 0 and at most {COORDINATE_MAX:g}")
     program = _measured(program, machine.radius)
     axis = _axes_in_use(program, machine)
     axes = tuple(program.axes[k] for k in axis)

@@ -1,0 +1,1 @@
+"""One runner for benchmarks: suites of jobs, ways to plan them, measured by one protocol, kept as rows (docs/benchmarks.md)."""

@@ -1,0 +1,155 @@
+"""The runner: pairs are measured in processes of their own, kept at once, resumed, and failures are rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import problems
+from benchmarks.__main__ import main
+from benchmarks.runner import peers
+from benchmarks.runner.measure import Calibration, Protocol, measured, outcome
+from benchmarks.runner.rows import ERROR, NOT_APPLICABLE, OVER_LIMIT, SKIPPED, SOLVED, Row, read
+from benchmarks.runner.run import Request, Worker
+from benchmarks.runner.suites import SUITES, Job
+from benchmarks.runner.ways import MODELS, PEERS, Way, way_of
+from planner.base.errors import InputError
+from planner.machine import Machine
+from planner.nc.program import Program
+
+PENTAGON = Job(name="pentagon", program=lambda machine: problems.pentagon())
+BLANK = Row(suite="quick", job="pentagon", way="way", kind="method", status=ERROR)
+
+
+@pytest.mark.slow
+def test_a_run_appends_rows_and_resumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = [
+        "run",
+        "quick",
+        "--only",
+        "pentagon",
+        "circle",
+        "--methods",
+        "stop",
+        "--peers",
+        "none",
+        "--repeats",
+        "1",
+    ]
+    assert main([*command, "--count", "1", "--folder", str(tmp_path)]) == 0
+    (row,) = read(tmp_path / "quick.jsonl").rows.values()
+    assert (row.job, row.way, row.status, row.verdict) == ("pentagon", "stop", SOLVED, "passed")
+    assert row.cpu_s is not None
+    assert row.cpu_s > 0.0
+    assert row.quiet is not None
+    assert row.quiet >= 1.0
+    (about,) = read(tmp_path / "quick.jsonl").abouts
+    assert about["planner"] == row.commit
+    capsys.readouterr()
+    if "+" in row.commit or not row.commit:
+        pytest.skip("the planner has changes that no commit has: nothing is resumed")
+    assert main([*command, "--resume", "--folder", str(tmp_path)]) == 0
+    assert "circle / stop" in (said := capsys.readouterr().out)
+    assert "pentagon" not in said
+    assert len(read(tmp_path / "quick.jsonl").rows) == 2
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_is_a_row_and_says_why() -> None:
+    worker = Worker("stop")
+    row = worker.answer(
+        {"suite": "quick", "job": "none of that name", "repeats": 1, "limit": 1.0, "commit": ""}, 60.0
+    )
+    assert (row.status, row.message) == (ERROR, "the process died: KeyError: 'none of that name'")
+    assert not worker.alive
+
+
+def failing(fault: BaseException) -> Way:
+    def planned(program: Program, machine: Machine, tolerance: float | None) -> float:
+        raise fault
+
+    return Way(name="way", kind="peer", plan=planned)
+
+
+@pytest.mark.parametrize(
+    ("fault", "status", "message"),
+    [
+        (InputError("line 3: no such word"), NOT_APPLICABLE, "line 3: no such word"),
+        (peers.NotApplicable("lines only"), NOT_APPLICABLE, "lines only"),
+        (peers.NotHere("no package"), SKIPPED, "no package"),
+        (ZeroDivisionError("by\nzero"), ERROR, "ZeroDivisionError: by zero"),
+    ],
+)
+def test_failures_are_rows(fault: Exception, status: str, message: str) -> None:
+    row = outcome(failing(fault), PENTAGON, BLANK)
+    assert (row.status, row.message, row.verdict, row.blocks) == (status, message, "", 5)
+
+
+def test_a_call_over_its_limit_is_ended() -> None:
+    def endless(program: Program, machine: Machine, tolerance: float | None) -> float:
+        while True:
+            pass
+
+    way = Way(name="way", kind="peer", plan=endless)
+    row = measured(way, PENTAGON, BLANK, Protocol(repeats=3, limit=0.05), Calibration())
+    assert (row.status, row.message) == (OVER_LIMIT, "more than 0.05 CPU s")
+    assert len(row.cpu_all) == 1
+    assert 0.05 <= row.cpu_all[0] < 1.0
+
+
+def test_the_least_of_the_repeats_counts() -> None:
+    row = measured(way_of("stop"), PENTAGON, BLANK, Protocol(repeats=3), Calibration())
+    assert row.status == SOLVED
+    assert row.cpu_s == min(row.cpu_all)
+    assert len(row.cpu_all) == 3
+
+
+def test_peers_and_models_judge_and_predict_the_same_job() -> None:
+    stops = outcome(way_of("stop"), PENTAGON, BLANK)
+    assert stops.cycle_s is not None
+    resting = outcome(way_of("ruckig"), PENTAGON, BLANK)
+    if resting.status == SKIPPED:
+        pytest.skip(resting.message)
+    assert resting.verdict == "passed"
+    assert resting.cycle_s is not None
+    # both move from rest to rest in the shortest time; ruckig's lines are whole periods long
+    assert 0.0 <= resting.cycle_s - stops.cycle_s <= 5 * problems.machine().dt
+    for name in MODELS:
+        row = outcome(way_of(name), PENTAGON, BLANK)
+        assert (row.status, row.verdict) == (SOLVED, "")
+        assert row.cycle_s is not None
+        assert 0.5 * stops.cycle_s < row.cycle_s < stops.cycle_s
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"suites": ("fast",)}, "no suite 'fast'; there are quick"),
+        ({"suites": ("quick",), "methods": ("optimum",)}, "did you mean 'optimal'"),
+        ({"suites": ("quick",), "methods": ("stop:quick",)}, "method stop has no corner and no effort"),
+        ({"suites": ("quick",), "methods": ("optimal/round",)}, "no corner 'round'"),
+        ({"suites": ("quick",), "limit": 0.0}, "limit 0"),
+    ],
+)
+def test_wrong_requests_are_refused(given: dict, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Request(**given)
+
+
+def test_ways_are_the_suites_or_those_asked_for() -> None:
+    request = Request(suites=("papers",), methods=("stop",), peers=("none",))
+    assert request.ways("papers") == ["stop"]
+    assert set(Request(suites=("papers",)).ways("papers")) == set(SUITES["papers"].ways)
+    assert Request(suites=("quick",), peers=("all",)).ways("quick")[-len(PEERS) - len(MODELS) :] == [
+        *PEERS,
+        *MODELS,
+    ]
+
+
+def test_job_names_are_unique_and_ways_known() -> None:
+    for suite in SUITES.values():
+        for way in suite.ways:
+            way_of(way)
+        names = [job.name for job in suite.jobs()] if suite.absent() is None else []
+        assert len(names) == len(set(names))

@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("-m", "--machine", required=True)
     parser.add_argument("--method", default="optimal")
     parser.add_argument("--corner", nargs="+", default=["auto", "bezier"])
-    parser.add_argument("--name", default="jerk-nc-programs")
+    parser.add_argument("--name", default="nc-programs")
     parser.add_argument("--only", nargs="*", default=[], help="parts of file names")
     parser.add_argument("--processes", type=int, default=1, help="programs planned at the same time")
     parser.add_argument("--quick-above", type=int, default=0, help="blocks; 0: never")

@@ -6,6 +6,10 @@ that keeps its programmed feed keeps the source's word, or gets the programmed f
 under G93 and G95, and threads, have no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a
 line, beside G0) stay, they are what the source says.
 
+Controls differ in what a feed per minute is where rotary axes move. Such a block can be given under G93 instead, by how often it could
+be run in a minute, in every block anew; the first other one after it has G94 and its feed. A line with a word of its own for the feed
+mode keeps it.
+
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
 up to 0.1 % longer than asked.
 """
@@ -15,6 +19,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,18 +35,20 @@ FEED_MIN = 0.01
 # A feed within this share of the programmed one is the programmed one [-]: the rounding of lengths and times.
 SAME_FEED = 1e-6
 
+G93, G94, G95 = 93, 94, 95
 _F, _G = ord("F"), ord("G")
 _NUMBER = re.compile(NUMBER)
 
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
 
-def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
+def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatArray | None = None) -> bytes:
     """The program `source` with new feeds.
 
     program : what the reader made of `source`, with the settings that it was read with
     feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
               never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
+    inverse : (B,) how often a block could be run in a minute, to be written under G93; NaN for blocks with a feed
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
@@ -60,8 +67,12 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
     unit = _unit_before(words)
     f_word = _f_words(words)
     programmed = _f_in_force(words, f_word, unit)[row]
-    own = _has_feed_of_f(program.feed[moving], programmed * unit[row], _per_minute(words)[row])
-    moving, row, programmed = moving[own], row[own], programmed[own]
+    mode = _feed_mode(words)
+    per_minute = mode.in_force[row] == G94
+    often = np.full(len(moving), np.nan) if inverse is None else np.asarray(inverse, dtype=np.float64)[moving]
+    often[~per_minute | (mode.word[row] >= 0)] = np.nan
+    own = _has_feed_of_f(program.feed[moving], programmed * unit[row], per_minute) | ~np.isnan(often)
+    moving, row, programmed, often = moving[own], row[own], programmed[own], often[own]
     wanted = np.maximum(asked[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
@@ -70,7 +81,8 @@ def retimed(source: bytes, program: Program, feeds: FloatArray) -> bytes:
     fastest = np.zeros(len(rows))
     np.maximum.at(fastest, place, np.where(slower, wanted, np.inf))
     fastest[np.isinf(fastest)] = np.nan
-    return _spliced(source, _edits(words, f_word, unit, rows, fastest, programmed[first]))
+    new = _New(rows, fastest, programmed[first], often[first])
+    return _spliced(source, _edits(words, f_word, unit, mode, new))
 
 
 def _has_feed_of_f(feed: FloatArray, f_word: FloatArray, per_minute: Array) -> Array:
@@ -78,40 +90,69 @@ def _has_feed_of_f(feed: FloatArray, f_word: FloatArray, per_minute: Array) -> A
     return per_minute & (np.abs(feed * SECONDS_PER_MINUTE - f_word) <= SAME_FEED * f_word)
 
 
-def _per_minute(words: Words) -> Array:
-    """(R,) whether F is a length per minute (G94) on each row."""
-    code = np.rint(words.value * 10.0)
-    switch = np.flatnonzero((words.letter == _G) & np.isin(code, (930.0, 940.0, 950.0)))
-    mode = np.append(True, code[switch] == 940.0)
-    return mode[np.searchsorted(_row_of_word(words)[switch], np.arange(len(words.line)), side="right")]
+class _FeedModes(NamedTuple):
+    """(R,) the feed mode in force on each row, G93, G94 or G95; and the index of a row's own word for it, or -1."""
+
+    in_force: Array
+    word: Array
 
 
-def _edits(
-    words: Words, f_word: Array, unit: FloatArray, row: Array, wanted: FloatArray, programmed: FloatArray
-) -> list[Edit]:
-    """The F words to write on the rows (n,) of the feed moves, in the order of the source.
+class _New(NamedTuple):
+    """What is to be written on the rows (n,) of feed moves.
 
-    wanted, programmed : (n,) numbers in each row's units; wanted is NaN where the programmed one holds
+    wanted, programmed : (n,) feeds in each row's units; wanted is NaN where the programmed one holds
+    often              : (n,) runs per minute, under G93; NaN for a feed
     """
+
+    row: Array
+    wanted: FloatArray
+    programmed: FloatArray
+    often: FloatArray
+
+
+def _feed_mode(words: Words) -> _FeedModes:
+    code = np.rint(words.value * 10.0)
+    switch = np.flatnonzero((words.letter == _G) & np.isin(code, (10.0 * G93, 10.0 * G94, 10.0 * G95)))
+    of_row = _row_of_word(words)[switch]
+    mode = np.append(G94, np.rint(code[switch] / 10.0)).astype(np.int64)
+    word = np.full(len(words.line), -1, dtype=np.int64)
+    word[of_row] = switch
+    return _FeedModes(mode[np.searchsorted(of_row, np.arange(len(words.line)), side="right")], word)
+
+
+def _edits(words: Words, f_word: Array, unit: FloatArray, mode: _FeedModes, new: _New) -> list[Edit]:
+    """The F words, and those of the feed mode, to write on rows of feed moves, in the order of the source."""
     edits: list[Edit] = []
     texts: dict[float, str] = {}
     as_given: dict[float, str] = {}
     move = np.full(len(f_word), -1)
-    move[row] = np.arange(len(row))
-    in_force = 0.0  # [mm per minute]
-    for r in np.flatnonzero((f_word >= 0) | (move >= 0)).tolist():
+    move[new.row] = np.arange(len(new.row))
+    in_force, ours = 0.0, False  # [mm per minute]; under a G93 that was written here
+    for r in np.flatnonzero((f_word >= 0) | (move >= 0) | (mode.word >= 0)).tolist():
         k, word, number = int(move[r]), int(f_word[r]), ""
-        if k >= 0 and not math.isnan(wanted[k]):
-            value = float(wanted[k])
+        if mode.word[r] >= 0:
+            ours = False
+            in_force = 0.0 if k >= 0 else in_force  # said anew
+        if k >= 0 and not math.isnan(new.often[k]):
+            edits += _edited(words, r, word, round_down(float(new.often[k])), "" if ours else "G93")
+            in_force, ours = 0.0, True
+            continue
+        if k < 0 and word < 0:
+            continue
+        if k >= 0 and not math.isnan(new.wanted[k]):
+            value = float(new.wanted[k])
             number = texts.get(value) or texts.setdefault(value, round_down(value))
-        elif k >= 0 and word < 0:
-            value = float(programmed[k])
+        elif k >= 0 and (word < 0 or ours):
+            value = float(new.programmed[k])
             number = as_given.get(value) or as_given.setdefault(
                 value, np.format_float_positional(value, trim="-")
             )
         given = float(number or words.value[word]) * unit[r]
-        if number and (word >= 0 or abs(given - in_force) > SAME_FEED * in_force):
-            edits.append(_edit(words, r, word, number))
+        if k >= 0 and ours:
+            edits += _edited(words, r, word, number, "G94")
+            ours = False
+        elif number and (word >= 0 or abs(given - in_force) > SAME_FEED * in_force):
+            edits += _edited(words, r, word, number, "")
         in_force = given
     return edits
 
@@ -160,16 +201,22 @@ def _f_in_force(words: Words, f_word: Array, unit: FloatArray) -> FloatArray:
     return np.where(last >= 0, given, np.nan)
 
 
-def _edit(words: Words, row: int, f_word: int, number: str) -> Edit:
-    """Replace the number of the row's F word, or append an F word to the row's words."""
-    if f_word >= 0:
-        at = int(words.at[f_word])
-        return at + 1, _end(words, f_word), number.encode()
+def _edited(words: Words, row: int, f_word: int, number: str, mode: str) -> list[Edit]:
+    """Replace the number of the row's F word, or append an F word to the row's words, and behind them the word of a feed mode."""
     last = int(words.first[row + 1]) - 1
     at, end = int(words.at[last]), _end(words, last)
     tight = words.data[at - 1 : at].isalnum() or words.data[at - 1 : at] == b"."  # written X1Y2
-    letter = b"f" if words.data[at : at + 1].islower() else b"F"
-    return end, end, (b"" if tight else b" ") + letter + number.encode()
+    added = [mode] if mode else []
+    edits = []
+    if f_word >= 0:
+        edits.append((int(words.at[f_word]) + 1, _end(words, f_word), number.encode()))
+    else:
+        added.append(f"F{number}")
+    if added:
+        text = "".join(("" if tight else " ") + word for word in added)
+        lower = words.data[at : at + 1].islower()
+        edits.append((end, end, (text.lower() if lower else text).encode()))
+    return edits
 
 
 def _end(words: Words, word: int) -> int:

@@ -14,9 +14,10 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.geometry.build import path_per_length
 from planner.geometry.toolpath import Toolpath
-from planner.machine import LINEAR_AXES
+from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.nc.dialects import is_plotter_file
 from planner.nc.points import are_points
 from planner.nc.program import Program
@@ -24,7 +25,7 @@ from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
 from planner.nc.text import program_text
 from planner.nc.writer import retimed
-from planner.report.block_feeds import PlannedBlocks, feeds_of, planned_blocks
+from planner.report.block_feeds import ABOVE, PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -65,15 +66,33 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     if is_plotter_file(data, plan.program.source):
         text = _written_anew(plan, feeds)
     elif plan.program.expansion is not None:
-        text = _expanded(data, plan, feeds)
+        text = _expanded(data, plan, feeds, _per_minute(plan, planned))
     else:
-        text = retimed(data, plan.program, feeds)
+        text = retimed(data, plan.program, feeds, _per_minute(plan, planned))
         if not _reads_as(text, plan, feeds=False):
             raise LeftOut(f"{source} with F words does not read back as the same motion")
     notes = _notes(plan, planned, text)
     if plan.program.expansion is not None:
         notes.insert(0, "planned.ngc is the expanded program: parameters, loops and calls are written out")
     return text, notes
+
+
+def _per_minute(plan: Plan, planned: PlannedBlocks) -> FloatArray | None:
+    """(B,) how often a block on which rotary axes move could be run in a minute at its highest planned feed, NaN for the others; None
+    without rotary axes."""
+    toolpath = plan.toolpath
+    rotary = [axis in ROTARY_AXES for axis in toolpath.axes]
+    if not any(rotary):
+        return None
+    turns = ((toolpath.end - toolpath.start)[:, rotary] != 0.0).any(axis=1) & ~toolpath.rapid
+    block = toolpath.block[turns]
+    length, highest = np.zeros(len(plan.program)), np.zeros(len(plan.program))
+    np.add.at(length, block, toolpath.length[turns])
+    feed = np.minimum(planned.highest[turns] * (1.0 + ABOVE), toolpath.feed[turns])
+    np.maximum.at(highest, block, feed)
+    often = np.full(len(plan.program), np.nan)
+    often[block] = highest[block] / length[block] * SECONDS_PER_MINUTE
+    return often
 
 
 def _as_programmed(feeds: FloatArray, toolpath: Toolpath) -> FloatArray:
@@ -124,7 +143,7 @@ def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
     return text
 
 
-def _expanded(data: bytes, plan: Plan, feeds: FloatArray) -> bytes:
+def _expanded(data: bytes, plan: Plan, feeds: FloatArray, often: FloatArray | None) -> bytes:
     """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does not."""
     from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
 
@@ -132,7 +151,7 @@ def _expanded(data: bytes, plan: Plan, feeds: FloatArray) -> bytes:
     found = flat_program(data, plan.machine, plan.program.reading, source=source)
     assert found is not None
     flat = found[0].encode()
-    text = retimed(flat, _read_back(flat, plan, "expanded"), feeds)
+    text = retimed(flat, _read_back(flat, plan, "expanded"), feeds, often)
     _read_back(text, plan, "expanded and with F words")
     return text
 

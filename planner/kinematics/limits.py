@@ -51,7 +51,7 @@ def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: floa
         raise InputError(f"wide = {wide:g}; it must be 1 or more")
     for letter in found.axes:
         machine.limits("velocity", (letter,))
-    radius = getattr(machine, "radius", 1.0)
+    radius = machine.radius
     linear = [machine.axes[letter] for letter in LINEAR]
     free = Axis(
         velocity=wide * max(axis.velocity for axis in linear),

@@ -15,9 +15,7 @@ def joint_setpoints(motion: Trajectory, kinematics: Kinematics) -> Trajectory:
     """The motion with the joints in place of the tip: positions, velocities, accelerations and jerks; times, path length and feed stay
     those of the tip."""
     columns = np.stack([motion.position, motion.velocity, motion.acceleration, motion.jerk])
-    position, velocity, acceleration, jerk = joints_along(
-        kinematics, motion.axes, columns, getattr(motion, "radius", 1.0)
-    )
+    position, velocity, acceleration, jerk = joints_along(kinematics, motion.axes, columns, motion.radius)
     return dataclasses.replace(
         motion, position=position, velocity=velocity, acceleration=acceleration, jerk=jerk
     )

@@ -43,7 +43,7 @@ def tip_path(
         raise InputError(f"tips: shape {at.shape}; (n, 3) finite numbers with n > 1 are needed")
     if (directions is None) == (angles is None):
         raise InputError("give either directions of the tool or angles")
-    radius = getattr(machine, "radius", 1.0)
+    radius = machine.radius
     budget = machine.tolerance if tolerance is None else tolerance
     turns = (
         rotary_along(chain, np.asarray(directions, dtype=np.float64), budget / radius)

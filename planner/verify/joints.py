@@ -79,7 +79,7 @@ def verify_joints(
     given = Given() if given is None else given
 
     def tips(position: FloatArray) -> FloatArray:
-        radius = getattr(setpoints, "radius", 1.0)
+        radius = setpoints.radius
         turns = np.array([letter in ROTARY_AXES for letter in setpoints.axes])
         angles = np.where(turns, position / radius, position)
         found = position.copy()

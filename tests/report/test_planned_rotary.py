@@ -49,7 +49,7 @@ def test_blocks_that_turn_are_under_g93_and_the_others_under_g94():
     assert "G9" not in lines[4]
     assert lines[5].startswith("X25 G94 F")
     assert "f" in lines[6] or "F" not in lines[6]
-    assert lines[8:] == SOURCE.decode().splitlines()[8:9] + [lines[9], "M2"]
+    assert lines[8:] == ["G0 X0 Y0", lines[9], "M2"]
     assert lines[9].startswith("G1 X5 G94 F")
 
 

@@ -61,7 +61,9 @@ def test_a_block_takes_at_its_word_what_its_highest_planned_feed_takes():
     turning = ~before.rapid & ((before.end - before.start)[:, 3:] != 0.0).any(axis=1)
     assert turning.sum() == 4
     expected = np.minimum(blocks.highest * 1.001, before.feed)
-    np.testing.assert_allclose(again.feed[turning], expected[turning], rtol=1.1e-3)  # four digits, rounded down
+    np.testing.assert_allclose(
+        again.feed[turning], expected[turning], rtol=1.1e-3
+    )  # four digits, rounded down
     assert (again.feed[turning] <= expected[turning] * (1.0 + 1e-9)).all()
 
 
@@ -71,7 +73,9 @@ def test_planned_again_it_takes_the_planned_time_and_written_again_it_stays():
     assert again.verdict.passed
     assert again.cycle_time == pytest.approx(plan.cycle_time, rel=2e-3)
     program = parse_program(text, MACHINE)
-    often = np.where([*b"\0\1\1\1\0\0\1\0\0"], 3.0, np.nan)  # of the blocks that turn, which are under G93 by now
+    often = np.where(
+        [*b"\0\1\1\1\0\0\1\0\0"], 3.0, np.nan
+    )  # of the blocks that turn, which are under G93 by now
     assert retimed(text, program, np.full(len(program), np.nan), often) == text
 
 

@@ -163,7 +163,7 @@ def test_shares_are_those_of_a_fine_sampling():
 @pytest.mark.parametrize("name", ["corner", "arcs", "pentagon"])
 def test_ipopt_finds_nothing_more_where_it_ends(name):
     run, guess = begun(name)
-    mine = tube_solvers.PRECISE.solve(run, guess)
+    mine = tube_solvers.Precise().solve(run, guess)
     ended = tube_solvers.again(run, guess, mine)
     other = TubeNLP().solve_from(run, ended, ended)
     assert mine.steps is not None

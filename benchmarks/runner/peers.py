@@ -23,6 +23,7 @@ import numpy as np
 
 import planner
 from planner.base.arrays import FloatArray
+from planner.base.errors import NotSolvedError
 from planner.control_files import models
 from planner.control_files.chords import Polyline, programmed_polyline
 from planner.control_files.for_linuxcnc import standing
@@ -114,9 +115,12 @@ def _from_rest_to_rest(
             continue
         given = _line(package, at, at + move, limits, feed * np.abs(move) / length)
         path = package.Trajectory(len(at))
-        result = package.Ruckig(len(at), machine.dt).calculate(given, path)
+        try:
+            result = package.Ruckig(len(at), machine.dt).calculate(given, path)
+        except package.RuckigError as fault:
+            raise NotSolvedError(str(fault).partition(" input:")[0].replace("\n", " ")) from fault
         if result not in (package.Result.Working, package.Result.Finished):
-            raise NotApplicable(f"ruckig ended with {result}")
+            raise NotSolvedError(f"ruckig ended with {result}")
         count = round(path.duration / machine.dt)
         positions.append(np.array([path.at_time(k * machine.dt)[0] for k in range(1, count + 1)]))
         at = at + move

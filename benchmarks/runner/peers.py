@@ -14,7 +14,6 @@ tolerance.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ import numpy as np
 
 import planner
 from planner.base.arrays import FloatArray
+from planner.base.errors import NotSolvedError
 from planner.control_files import models
 from planner.control_files.chords import Polyline, programmed_polyline
 from planner.control_files.for_linuxcnc import standing
@@ -115,9 +115,12 @@ def _from_rest_to_rest(
             continue
         given = _line(package, at, at + move, limits, feed * np.abs(move) / length)
         path = package.Trajectory(len(at))
-        result = package.Ruckig(len(at), machine.dt).calculate(given, path)
+        try:
+            result = package.Ruckig(len(at), machine.dt).calculate(given, path)
+        except package.RuckigError as fault:
+            raise NotSolvedError(str(fault).partition(" input:")[0].replace("\n", " ")) from fault
         if result not in (package.Result.Working, package.Result.Finished):
-            raise NotApplicable(f"ruckig ended with {result}")
+            raise NotSolvedError(f"ruckig ended with {result}")
         count = round(path.duration / machine.dt)
         positions.append(np.array([path.at_time(k * machine.dt)[0] for k in range(1, count + 1)]))
         at = at + move
@@ -163,22 +166,10 @@ def _law(stops: Plan, line: Polyline, control: str) -> float:
 
 
 def _linuxcnc(stops: Plan, line: Polyline, tolerance: float) -> float:
-    """The model of LinuxCNC, from each stop to the next one: it has no stop inside a chain of arcs."""
     feed = np.where(line.rapid, np.inf, line.feed)
     moves = np.linalg.norm(np.diff(line.points, axis=0), axis=1) > 0.0
     at = np.append(0, np.flatnonzero(moves) + 1)  # a point that moves on, after those that stand in its place
-    stands = np.flatnonzero(np.add.reduceat(standing(stops, line), at)[1:-1]) + 1
-    ends = [0, *stands, len(at) - 1]
-    total = 0.0
-    for first, last in itertools.pairwise(ends):
-        own = at[first : last + 1]
-        inner = np.zeros(len(own), bool)
-        total += linuxcnc_time(
-            line.points[own],
-            feed[own[1:] - 1],
-            inner,
-            stops.machine,
-            stops.toolpath.axes,
-            tolerance - line.miss,
-        )
-    return total
+    stands = np.logical_or.reduceat(standing(stops, line), at)
+    return linuxcnc_time(
+        line.points[at], feed[moves], stands, stops.machine, stops.toolpath.axes, tolerance - line.miss
+    )

@@ -23,6 +23,8 @@ Held against LinuxCNC's own planner on five programs, and on their planned paths
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -81,13 +83,23 @@ def linuxcnc_time(
     axes      : letters of the A axes; velocities, accelerations and the period are the machine's
     tolerance : P [mm]
     """
+    ends = [0, *(np.flatnonzero(stop[1:-1]) + 1), len(points) - 1]
+    return sum(
+        _moving_time(points[first : last + 1], feed[first:last], machine, axes, tolerance)
+        for first, last in pairwise(ends)
+    )
+
+
+def _moving_time(
+    points: FloatArray, feed: FloatArray, machine: Machine, axes: tuple[str, ...], tolerance: float
+) -> float:
+    """`linuxcnc_time` between two stops: nothing is blended with what comes after a stop."""
     step = np.diff(points, axis=0)
     length = np.linalg.norm(step, axis=1)
     way = step / length[:, None]
     velocity, acceleration = (machine.limits(name, axes) for name in ("velocity", "acceleration"))
     top = np.minimum(np.minimum(feed, along(way, velocity)), length / machine.dt)
     cut, arc, speed, left = _corners(way, length, top, acceleration, tolerance, machine.dt)
-    speed = np.where(stop[1:-1] > 0, 0.0, speed)
     rest = np.maximum(length - np.append(0.0, cut) - np.append(cut, 0.0), 0.0)
     straight = along(way, acceleration)
     kinks = arc == 0

@@ -49,6 +49,18 @@ def test_a_straight_move_ends_with_half_of_the_acceleration() -> None:
     assert time_of(before) == pytest.approx(80 / 100 + 100 / (2 * 0.9 * 2000) + 100 / (2 * 0.9 * a), rel=1e-9)
 
 
+@pytest.mark.parametrize("turn", [0.0, 3.0, 90.0, 180.0])
+def test_a_stop_parts_the_program_in_two(turn: float) -> None:
+    """A dwell at a corner: no arc leads through it, and each half takes what it takes alone."""
+    angle = np.deg2rad(turn)
+    points = np.array([[0.0, 0, 0], [40, 0, 0], [40 + 30 * np.cos(angle), 30 * np.sin(angle), 0]])
+    found = linuxcnc_time(
+        points, np.full(2, 50.0), np.array([False, True, False]), MACHINE, ("x", "y", "z"), 0.05
+    )
+    assert found == pytest.approx(time_of(points[:2], feed=50.0) + time_of(points[1:], feed=50.0), rel=1e-12)
+    assert found > time_of(points, feed=50.0)
+
+
 def test_a_corner_is_passed_at_the_speed_of_its_arc() -> None:
     """Right angle: R = P s / (1 - s), v^2 = N a R; the way is shorter by 2 d - pi R / 2."""
     points = np.array([[0.0, 0, 0], [40, 0, 0], [40, 40, 0]])

@@ -149,6 +149,10 @@ def info_table(info: ProgramInfo) -> Group:
         table.add_row("other words", _counts(info.events))
     if info.expansion is not None:
         table.add_row("expanded", _expanded(info.expansion))
+    if (point := info.tool_point) is not None:
+        table.add_row(
+            "tool centre point", f"on by {point.word}, line {point.line}; a tool of {point.length:g} mm"
+        )
     notes = [Text(f"note: {note}") for note in info.notes]
     if not info.unsupported:
         return _titled(title, table, *notes, Text("every construct is supported", style="green"))

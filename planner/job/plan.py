@@ -27,6 +27,8 @@ class Plan(Shown):
     toolpath            : the exact programmed path with its tolerances
     status, sentence    : how the solution ended
     trajectory, verdict : the motion at the interpolation period and the verifier's verdict on it; None unless solved
+    joints              : of a program with the tool centre point on: the same motion as setpoints of the joints; `trajectory` is that
+                          of the tip
     rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
@@ -50,6 +52,7 @@ class Plan(Shown):
     grid: GridHistory | None
     stop_time: float
     grid_points: int
+    joints: Trajectory | None = None
     prices: PriceList | None = None
     notes: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
@@ -67,6 +70,11 @@ class Plan(Shown):
         if self.trajectory is None:
             raise NotSolvedError(self.sentence)
         return self.trajectory.cycle_time
+
+    @property
+    def setpoints(self) -> Trajectory | None:
+        """What the axes get: the joints' motion where the tool centre point is on, else the trajectory."""
+        return self.trajectory if self.joints is None else self.joints
 
     @property
     def geometry(self) -> str | None:

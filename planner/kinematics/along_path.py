@@ -1,4 +1,4 @@
-"""The joints along a path of the tip, with their first three derivatives.
+"""The joints along a path of the tip, with their first three derivatives, and the tip along one of the joints.
 
 A path gives position and derivatives of all its axes, p(s) and the angles; q(s) = f(p(s)) then has the derivatives that the chain rule
 gives to third order (base/series.py), exact but for rounding.
@@ -6,13 +6,14 @@ gives to third order (base/series.py), exact but for rounding.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.series import Series
-from planner.kinematics.chain import LINEAR, Kinematics
+from planner.kinematics.chain import LINEAR, Chain, Kinematics
 from planner.machine import ROTARY_AXES
 
 
@@ -24,9 +25,23 @@ def joints_along(
 
     radius : at which the angles of rotary axes are lengths [mm]; at 1 mm they are in rad
     """
+    return _along(kinematics.joints, axes, motion, radius)
+
+
+def points_along(chain: Chain, axes: tuple[str, ...], motion: FloatArray, radius: float = 1.0) -> FloatArray:
+    """(4, n, A) the controlled point where `motion` (4, n, A) is that of the joints; the rest as in `joints_along`."""
+    return _along(chain.point, axes, motion, radius)
+
+
+def _along(
+    function: Callable[[dict[str, Any]], dict[str, Any]],
+    axes: tuple[str, ...],
+    motion: FloatArray,
+    radius: float,
+) -> FloatArray:
     table = np.asarray(motion, dtype=np.float64)
     columns = {letter: Series(table[:, :, k]) for k, letter in enumerate(axes)}
-    found = kinematics.joints(in_rad(columns, radius))
+    found = function(in_rad(columns, radius))
     out = table.copy()
     for k, letter in enumerate(axes):
         if letter in LINEAR:

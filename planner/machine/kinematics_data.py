@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import model_validator
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from planner.machine.parts import Finite, NotNegative, Record
 
@@ -58,6 +58,15 @@ class KinematicsData(Record):
             if letter not in self.rotary:
                 raise ValueError(f"reversed: '{letter}' is no axis of type {self.type}; it has {self.axes}")
         return self
+
+    @model_serializer(mode="wrap")
+    def _keys_of_this_type(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The keys that its type has, as they are read again."""
+        found: dict[str, Any] = written(self)
+        absent = {key for keys in _KEYS.values() for key in keys} - {*_KEYS[self.type]}
+        if self.type == HEAD_HEAD:
+            absent |= {"x_rot_point", "y_rot_point", "z_rot_point"}
+        return {key: value for key, value in found.items() if key not in absent}
 
     @property
     def rotary(self) -> tuple[str, str]:

@@ -22,6 +22,7 @@ from planner.base.names import (
 )
 from planner.constraints.own import OwnLimit
 from planner.corners.smooth import CornerShape
+from planner.job.at_tip import planned
 from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
@@ -96,14 +97,18 @@ def plan(
         limits = (limits,)
     if limits:
         machine = machine.with_own((*machine.own, *limits))
+
+    def on(read: Program, used: Machine) -> Plan:
+        return method.plan(read, used, tolerance, progress, log)
+
     if isinstance(program, Program):
         if reading != AS_USUAL:
             raise InputError("reading: the program is read already; give the settings to read_program")
-        return method.plan(program, machine, tolerance, progress, log)
+        return planned(program, machine, on)
     stages = Stages(progress)
     with stages.stage("read"):
         program = read_program(program, machine, reading)
-    made = method.plan(program, machine, tolerance, progress, log)
+    made = planned(program, machine, on)
     return dataclasses.replace(made, timings=stages.timings | made.timings)
 
 

@@ -70,6 +70,10 @@ class TrajectoryOnDemand(Trajectory):
         object.__setattr__(heard, "_take", take)
         return heard
 
+    def through(self, change: Callable[[Trajectory], Trajectory]) -> TrajectoryOnDemand:
+        """The motion with other positions and derivatives: `change` gives those of samples, one by one."""
+        return TrajectoryOnDemand(_Changed(self._motion, change), self.dt, len(self), self._places)
+
     def chunks(self) -> Iterator[Trajectory]:
         """All samples in order, `CHUNK` at a time."""
         if "_whole" in vars(self):
@@ -107,6 +111,20 @@ class TrajectoryOnDemand(Trajectory):
         if "_whole" not in vars(self):
             object.__setattr__(self, "_whole", joined(list(self.chunks())))
         return getattr(self._whole, name)
+
+
+class _Changed:
+    """A motion whose samples are changed one by one."""
+
+    def __init__(self, motion: _AnyMotion, change: Callable[[Trajectory], Trajectory]):
+        self.motion, self.change = motion, change
+
+    @property
+    def end(self) -> float:
+        return self.motion.end
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        return self.change(self.motion.at(times, dt))
 
 
 class _Places:

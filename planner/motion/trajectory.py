@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -85,6 +85,10 @@ class Trajectory:
         """All samples in order, one part after the other. What goes through a long motion takes its parts, so that only one of them
         has to be in memory (motion/on_demand.py)."""
         yield self
+
+    def through(self, change: Callable[[Trajectory], Trajectory]) -> Trajectory:
+        """The motion with other positions and derivatives: `change` gives those of any samples, each by itself."""
+        return change(self)
 
     def rows(self, k: Array) -> Trajectory:
         """The samples with the ascending indices k (n,)."""

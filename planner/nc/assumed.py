@@ -41,10 +41,11 @@ class Assumed:
     moved     : letters of axes that are not planned and were refused, because they move
     printer   : the program is one for a 3-D printer: it has M82 or M83
     follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
+    at_tip    : the machine has kinematics: the switch of the tool centre point is read (tool_point.py)
     """
 
-    def __init__(self, reading: Reading, axes: str = "", *, extruder: bool = False):
-        self.reading = reading
+    def __init__(self, reading: Reading, axes: str = "", *, extruder: bool = False, at_tip: bool = False):
+        self.reading, self.at_tip = reading, at_tip
         self.follows = extruder and reading.extruder != IGNORE
         self.strict = reading.strict
         self.printer = False

@@ -16,7 +16,15 @@ from planner.nc import codes
 from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
 from planner.nc.commands import MESSAGE, command, homed
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
-from planner.nc.settings import ALWAYS_READ, EVERYTHING, EXTRUDER_MODES, TEXTS, setting
+from planner.nc.settings import (
+    ALWAYS_READ,
+    EVERYTHING,
+    EXTRUDER_MODES,
+    TEXTS,
+    TOOL_POINT_OFF,
+    TOOL_POINT_ON,
+    setting,
+)
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
@@ -24,6 +32,8 @@ NUMBER_MAX = 1e9
 CODE_MAX = 1e4  # larger G and M numbers are all unknown
 _CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
 _ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code beside them
+
+_TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT_OFF))
 
 Report = Callable[[int, str], None]
 
@@ -53,6 +63,7 @@ class Block:
     homing  : axes that go to their home position
     stops   : one of `events` is a full stop
     own     : letters of the words that codes of the line use
+    tool_point : number of the M code that switches the tool centre point, or None
     """
 
     line: int
@@ -68,6 +79,7 @@ class Block:
     homing: str = ""
     stops: bool = False
     own: frozenset[str] = frozenset()
+    tool_point: int | None = None
 
     def has(self, letters: str) -> bool:
         """Whether the block has a word with one of the letters."""
@@ -175,6 +187,10 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed
         block.foreign |= letter == "G"
         alone = letter == "M" and code not in codes.M_GROUP and not before
         return found.own if found else EVERYTHING if alone else ""
+    if assumed.at_tip and letter == "M" and code in _TOOL_POINT_CODES:
+        block.tool_point, block.at["tool point"] = code // 10, word
+        block.events.append((letter, code / 10))
+        return ""
     if found is None or assumed.strict:
         return None
     assumed.count(found.what, words.text(word), block.line)

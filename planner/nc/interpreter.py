@@ -30,6 +30,7 @@ from planner.nc.program import MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.state import REFUSED_MOTION, Setup, State, set_units, system_name
 from planner.nc.store import Store
+from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
 
 class Interpreter:
@@ -47,8 +48,12 @@ class Interpreter:
         self.setup = Setup.of(machine)
         state = self.setup.start()
         state.further.letters = "".join(c for c in state.further.letters if c not in reading.ignore)
+        self.tool_point = ToolPointSwitch.of(machine)
         self.assumed = Assumed(
-            reading, state.further.letters, extruder=machine is not None and EXTRUDER in machine.axes
+            reading,
+            state.further.letters,
+            extruder=machine is not None and EXTRUDER in machine.axes,
+            at_tip=self.tool_point.chain is not None,
         )
         store = Store(len(state.further.letters))
         self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.note)
@@ -85,7 +90,8 @@ class Interpreter:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
         self._end_compensation()
-        return self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
+        read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
+        return read if self.found.faults else at_the_tip(read, self.tool_point, self.setup.machine)
 
     def go_on_with(self, state: State, store: Store) -> None:
         """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
@@ -195,11 +201,13 @@ class Interpreter:
         if block.g.get("one-shot") == 40:
             auxiliary.dwell(self.state, self.store, block, self.assumed, self.note)
         self._modes(block)
+        turned = self.state.further.position.copy()
         if not block.foreign:
             self._check_parked(block)
             homing.go_to_switches(self.state, self.store, block, self.note)
             self._one_shot(block)
             self.mover.execute(block)
+            self.tool_point.check(self.state, block, turned)
         stop = block.m.get("stopping")
         if stop is not None and self.mover.cutter is not None:
             self.mover.cutter.fix()
@@ -229,6 +237,7 @@ class Interpreter:
             self.mover.cutter = compensation.switch(state, self.store, block, self.mover.cutter, self.note)
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.note)
+        self.tool_point.take(state, self.store, block)
         if "work offset" in g:
             state.system = offsets.system_of(block)
             if state.system not in state.systems and state.system != 540:

@@ -32,7 +32,7 @@ _FIXTURE = 593  # the system of G10 L11
 
 
 def set_tool_offset(state: State, block: Block, note: Note) -> None:
-    """G43, G43.1, G43.2, G49. Raises WordFault for words that contradict each other."""
+    """G43, G43.1, G43.2, G43.4, G49. Raises WordFault for words that contradict each other."""
     code = block.g["tool length"]
     if code in (431, 432) and "motion" not in block.g:
         further_moves.refuse(state, block, "of a tool offset")
@@ -40,7 +40,7 @@ def set_tool_offset(state: State, block: Block, note: Note) -> None:
         state.tool_offset = np.zeros(3)
     elif code == 431:
         state.tool_offset = _given(state, block, state.tool_offset)
-    elif code == 430:
+    elif code in (430, 434):
         tool = integer(block, "H", 0) if "H" in block.value else state.tool_loaded
         state.tool_offset = _offset_of(state, tool, block, note)
     elif "H" in block.value:

@@ -89,6 +89,22 @@ class Expansion:
     rows: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class ToolPoint:
+    """The tool centre point of a program that has it on (nc/tool_point.py): x, y and z are those of the tool's tip.
+
+    word       : what switched it on first: "G43.4", "M428", "M128"
+    line       : where
+    length     : of the tool, which z holds [mm]
+    rapids_off : rapid moves while it was off and a rotary axis not at 0: in the program as their paths of the tip, in chords
+    """
+
+    word: str
+    line: int
+    length: float
+    rapids_off: int = 0
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
@@ -148,6 +164,7 @@ class Program:
     extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it moves alone, a block of
                    kind STOP with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
     reading      : the settings it was read with
+    tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : the program itself, if it was given as a text; None for those of a file, and for points
     """
@@ -175,6 +192,7 @@ class Program:
     expansion: Expansion | None = None
     extruded: FloatArray = field(default_factory=lambda: np.zeros(0))
     reading: Reading = AS_USUAL
+    tool_point: ToolPoint | None = None
     pen: bool = False
     text: bytes | None = None
 

@@ -31,6 +31,9 @@ TOOL_POINT_M = Assumption(
     "switches to the tool centre point, as some controls have them (M128, M428)",
     "not followed: every axis is planned as a joint, and with the switch on the tool takes another path",
 )
+# M codes that switch the tool centre point on and off, by number: Heidenhain's and LinuxCNC's.
+TOOL_POINT_ON, TOOL_POINT_OFF = (128, 428), (129, 429)
+_TOOL_LENGTH_POINT = 434  # G43.4, read where the machine has kinematics
 PRINTER_M = Assumption(
     "code of a 3-D printer that moves nothing",
     "codes of a 3-D printer that move nothing",
@@ -150,4 +153,4 @@ def may_be_ignored(name: str) -> bool:
     if letter == "M":
         return code not in (20, 300, 970, 980, 990)
     moving = 50 <= code <= 69 or 330 <= code <= 389 or 700 <= code <= 899  # splines, threads, probing, cycles
-    return code not in G_GROUP and not moving
+    return (code not in G_GROUP or code == _TOOL_LENGTH_POINT) and not moving

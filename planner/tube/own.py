@@ -151,8 +151,8 @@ class _Search:
         )
 
     def _slow(self, nodes: list[int]) -> None:
-        """Make the guess slower at nodes that will stay, where the steps beside them would be faster than limits as narrowed as they may
-        be: no motion keeps them there."""
+        """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as narrowed as they may be: no
+        motion keeps them there."""
         run, at = self.run, np.array(nodes, dtype=int)
         state, leg, h = self.guess.state, self.guess.leg, self.guess.h
         v, a = state[at, 1], state[at, 2]

@@ -13,6 +13,7 @@ angles change, d(direction)^2 = d(tilt)^2 + sin(tilt)^2 d(c)^2, so that the tole
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -23,15 +24,16 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Axis, Machine
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory, joined
+from planner.verify.findings import QUANTITIES
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.judge import verify
 from planner.verify.kinematics import tip_and_direction
-from planner.verify.limits import NORMAL_NAME
+from planner.verify.limits import COLUMN, NORMAL_NAME
 from planner.verify.own import OwnSeen, SampleBlock
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
-from planner.verify.stream import Limits
-from planner.verify.verdict import Verdict
+from planner.verify.stream import CARRIED, Limits
+from planner.verify.verdict import LimitCheck, Verdict
 
 # Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints [-].
 NOT_JUDGED = 100.0
@@ -42,17 +44,43 @@ class JointVerdict:
     """The findings of `verify_joints`.
 
     passed       : True if every check holds
-    ratios       : of the linear joints, "velocity.x" and so on, and of rotary joints, feed and tip: value / limit [-]
+    limits       : of the linear joints, "velocity.x" and so on
     tip          : the verdict of the tip's motion
     tip_error_mm : largest distance of tip and angles from the path, with what lies between setpoints [mm]; inf where it was lost
     faults       : one sentence for each failure
     """
 
     passed: bool
-    ratios: dict[str, float]
+    limits: dict[str, LimitCheck]
     tip: Verdict
     tip_error_mm: float
     faults: tuple[str, ...]
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Of the linear joints, and of rotary joints, feed and tip: value / limit [-]."""
+        return {name: check.ratio for name, check in self._of_joints_and_tip().items()}
+
+    def verdict(self) -> Verdict:
+        """All of it as one verdict: limits of the joints in place of those of the tip's coordinates."""
+        known = np.isfinite(self.tip_error_mm)
+        contour = self.tip.contour
+        more = self.tip_error_mm - (self.tip.contour_error_mm or 0.0) if known else 0.0
+        value = contour.value + more
+        return dataclasses.replace(
+            self.tip,
+            passed=self.passed,
+            limits=self._of_joints_and_tip(),
+            contour=dataclasses.replace(contour, value=value, ratio=contour.ratio + more / contour.limit),
+            contour_error_mm=self.tip_error_mm if known else None,
+            faults=self.faults,
+        )
+
+    def _of_joints_and_tip(self) -> dict[str, LimitCheck]:
+        of_tip = {n: c for n, c in self.tip.limits.items() if n.rpartition(".")[2] not in LINEAR_AXES}
+        found = self.limits | of_tip
+        order = {quantity: k for k, quantity in enumerate(QUANTITIES)}
+        return dict(sorted(found.items(), key=lambda pair: order.get(pair[0].partition(".")[0], len(order))))
 
 
 def verify_joints(
@@ -74,34 +102,21 @@ def verify_joints(
     """
     if machine.kinematics is None:
         raise InputError(f"machine '{machine.name}' has no table [kinematics]")
-    data = machine.kinematics
-    length = data.tool_length if tool_length is None else tool_length
+    carried = _Carried(
+        machine, setpoints, machine.kinematics.tool_length if tool_length is None else tool_length
+    )
     given = Given() if given is None else given
-
-    def tips(position: FloatArray) -> FloatArray:
-        radius = setpoints.radius
-        turns = np.array([letter in ROTARY_AXES for letter in setpoints.axes])
-        angles = np.where(turns, position / radius, position)
-        found = position.copy()
-        linear = [setpoints.axes.index(letter) for letter in LINEAR_AXES]
-        found[:, linear], _ = tip_and_direction(data, length, setpoints.axes, angles)
-        return found
-
-    at = tips(setpoints.position)
-    middle = tips(0.5 * (setpoints.position[1:] + setpoints.position[:-1]))
-    gap = float(np.linalg.norm(middle - 0.5 * (at[1:] + at[:-1]), axis=1).max(initial=0.0))
-    nothing = np.zeros_like(at)
-    motion = dataclasses.replace(setpoints, position=at, velocity=nothing, acceleration=nothing, jerk=nothing)
     # of machines with a limit of the normal acceleration that limit is not one of the tip: it moves with the workpiece
     tip = verify(
-        motion,
+        carried.motion(setpoints),
         toolpath,
         _of_tip(machine),
         given=dataclasses.replace(given, columns=()),
         not_limited=(*not_limited, NORMAL_NAME),
     )
-    ratios, faults = _joint_ratios(setpoints, machine, given, not_limited)
-    of_tip = {name: c.ratio for name, c in tip.limits.items() if name.rpartition(".")[2] not in LINEAR_AXES}
+    gap = max((carried.gap(part) for part in _overlapping(setpoints, 1)), default=0.0)
+    limits = _joint_checks(setpoints, machine, given, not_limited)
+    faults = [f"joint {check.sentence(setpoints.axes)}" for check in limits.values() if check.broken]
     error = (np.inf if tip.contour_error_mm is None else tip.contour_error_mm) + gap
     tolerance = tip.contour.limit
     if error > tolerance * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING and not tip.contour.broken:
@@ -110,9 +125,56 @@ def verify_joints(
             f"with {tolerance:.6g} mm allowed"
         )
     faults += tip.faults
-    return JointVerdict(
-        passed=not faults, ratios=ratios | of_tip, tip=tip, tip_error_mm=error, faults=tuple(faults)
-    )
+    return JointVerdict(passed=not faults, limits=limits, tip=tip, tip_error_mm=error, faults=tuple(faults))
+
+
+class _Carried:
+    """The tip that joints carry, by the chain of frames of kinematics.py."""
+
+    def __init__(self, machine: Machine, setpoints: Trajectory, length: float):
+        axes, radius = setpoints.axes, setpoints.radius
+        self.data, self.length, self.axes = machine.kinematics, length, axes
+        self.per_length = np.array([1.0 / radius if letter in ROTARY_AXES else 1.0 for letter in axes])
+        self.linear = [axes.index(letter) for letter in LINEAR_AXES]
+
+    def tips(self, position: FloatArray) -> FloatArray:
+        """(n, A) places with x, y, z of the tip for those of the joints."""
+        assert self.data is not None
+        found = position.copy()
+        found[:, self.linear], _ = tip_and_direction(
+            self.data, self.length, self.axes, position * self.per_length
+        )
+        return found
+
+    def motion(self, setpoints: Trajectory) -> Trajectory:
+        """The motion of the tip, positions alone."""
+
+        def of(samples: Trajectory) -> Trajectory:
+            nothing = np.zeros_like(samples.position)
+            return dataclasses.replace(
+                samples,
+                position=self.tips(samples.position),
+                velocity=nothing,
+                acceleration=nothing,
+                jerk=nothing,
+            )
+
+        return setpoints.through(of)
+
+    def gap(self, samples: Trajectory) -> float:
+        """How far the middle of the tip's way between two setpoints leaves the middle of both tips [mm]."""
+        q = samples.position
+        at, middle = self.tips(q), self.tips(0.5 * (q[1:] + q[:-1]))
+        return float(np.linalg.norm(middle - 0.5 * (at[1:] + at[:-1]), axis=1).max(initial=0.0))
+
+
+def _overlapping(setpoints: Trajectory, carried: int) -> Iterator[Trajectory]:
+    """The samples chunk by chunk, each after the first with the last `carried` ones before it."""
+    before: Trajectory | None = None
+    for chunk in setpoints.chunks():
+        whole = chunk if before is None else joined([before, chunk])
+        yield whole
+        before = whole.rows(np.arange(max(len(whole) - carried, 0), len(whole)))
 
 
 def _of_tip(machine: Machine) -> Machine:
@@ -123,15 +185,47 @@ def _of_tip(machine: Machine) -> Machine:
     return machine.model_copy(update={"axes": axes}).with_own(())
 
 
-def _joint_ratios(
+def _joint_checks(
     setpoints: Trajectory, machine: Machine, given: Given, not_limited: tuple[str, ...]
-) -> tuple[dict[str, float], list[str]]:
-    """Ratios of the linear joints to their limits, and a sentence for each that is exceeded."""
+) -> dict[str, LimitCheck]:
+    """The worst of each limit of the linear joints, by name."""
     axes = setpoints.axes
-    joints = tuple(_Joint(letter, machine.axes[letter]) for letter in LINEAR_AXES)
-    seen = OwnSeen(joints, axes)
+    seen = OwnSeen(tuple(_Joint(letter, machine.axes[letter]) for letter in LINEAR_AXES), axes)
+    limits = _limits(machine, axes, given, not_limited)
+    travelled, skip = 0.0, 0
+    for part in _overlapping(setpoints, CARRIED):
+        seen.take(
+            SampleBlock(
+                **{name: getattr(part, name) for name in ("t", "position", *DERIVATIVES)},
+                piece=np.asarray(part.line, dtype=np.int64),
+                skip=skip,
+                travelled=travelled,
+            ),
+            limits,
+        )
+        travelled += float(np.linalg.norm(np.diff(part.position, axis=0), axis=1).sum())
+        skip = min(CARRIED, len(part))
+    checks = {}
+    for row, (ratio, value, limit, how) in enumerate(seen.worst):
+        name, unit = seen.name(row)
+        checks[name] = LimitCheck(
+            name=name,
+            unit=unit,
+            ratio=float(ratio),
+            value=float(value),
+            limit=float(limit if ratio > 0 else seen.least[row]),
+            time=float(seen.time[row]),
+            position=seen.at[row],
+            line=int(seen.piece[row]),
+            limited=name.partition(".")[0] not in not_limited,
+            note="column" if how == COLUMN else "differences of position",
+        )
+    return checks
+
+
+def _limits(machine: Machine, axes: tuple[str, ...], given: Given, not_limited: tuple[str, ...]) -> Limits:
     rounding = np.zeros(len(axes)) if not len(given.position_rounding) else np.array(given.position_rounding)
-    limits = Limits(
+    return Limits(
         per_axis=np.array([machine.limits(name, axes) for name in DERIVATIVES]),  # type: ignore[arg-type]
         linear=np.array([letter in LINEAR_AXES for letter in axes]),
         judged=np.array([name in given.columns for name in DERIVATIVES]),
@@ -141,24 +235,6 @@ def _joint_ratios(
         acceleration_at_stop=np.full(len(axes), np.inf),
         jerk_limited="jerk" not in not_limited,
     )
-    seen.take(
-        SampleBlock(
-            **{name: getattr(setpoints, name) for name in ("t", "position", *DERIVATIVES)},
-            piece=np.zeros(len(setpoints), dtype=np.int64),
-            skip=0,
-            travelled=0.0,
-        ),
-        limits,
-    )
-    ratios, faults = {}, []
-    for row, (ratio, value, limit, _) in enumerate(seen.worst):
-        name, unit = seen.name(row)
-        ratios[name] = float(ratio)
-        if name.partition(".")[0] not in not_limited and ratio > 1.0 + RATIO_ROUNDING:
-            faults.append(
-                f"{name}: {value:.7g} {unit}, {ratio:.6g} of the limit {limit:.6g} {unit} of the joint at t = {seen.time[row]:.6g} s"
-            )
-    return ratios, faults
 
 
 class _Joint(SimpleNamespace):

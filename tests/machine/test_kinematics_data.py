@@ -6,7 +6,7 @@ import pytest
 
 from planner.base.errors import InputError
 from planner.kinematics import kinematics_of
-from planner.machine import Machine, machine_from_dict
+from planner.machine import KinematicsData, Machine, machine_from_dict
 
 LIMITS = {"velocity": 100.0, "acceleration": 1000.0, "jerk": 20000.0}
 
@@ -48,3 +48,9 @@ def test_wrong_values_are_refused(table: dict, said: str) -> None:
 def test_a_machine_without_the_table_has_no_tool_centre_point() -> None:
     with pytest.raises(InputError, match=r"needs a table \[kinematics\]"):
         kinematics_of(machine(None))
+
+
+@pytest.mark.parametrize("kind", ["xyzac-trt", "xyzbc-trt", "head-table", "head-head"])
+def test_written_and_read_again(kind: str) -> None:
+    data = KinematicsData(type=kind, tool_length=12.0)
+    assert KinematicsData(**data.model_dump(mode="json")) == data

@@ -1,0 +1,288 @@
+"""The tool centre point of a program: G43.4 and G49, M428 and M429, M128 and M129 switch it on and off on a machine with kinematics.
+
+While it is on, x, y, z of the program are those of the controlled point p of kinematics/chain.py: the tool's tip as seen from the
+workpiece, with the tool's length L in z. While it is off they are the joints q. The switch moves nothing: what stands still are the
+joints. L is the length of the tool offset in force, else `tool_length` of the machine file.
+
+The program that is planned is one of p throughout. A move with the switch off is
+
+    the same move of p     where both rotary axes stand at 0, since q = p there
+    its own path in p      for rapid moves elsewhere: a straight line of q, in chords that p leaves by `CHORD_SHARE` of the tolerance
+    refused                for feed moves elsewhere
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.units import RAD_PER_DEG
+from planner.kinematics.chain import LINEAR, Chain, kinematics_of
+from planner.machine import Machine
+from planner.nc.block import Block
+from planner.nc.events import EventTable
+from planner.nc.further import LETTERS, ROTARY
+from planner.nc.moves import WordFault
+from planner.nc.program import FEED_MOVES, MOVES, Kind, PathControl, Program, SplineTable, ToolPoint
+from planner.nc.settings import TOOL_POINT_ON
+from planner.nc.state import State
+from planner.nc.store import Store
+
+CHORD_SHARE = 0.1  # of the tolerance, that a rapid move of the joints leaves its chords by [-]
+CHORDS_MAX = 2**14  # of one move: enough for a turn at 1e4 mm from the axis and a tolerance of 1 um
+G43_4, CANCELLED = 434, (430, 431, 432, 490)  # tool length codes, ten times; the others switch G43.4 off
+_JOINT_PLACES = {280: "G28", 300: "G30", 530: "G53"}  # one-shots whose coordinates are those of the joints
+
+
+class Switch(NamedTuple):
+    """On or off from a block on: the word that switched it on, "" where it is off, and the tool's length [mm]."""
+
+    block: int
+    line: int
+    word: str
+    length: float
+
+
+@dataclass
+class ToolPointSwitch:
+    """Follows the switch through a program; does nothing on machines without kinematics.
+
+    chain    : kinematics of the machine, or None
+    switches : so far
+    """
+
+    chain: Chain | None
+    switches: list[Switch] = dataclasses.field(default_factory=list)
+
+    @classmethod
+    def of(cls, machine: Machine | None) -> ToolPointSwitch:
+        """That of a machine."""
+        return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
+
+    def take(self, state: State, store: Store, block: Block) -> None:
+        """What the words of a block switch. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
+        tool = block.g.get("tool length")
+        if tool == G43_4 and self.chain is None:
+            raise WordFault(
+                block.at["tool length"],
+                "the tool centre point (G43.4) needs a machine with a table [kinematics]; add it to the machine file",
+            )
+        now = self._word(block, tool)
+        if self.chain is None or (now == self._on and tool is None):
+            return
+        length = float(state.tool_offset[2]) or self.chain.data.tool_length
+        if now and state.tool_offset[:2].any():
+            raise WordFault(
+                block.at["tool point" if block.tool_point is not None else "tool length"],
+                "the tool centre point needs a tool on the spindle's axis; this one has an offset in x or y",
+            )
+        if now != self._on or (now and length != self.switches[-1].length):
+            self._move(state, now, length)
+            self.switches.append(Switch(store.blocks, block.line, now, length))
+
+    def check(self, state: State, block: Block, before: FloatArray) -> None:
+        """Raise WordFault for a move to a place of the joints while the switch is on, unless both rotary axes stand at 0.
+
+        before : (6,) place of the further axes before the block
+        """
+        code = block.g.get("one-shot", 0)
+        if (
+            self._on
+            and code in _JOINT_PLACES
+            and (before[:ROTARY].any() or state.further.position[:ROTARY].any())
+        ):
+            raise WordFault(
+                block.at["one-shot"],
+                f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
+                "place of the joints; switch the tool centre point off before it (G49, M429, M129)",
+            )
+
+    @property
+    def _on(self) -> str:
+        return self.switches[-1].word if self.switches else ""
+
+    def _word(self, block: Block, tool: int | None) -> str:
+        """What is on after the words of a block."""
+        now = self._on
+        if tool == G43_4:
+            now = "G43.4"
+        elif tool in CANCELLED and now == "G43.4":
+            now = ""
+        if block.tool_point is not None:
+            now = f"M{block.tool_point}" if block.tool_point in TOOL_POINT_ON else ""
+        return now
+
+    def _move(self, state: State, now: str, length: float) -> None:
+        """The coordinates of the place where the joints stand, on the other side of the switch."""
+        assert self.chain is not None
+        angles = {
+            c.lower(): float(state.further.position[LETTERS.index(c)]) * RAD_PER_DEG for c in LETTERS[:ROTARY]
+        }
+        place = angles | dict(zip(LINEAR, state.position.tolist(), strict=True))
+        if self._on:
+            place |= self.chain.with_tool(self.switches[-1].length).joints(place)
+        if now:
+            place |= self.chain.with_tool(length).point(place)
+        state.position[:] = [place[letter] for letter in LINEAR]
+
+
+def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | None) -> Program:
+    """The program as one of the controlled point throughout (module text), if the tool centre point is on somewhere while rotary axes
+    are off 0; else the program itself.
+
+    Raises InputError for feed moves while it is off and a rotary axis is off 0, and for tools of two lengths.
+    """
+    on = _where_on(program, switch.switches)
+    tilted = _tilted(program, switch.chain)
+    if (
+        switch.chain is None
+        or machine is None
+        or not (on & np.isin(program.kind, MOVES)).any()
+        or not tilted.any()
+    ):
+        return program
+    first = _tool_of(program, switch.switches)
+    whole = _with_axes(program, switch.chain.axes)
+    made = _Pieces(whole, on, tilted, switch.chain.with_tool(first.length), machine).program()
+    off = int((~on & tilted & (program.kind == Kind.RAPID)).sum())
+    said = f"line {first.line}: the tool centre point is on ({first.word}), x, y, z are of the tip of a tool of {first.length:g} mm"
+    if off:
+        said += f"; {off:,} rapid moves with it off and a rotary axis off 0 are straight lines of the joints"
+    point = ToolPoint(word=first.word, line=first.line, length=first.length, rapids_off=off)
+    return dataclasses.replace(made, tool_point=point, notes=(*program.notes, said))
+
+
+def _where_on(program: Program, switches: list[Switch]) -> Array:
+    """(B,) True for the blocks that are run with the switch on."""
+    on = np.zeros(len(program), dtype=bool)
+    for switch in switches:
+        on[switch.block :] = bool(switch.word)
+    return on
+
+
+def _tilted(program: Program, chain: Chain | None) -> Array:
+    """(B,) True for the blocks at whose start or end a rotary axis of the kinematics is off 0."""
+    columns = [
+        k for k, letter in enumerate(program.axes) if chain is not None and letter in chain.data.rotary
+    ]
+    turned: Array = np.any(np.vstack([program.start, program.end])[:, columns], axis=1)
+    found: Array = turned[1:] | turned[:-1]
+    return found
+
+
+def _tool_of(program: Program, switches: list[Switch]) -> Switch:
+    """The switch that moves are made under. Raises InputError if there are two lengths of tools."""
+    ends = [*(s.block for s in switches[1:]), len(program)]
+    used = [
+        s
+        for s, end in zip(switches, ends, strict=True)
+        if s.word and np.isin(program.kind[s.block : end], MOVES).any()
+    ]
+    for switch in used:
+        if switch.length != used[0].length:
+            raise InputError(
+                f"the tool centre point is on with a tool of {switch.length:g} mm, and from line {used[0].line} on with one of "
+                f"{used[0].length:g} mm; one length is planned at a time: plan the part of each tool as a program of its own",
+                source=program.source,
+                line=switch.line,
+            )
+    return used[0]
+
+
+def _with_axes(program: Program, axes: tuple[str, ...]) -> Program:
+    """The program with all axes of the kinematics, those at 0 that it does not move."""
+    letters = LINEAR + tuple(c.lower() for c in LETTERS if c.lower() in (*program.axes, *axes))
+    if letters == program.axes:
+        return program
+
+    def widened(values: FloatArray) -> FloatArray:
+        wide = np.zeros((*values.shape[:-1], len(letters)))
+        wide[..., [letters.index(letter) for letter in program.axes]] = values
+        return wide
+
+    splines = program.splines
+    return dataclasses.replace(
+        program,
+        axes=letters,
+        start=widened(program.start),
+        end=widened(program.end),
+        arc_center=widened(program.arc_center),
+        splines=SplineTable(block=splines.block, points=widened(splines.points), weights=splines.weights),
+    )
+
+
+class _Pieces:
+    """The blocks of a program as pieces whose ends are places of p."""
+
+    def __init__(self, program: Program, on: Array, tilted: Array, chain: Chain, machine: Machine):
+        self.whole, self.chain = program, chain
+        self.off = ~on & tilted
+        self._refuse_feed_moves()
+        given = program.tolerance[np.isfinite(program.tolerance)]
+        self.within = CHORD_SHARE * min(machine.tolerance, float(given.min(initial=np.inf)))
+        self.end = program.end.copy()
+        self.end[self.off] = self._of(chain.point, program.end[self.off])
+
+    def _refuse_feed_moves(self) -> None:
+        feed = np.flatnonzero(self.off & np.isin(self.whole.kind, FEED_MOVES))
+        if len(feed):
+            raise InputError(
+                "a feed move with the tool centre point off while a rotary axis is off 0: there only rapid moves (G0) are planned with "
+                f"it off ({len(feed):,} such moves); switch the tool centre point on before it (G43.4, M428, M128, TRAORI), or turn "
+                "the rotary axes to 0",
+                source=self.whole.source,
+                line=int(self.whole.line[feed[0]]),
+            )
+
+    def _of(self, function: Callable[[dict[str, Any]], dict[str, Any]], places: FloatArray) -> FloatArray:
+        """Places (n, A) with x, y, z from joints to points, or back."""
+        axes = self.whole.axes
+        found = places.copy()
+        new = function({letter: places[:, k] for k, letter in enumerate(axes)})
+        for letter in LINEAR:
+            found[:, axes.index(letter)] = new[letter]
+        return found
+
+    def program(self) -> Program:
+        """The program of the pieces."""
+        whole = self.whole
+        ends = [self.end[k : k + 1] for k in range(len(whole))]
+        for k in np.flatnonzero(self.off & (whole.kind == Kind.RAPID)).tolist():
+            begin = self.end[k - 1] if k else whole.start
+            ends[k] = self._chords(self._of(self.chain.joints, begin[None])[0], whole.end[k])
+        count = np.array([len(pieces) for pieces in ends])
+        first = np.append(0, np.cumsum(count))
+        block = np.repeat(np.arange(len(whole)), count)
+        inner = np.ones(len(block), dtype=bool)
+        inner[first[1:] - 1] = False
+        events = whole.events
+        assert isinstance(events, EventTable)
+        splines = whole.splines
+        return dataclasses.replace(
+            whole,
+            end=np.concatenate(ends),
+            **{name: getattr(whole, name)[block] for name in ("kind", "feed", "dwell", "line", "tolerance")},
+            path_control=np.where(inner, PathControl.BLEND, whole.path_control[block]),
+            arc_block=first[whole.arc_block],
+            synchronised=first[whole.synchronised],
+            splines=SplineTable(block=first[splines.block], points=splines.points, weights=splines.weights),
+            events=dataclasses.replace(events, block=first[events.block]),
+            frame=whole.frame[block] if len(whole.frame) else whole.frame,
+        )
+
+    def _chords(self, begin: FloatArray, end: FloatArray) -> FloatArray:
+        """(n, A) ends in p of the chords of a straight line of the joints; the path leaves none of them by more than `within`."""
+        count = 1
+        while True:
+            share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]
+            places = self._of(self.chain.point, begin + share * (end - begin))
+            bow = places[1::2] - 0.5 * (places[:-1:2] + places[2::2])
+            if count >= CHORDS_MAX or float(np.linalg.norm(bow, axis=1).max()) <= self.within:
+                return places[2::2]
+            count *= 2

@@ -1,0 +1,138 @@
+"""The tool centre point in programs: where it is on, what moves with it off are, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from planner.base.errors import InputError
+from planner.kinematics import kinematics_of
+from planner.machine import Machine
+from planner.nc.program import Kind, Program
+from planner.nc.reader import parse_program
+from tests.kinematics.five_axis import table_machine
+
+LENGTH = 60.0
+BARE = table_machine(y_offset=-20.0, z_offset=35.0, tool_length=LENGTH)
+MACHINE = Machine(**(BARE.model_dump(exclude_none=True) | {"tools": {"1": 45.0, "2": 50.0}}))
+CUT = "G1 X5 A10 C5 F600\nX10 A20\n"
+
+
+def read(text: str, machine: Machine = MACHINE) -> Program:
+    return parse_program(text, machine)
+
+
+def joints(program: Program, length: float = LENGTH) -> np.ndarray:
+    """(B, A) ends of the blocks in the joints [mm, rad]."""
+    chain = kinematics_of(MACHINE).with_tool(length)
+    found = program.end.copy()
+    q = chain.joints(dict(zip(program.axes, program.end.T, strict=True)))
+    found[:, :3] = np.stack([q[letter] for letter in "xyz"], axis=1)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("on", "off", "word", "length"),
+    [
+        ("M428", "M429", "M428", LENGTH),
+        ("M128", "M129", "M128", LENGTH),
+        ("G43.4 H1", "G49", "G43.4", 45.0),
+        ("G43 H2\nM428", "M429", "M428", 50.0),
+    ],
+)
+def test_words(on: str, off: str, word: str, length: float) -> None:
+    program = read(f"G21 G90\nG0 X1 Y2\n{on}\n{CUT}G0 A0 C0\n{off}\nG0 X0\n")
+    assert program.tool_point is not None
+    assert (program.tool_point.word, program.tool_point.length) == (word, length)
+    assert program.tool_point.line == 3 + on.count("\n")
+    assert program.tool_point.rapids_off == 0
+    assert program.axes == ("x", "y", "z", "a", "c")
+    assert len(program) == 5
+    assert any(f"({word})" in note and f"{length:g} mm" in note for note in program.notes)
+
+
+def test_without_moves_of_rotary_axes_tip_and_joints_are_one() -> None:
+    assert read("G21\nM428\nG1 X5 F600\nM429\n").tool_point is None
+    assert read(f"G21\nM428\nM429\n{CUT}").tool_point is None  # nothing moves while it is on
+
+
+def test_moves_off_at_angle_0_are_the_same_on_and_off() -> None:
+    program = read(f"G21\nG1 X3 Y1 F500\nM428\n{CUT}G0 A0 C0\nM429\nG1 X7 Z3\n")
+    assert np.allclose(joints(program)[0], [3, 1, 0, 0, 0])
+    assert np.allclose(joints(program)[-1], [7, 1, 3, 0, 0])
+    assert np.allclose(program.end[-1], [7, 1, 3, 0, 0])
+
+
+def test_the_switch_moves_no_joint() -> None:
+    """An axis that the next block does not name stays where its joint is, not where the tip's coordinate was."""
+    program = read("G21\nG0 X1 Y2 Z3 A30 C10\nM428\nG1 X4 F600\nM429\nG0 X9\n")
+    q = joints(program)
+    first = int(np.flatnonzero(program.kind == Kind.LINE)[0])
+    assert np.allclose(q[first - 1], [1, 2, 3, np.deg2rad(30), np.deg2rad(10)])
+    assert program.end[first, 0] == 4.0
+    assert np.allclose(program.end[first, 1:], program.end[first - 1, 1:])  # of the tip only x moves
+    assert np.allclose(q[-1, 1:], q[first, 1:])  # of the joints only x moves
+    assert q[-1, 0] == pytest.approx(9.0)
+
+
+def test_rapid_moves_off_are_straight_lines_of_the_joints() -> None:
+    program = read(f"G21 G0 X50 Y20\nA30 C40\nM428\n{CUT}")
+    assert program.tool_point is not None
+    assert program.tool_point.rapids_off == 1
+    piece = np.flatnonzero(program.line == 2)
+    assert len(piece) > 8
+    assert (program.kind[piece] == Kind.RAPID).all()
+    q = joints(program)[np.append(piece[0] - 1, piece)]
+    assert np.allclose(q[:, :3], [50.0, 20.0, 0.0])  # they stand still, while the table turns the tip away
+    p = program.end[np.append(piece[0] - 1, piece)]
+    assert np.linalg.norm(p[-1, :3] - p[0, :3]) > 10.0
+    # half-way between two ends the tip is within a tenth of the tolerance of the chord
+    chain = kinematics_of(MACHINE)
+    half = 0.5 * (q[1:] + q[:-1])
+    at = chain.point(dict(zip(program.axes, half.T, strict=True)))
+    bow = np.stack([at[c] for c in "xyz"], axis=1) - 0.5 * (p[1:, :3] + p[:-1, :3])
+    assert 0.0 < np.linalg.norm(bow, axis=1).max() <= 0.1 * MACHINE.tolerance
+
+
+def test_a_rapid_move_that_only_shifts_is_one_move() -> None:
+    program = read(f"G21\nM428\n{CUT}M429\nG0 X30 Z10\n")
+    assert (program.line == 6).sum() == 1
+    assert np.allclose(joints(program)[-1, [0, 2]], [30.0, 10.0])
+
+
+def test_events_dwells_and_arcs_keep_their_blocks() -> None:
+    program = read(f"G21\nG0 A30 C40\nM8\nG4 P1\nM428\n{CUT}M9\nG2 X20 I5 J0\nM429\nG0 A0 C0\nM5\n")
+    at = {
+        event.text: int(program.line[event.block]) for event in program.events if event.block < len(program)
+    }
+    assert at["M8"] == 4
+    assert at["M9"] == 9
+    assert [event.text for event in program.events][-1] == "M5"
+    assert program.line[program.arc_block[0]] == 9
+    assert program.kind[program.line == 4].tolist() == [Kind.DWELL]
+    assert program.dwell.sum() == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        (f"G21\nM428\n{CUT}M429\nG1 Z5\n", 6, "feed move with the tool centre point off"),
+        (f"G21\nM428\n{CUT}G53 G0 Z5\n", 5, "G53 goes to a place of the joints"),
+        (f"G21\nM428\n{CUT}G28 Z5\n", 5, "G28 goes to a place of the joints"),
+        (f"G21\nG43.4 H1\n{CUT}G0 A0 C0\nG49\nG43.4 H2\n{CUT}", 7, "plan the part of each tool"),
+        (f"G21\nG43.1 X5\nM428\n{CUT}", 3, "a tool on the spindle's axis"),
+    ],
+)
+def test_refused(text: str, line: int, said: str) -> None:
+    with pytest.raises(InputError, match=said) as caught:
+        read(text)
+    assert caught.value.line == line
+
+
+def test_without_kinematics() -> None:
+    plain = MACHINE.model_copy(update={"kinematics": None})
+    program = read(f"G21\nM428\n{CUT}M429\n", plain)
+    assert program.tool_point is None
+    assert any("not followed" in note for note in program.notes)
+    with pytest.raises(InputError, match=r"needs a machine with a table \[kinematics\]"):
+        read(f"G21\nG43.4 H1\n{CUT}", plain)

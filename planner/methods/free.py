@@ -262,7 +262,7 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver | I
             continue
         # parts of another start's motion do not join those of the first one
         other = kept is not None and kept.any() and not first
-        if other or steps.h.sum() >= least:
+        if other or (start.plan is not None and steps.h.sum() >= least):
             why.append("the search did not end faster than its start")
             continue
         times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))

@@ -28,7 +28,7 @@ from planner.tube.motion import Steps, closed_at_nodes
 from planner.tube.nlp import PULL, SMOOTH
 from planner.tube.outcome import TubeSolution
 from planner.tube.price import columns, step_prices
-from planner.tube.problem import StepWindow, window_of
+from planner.tube.problem import NARROWED, StepWindow, window_of
 from planner.tube.run import TubeRun
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
@@ -40,6 +40,8 @@ JOIN_WITHIN = 40
 # first do with the second (pentagon on mill), and the other way round. By how much rows may be missed at the end [-]: on some windows
 # with arcs they keep trembling by 1e-5.
 TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
+# The most that rows may be missed by [-].
+MISSED_MOST = max(missed for _, missed in TRIES)
 # Complementarity of the start, share of the time, and its slacks at least [-]: of any motion, and of one that is an optimum of longer
 # steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
 # and 0.01 693 and 364.
@@ -59,7 +61,8 @@ class TubeOwn:
     """Settings of the search.
 
     gap      : complementarity at its end, share of the time [-]
-    divide   : divide windows that fail; what is found is of use in parts only then, and otherwise the search ends at the first one
+    divide   : divide windows that fail, and keep the guess where nothing faster is found. Otherwise the guess need not keep the limits
+               and no part of it is kept: windows may end slower than it, and the search ends at the first one that fails
     progress : called with the share of the steps that are done [-]
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: 31
                runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times the iterations
@@ -137,6 +140,8 @@ class _Search:
         steps = len(self.guess)
         even = np.linspace(0, steps, max(int(np.ceil(steps / WINDOW)), 1) + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
+        if not self.settings.divide:  # no step of the guess is kept
+            self._slow(joins)
         self._all = steps + 2 * OVERLAP * len(joins)
         self._side_by_side([0, *joins], [*joins, steps], self.settings.divide)
         if self._stopped:
@@ -144,6 +149,23 @@ class _Search:
         self._side_by_side(
             [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
         )
+
+    def _slow(self, nodes: list[int]) -> None:
+        """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as narrowed as they may be: no
+        motion keeps them there."""
+        run, at = self.run, np.array(nodes, dtype=int)
+        state, leg, h = self.guess.state, self.guess.leg, self.guess.h
+        v, a = state[at, 1], state[at, 2]
+        feed = np.minimum(run.feed[leg[at]], run.feed[leg[at - 1]])
+        beside = np.stack([v, v - a * h[at - 1, None] / 2, v + a * h[at, None] / 2])  # of the Bezier velocity
+        shares = (
+            (np.abs(beside) / run.velocity).max(axis=(0, 2)),
+            np.linalg.norm(beside, axis=2).max(axis=0) / feed,
+            np.sqrt((np.abs(a) / run.acceleration).max(axis=1)),
+        )
+        by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED_MOST), 1.0)[:, None]
+        state[at, 1] /= by
+        state[at, 2] /= by**2
 
     def steps(self) -> Steps:
         """The steps; those that are kept as they were guessed."""
@@ -247,7 +269,7 @@ class _Search:
             across = normal_shares(self._keeps, leg, h, found, jerk)
             tight *= np.where(across > 1.0, across * TIGHTER, 1.0)
             return False
-        if h.sum() < guess.h[lo:hi].sum():
+        if not self.settings.divide or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = place + run.offset[leg][:, None]
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False

@@ -14,7 +14,9 @@ from planner.corners.smooth import CLOSE
 from planner.geometry.build import toolpath_from_program
 from planner.job.job import Job
 from planner.job.stages import Stages
+from planner.job.trace import Trace
 from planner.methods.optimal import SIGMA2, OptimalMethod
+from planner.tube.own import WINDOW
 
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
@@ -90,3 +92,18 @@ def test_isolated_corners_are_passed_at_the_closed_form_s_speed(dt, tolerance, n
     np.testing.assert_allclose(tight.feed_closed_form, speed, rtol=smaller)
     assert (tight.feed_planned < 0.97 * speed).all()
     assert all(name.startswith("jerk.") for name in tight.limited_by)
+
+
+def test_a_search_of_several_windows_held_by_the_feed_ends_at_the_first_attempt():
+    """Windows join where the first motion, kept on a coarse grid only, is a little faster than the feed."""
+    turned = np.arange(800) * 0.7 / 20.0
+    points = np.column_stack([20.0 * np.cos(turned), 20.0 * np.sin(turned), -0.001 * np.arange(800)]).round(3)
+    moves = "".join("G1 X{:.3f} Y{:.3f} Z{:.3f}\n".format(*point) for point in points)
+    trace = Trace()
+    plan = planner.plan(
+        planner.read_program(text=f"G21 G90 G94 F1500\n{moves}M2\n"), "router", effort="quick", log=trace
+    )
+    searches = [step for step in trace.steps if step.name == "search"]
+    assert plan.verdict.passed
+    assert [step.kept for step in searches] == [True]
+    assert searches[0].facts["steps"] > WINDOW

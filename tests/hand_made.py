@@ -128,6 +128,7 @@ def make_plan(
         corners=make_corners(turns=turns) if solved else None,
         status=SimpleNamespace(name="OPTIMAL" if solved else "INFEASIBLE"),
         sentence="solved" if solved else "no feed satisfies all limits; loosen the tolerance",
+        joints=None,
         trajectory=trajectory,
         verdict=make_verdict(passed=passed, turns=turns) if solved else None,
         stop_time=1.25,

@@ -7,9 +7,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
+from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.job.plan import Plan
 from planner.kinematics import Chain, at_tip, kinematics_of
+from planner.kinematics.along_path import in_rad
 from planner.kinematics.limits import LinearJoint
 from planner.kinematics.setpoints import joint_setpoints
 from planner.machine import Machine
@@ -57,6 +61,16 @@ def of_axes(plan: Plan, samples: Trajectory) -> Trajectory:
     """Samples of the plan's trajectory as the axes get them."""
     made = joints_of(plan)
     return samples if made is None else made(samples)
+
+
+def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
+    """(n, 3) unit vectors along the tool, from its tip to the spindle as seen from the workpiece, at samples of the plan's trajectory;
+    None where that is one of the axes."""
+    chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
+    if chain is None:
+        return None
+    columns = dict(zip(samples.axes, samples.position.T, strict=True))
+    return np.stack(np.broadcast_arrays(*chain.direction(in_rad(columns, samples.radius))), axis=1)
 
 
 def judged(setpoints: Trajectory, job: Judged) -> Verdict:

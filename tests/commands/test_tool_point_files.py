@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from planner.geometry.build import toolpath_from_program
+from planner.job.at_tip import directions_of
 from planner.kinematics import kinematics_of
 from planner.machine import load_machine
 from planner.nc.reader import read_program
 from planner.report.block_feeds import planned_blocks
 from planner.report.html.saved import saved_plan
+from planner.report.toolpath_figure import toolpath_figure
 from tests.commands.command_line import run
 
 TEXT = "G21 G90\nG0 X1 Y2 Z50\nM428\nG1 X2 A3 C5 F600\nX3 A6\nM429\nG0 Z52\nM2\n"
@@ -125,3 +127,16 @@ def test_info_tells_it(tmp_path: Path) -> None:
     assert "on by M428, line 3; a tool of 60 mm" in done.stdout
     found = run("info", tmp_path / "part.ngc", "-m", machine_file(tmp_path), "--json")
     assert json.loads(found.stdout)["tool_point"]["word"] == "M428"
+
+
+@pytest.mark.slow
+def test_the_picture_has_the_tool(made: Path) -> None:
+    plan, _, _ = saved_plan(made / "out")
+    figure = toolpath_figure(plan)
+    labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert "tool" in labels
+    places = plan.trajectory.rows(np.array([0, len(plan.trajectory) - 1]))
+    begin, end = directions_of(plan, places)
+    assert np.allclose(begin, [0.0, 0.0, 1.0])
+    tilt, turn = np.deg2rad([6.0, 5.0])
+    assert np.allclose(end, [np.sin(turn) * np.sin(tilt), np.cos(turn) * np.sin(tilt), np.cos(tilt)])

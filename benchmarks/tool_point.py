@@ -74,7 +74,9 @@ def _planned(program: Path, machine: str, method: str, effort: str) -> dict[str,
         "grid_points": plan.grid_points,
         "planning_s": seconds,
         "timings_s": plan.timings,
-        "tip_error_mm": plan.verdict.contour_error_mm,
+        "contour_error_mm": plan.verdict.contour_error_mm,
+        "tip_error_mm": plan.verdict.linear_error_mm,
+        "angle_error_deg": plan.verdict.angle_error_deg,
         "shares": _shares(plan.verdict),
         "held_by": [] if plan.grid is None else plan.grid.ranked()[:SHARES_SHOWN],
         "faults": plan.verdict.faults[:3],
@@ -94,17 +96,19 @@ def _table(rows: list[dict[str, Any]]) -> str:
         "motion [s]",
         "a stop at every block [s]",
         "tip error [µm]",
+        "angle error [°]",
         "planning [s]",
     ]
     lines = []
     for row in rows:
         found = [row["method"], row["outcome"]]
         if "cycle_time_s" in row:
-            error = row["tip_error_mm"]
+            tip, angle = row["tip_error_mm"], row["angle_error_deg"]
             found += [
                 f"{row['cycle_time_s']:,.2f}",
                 f"{row['stop_time_s']:,.1f}",
-                "-" if error is None else f"{1e3 * error:.2f}",
+                "-" if tip is None else f"{1e3 * tip:.2f}",
+                "-" if angle is None else f"{angle:.4f}",
                 f"{row['planning_s']:.0f}",
             ]
         lines.append(found + [""] * (len(columns) - len(found)))

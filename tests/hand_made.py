@@ -62,6 +62,7 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
             "jerk.x": check(3.5, limited=False),
         },
         contour_error_mm=0.0123,
+        linear_error_mm=None,
         vertex_error_mm=0.02,
         end_error_mm=0.0,
         corners=make_corners(turns=turns),

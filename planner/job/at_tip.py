@@ -133,6 +133,8 @@ def _both(tip: Verdict, joints: Verdict) -> Verdict:
         limits=limits,
         contour=max(tip.contour, joints.contour, key=lambda check: check.ratio),
         contour_error_mm=_larger(tip.contour_error_mm, joints.contour_error_mm),
+        linear_error_mm=_larger(tip.linear_error_mm, joints.linear_error_mm),
+        angle_error_deg=_larger(tip.angle_error_deg, joints.angle_error_deg),
         faults=tuple(dict.fromkeys((*tip.faults, *joints.faults))),
         notes=tuple(dict.fromkeys((*tip.notes, *joints.notes))),
     )

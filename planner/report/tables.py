@@ -217,6 +217,9 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
     table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
+    if verdict.linear_error_mm is not None:
+        both = f"{verdict.linear_error_mm / MICROMETRE:.3f} µm in linear axes, {verdict.angle_error_deg:.4g}° in rotary ones"
+        table.add_row("of it", both)
     table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
     if (after := verdict.after_filters) is not None:
         table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))

@@ -67,12 +67,14 @@ class JointVerdict:
         contour = self.tip.contour
         more = self.tip_error_mm - (self.tip.contour_error_mm or 0.0) if known else 0.0
         value = contour.value + more
+        linear = self.tip.linear_error_mm
         return dataclasses.replace(
             self.tip,
             passed=self.passed,
             limits=self._of_joints_and_tip(),
             contour=dataclasses.replace(contour, value=value, ratio=contour.ratio + more / contour.limit),
             contour_error_mm=self.tip_error_mm if known else None,
+            linear_error_mm=None if linear is None else linear + more,
             faults=self.faults,
         )
 

@@ -18,7 +18,7 @@ _CONVERSATIONAL = re.compile(
 )
 _SIEMENS = re.compile(
     rb"^[ \t]*(?:N\d+[ \t]*)?(DEF[ \t]+(?:REAL|INT|BOOL|STRING)|PROC[ \t]|EXTERN[ \t]|M?CALL[ \t]+CYCLE|CYCLE\d+[ \t]*\(|MSG[ \t]*\(|"
-    rb"WORKPIECE[ \t]*\(|SUPA\b|TRAFOOF\b|TRANS[ \t]|STOPRE\b|%_N_|[XYZABC]=|R\d+=|(?:ENDIF|ENDWHILE|ENDLOOP|ENDFOR)\b|"
+    rb"WORKPIECE[ \t]*\(|SUPA\b|TRAORI\b|TRAFOOF\b|TRANS[ \t]|STOPRE\b|%_N_|[XYZABC]=|R\d+=|(?:ENDIF|ENDWHILE|ENDLOOP|ENDFOR)\b|"
     rb"GOTO[FB]\b)",
     re.MULTILINE | re.IGNORECASE,
 )

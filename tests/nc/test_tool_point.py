@@ -136,3 +136,41 @@ def test_without_kinematics() -> None:
     assert any("not followed" in note for note in program.notes)
     with pytest.raises(InputError, match=r"needs a machine with a table \[kinematics\]"):
         read(f"G21\nG43.4 H1\n{CUT}", plain)
+
+
+SIEMENS = "N10 G71 G90\nN20 G0 X=1 Y2\nN30 {on}\nN40 G1 X5 A=10 C5 F600\nX10 A20\nN60 G0 A0 C0\nN70 TRAFOOF\nG0 X0\nM30\n"
+HEIDENHAIN = (
+    "0 BEGIN PGM P MM\n1 TOOL CALL 1 Z S1000\n2 L X+1 Y+2 FMAX{on}\n4 L X+5 A+10 C+5 F600\n5 L IX+5 A+20\n"
+    "6 L A+0 C+0 FMAX\n7 M129\n8 L X+0 FMAX\n9 END PGM P MM\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "tool", "length"),
+    [
+        (SIEMENS.format(on="TRAORI"), "", LENGTH),
+        (SIEMENS.format(on="TRAORI(1)"), "", LENGTH),
+        (HEIDENHAIN.format(on="\n3 M128"), "G43 H1", 45.0),  # the tool call brings its length
+        (HEIDENHAIN.format(on="\n3 M128 F5000"), "G43 H1", 45.0),
+    ],
+)
+def test_other_languages(text: str, tool: str, length: float) -> None:
+    expected = read(f"G21 G90 {tool}\nG0 X1 Y2\nM428\n{CUT}G0 A0 C0\nM429\nG0 X0\n")
+    found = read(text)
+    assert found.tool_point is not None
+    assert found.tool_point.length == length
+    moves = np.isin(found.kind, (Kind.RAPID, Kind.LINE))  # a tool change is a stop
+    assert np.allclose(found.end[moves], expected.end)
+    assert found.kind[moves].tolist() == expected.kind.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SIEMENS.format(on="TRAORI"), "TRAORI is not read on a machine without a table"),
+        (HEIDENHAIN.format(on=" M128"), "M128 is not read"),
+    ],
+)
+def test_other_languages_without_kinematics(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read(text, MACHINE.model_copy(update={"kinematics": None}))

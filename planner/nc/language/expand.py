@@ -111,6 +111,7 @@ class _Files:
         """Compile a file; returns what cannot be read in it."""
         first, begin = self.rows.add_file(words, name)
         source = Source(words, len(self.sources), first, begin, self.integers)
+        source.at_tip = self.run.interpreter.assumed.at_tip
         self.sources.append(source)
         if source.file:
             self.run.files.append(name)

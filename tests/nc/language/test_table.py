@@ -21,6 +21,11 @@ MILL = {
     "axes": dict.fromkeys("xyz", AXIS),
 }
 TOOLED = {**MILL, "tools": {"1": {"length": 20.0, "diameter": 2.0}}}
+FIVE = {
+    **MILL,
+    "axes": dict.fromkeys("xyzac", AXIS),
+    "kinematics": {"type": "xyzac-trt", "tool_length": 20.0},
+}
 LATHE = {**MILL, "dialect": {"lathe": True}}
 FIRST = "G21 G90 G17 G94 G0 X0 Y0 Z0\n"
 TURN = "G21 S500 M3 G99 G0 X50. Z2. F0.2\n"
@@ -104,6 +109,10 @@ READ: dict[str, list[tuple[str, dict]]] = {
             MILL,
         )
     ],
+    "G43.4, M428": [
+        (FIRST + f"{on}\nG1 X5 A3 F600\nX0 C9\nG0 A0 C0\n{off}\nG1 X9", FIVE)
+        for on, off in (("G43.4 H1", "G49"), ("M428", "M429"), ("M128", "M129"))
+    ],
     "G6.2 NURBS": [
         (FIRST + "G1 X0 F600\nG6.2 P4 K0 X0 Y0\nK0 X5 Y9\nK0 X9 Y9\nK0 X15 Y0\nK1\nK1\nK1\nK1", MILL)
     ],
@@ -133,6 +142,7 @@ REFUSED: dict[str, list[tuple[str, dict]]] = {
     ],
     "state of the control": [(FIRST + "#5420=1\nG1 X5 F600", MILL)],
     "lathe: drilling": [(TURN + "G83 Z-20. Q3000 F0.1", LATHE)],
+    "G43.4, M428": [(FIRST + "G43.4 H1\nG1 X5 A3 F600\nG49", MILL)],
     "G38.2 to G38.5": [(FIRST + "G38.2 Z-5 F60", MILL), (FIRST + "M66 P0 L3 Q5\nG1 X5 F600", MILL)],
 }
 OTHER_FILE = "a call to another file"

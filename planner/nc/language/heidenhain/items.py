@@ -15,6 +15,7 @@ _ITEM = re.compile(
     r"(?P<ahead>LA)(?=\s*\d))",
     re.IGNORECASE,
 )
+_ROTARY = ("A", "B", "C")
 X, Y, Z = own("x"), own("y"), own("z")
 POSITION = {"X": X, "Y": Y, "Z": Z}
 POLE = own("cx"), own("cy")
@@ -46,8 +47,9 @@ class Items:
     side: int | None = None
 
 
-def items(block: ConversationalBlock, column: int) -> Items:
-    """Read what stands behind the function. Raises ProgramFault for what a path function does not take here."""
+def items(block: ConversationalBlock, column: int, turning: bool = False) -> Items:
+    """Read what stands behind the function; `turning`: absolute coordinates of A, B and C, too. Raises ProgramFault for what a path
+    function does not take here."""
     found, text = Items(), block.text
     while text[column:].strip():
         item = _ITEM.match(text, column)
@@ -59,7 +61,7 @@ def items(block: ConversationalBlock, column: int) -> Items:
         at, column = item.start() + len(item.group()) - len(item.group().lstrip()), item.end()
         if item["axis"]:
             name = item["axis"].upper()
-            if name[-1] not in "XYZ":
+            if name[-1] not in "XYZ" and not (turning and name in _ROTARY):
                 raise block.fault(f"axis {name[-1]} is not planned; X, Y and Z are", at)
             given, column = value(block, column)
             if name[-1] in found.axes:

@@ -82,7 +82,9 @@ class Moves:
         words.append(word("G", at, ZERO if given.fast else ONE))
         words += self.feed_words(block, given)
         words += [word(axis, at, end) for axis, end in ends.items()]
-        assigned: list[tuple[Parameter, Expression]] = [(POSITION[axis], end) for axis, end in ends.items()]
+        assigned: list[tuple[Parameter, Expression]] = [
+            (POSITION[axis], end) for axis, end in ends.items() if axis in POSITION
+        ]
         if "X" in ends or "Y" in ends:
             assigned += [
                 (DIRECTION[0], minus(ends.get("X", X), X)),

@@ -7,7 +7,9 @@
 LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
 LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.
 
-Refused with their block: PLANE and M128 (tilted axes), LN, free contours (FK), APPR and DEP with polar coordinates, other cycles, M89
+On a machine with kinematics M128 and M129 switch the tool centre point, and L takes A, B and C.
+
+Refused with their block: PLANE, M128 without kinematics, LN, free contours (FK), APPR and DEP with polar coordinates, other cycles, M89
 and other M codes that change moves, polar coordinates without a pole, texts and QS parameters.
 """
 
@@ -49,6 +51,7 @@ from planner.nc.language.tree import (
     SourcePlace,
     Statement,
 )
+from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
@@ -182,7 +185,7 @@ class HeidenhainParser(Definitions):
         return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
     def _straight(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        given = items(block, column)
+        given = items(block, column, turning=self.source.at_tip)
         before, after, machine = self._codes(block, given)
         lines: list[Statement] = [*before, *self._side(block, given)]
         if block.text[:column].upper() == "LP":
@@ -267,6 +270,8 @@ class HeidenhainParser(Definitions):
                         (word("M", block.byte(column), spindle), word("M", block.byte(column), Number(8.0))),
                     )
                 )
+            elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
+                before += [row, looked_up(block)]
             elif code in _REFUSED:
                 raise block.fault(f"M{code} is not read: it changes how the axes move; {_REMEDY}", column)
             elif code in _AT_END and self.file:

@@ -29,8 +29,10 @@ IDLE = frozenset((
 ))  # fmt: skip
 # The same with arguments or a value behind them.
 IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "SPOS", "LIMS"))
+# Commands that switch the tool centre point on and off, and the M codes of RS274NGC that stand for them.
+TOOL_POINT = {"TRAORI": 428.0, "TRAFOOF": 429.0}
 # Commands that tilt or bend the coordinates.
 REFUSED = (
-    "ROTS", "AROTS", "CROTS", "TRAORI", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
+    "ROTS", "AROTS", "CROTS", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
 )  # fmt: skip
 REMEDY = "let the CAM system write the moves out"

@@ -21,6 +21,7 @@ class Commands(SiemensControl):
     unit     : mm per unit of the program
     cycle    : of MCALL, which follows every row that moves
     compensates : the file has G41 or G42
+    at_tip   : the machine has kinematics
     """
 
     def __init__(self) -> None:
@@ -30,6 +31,7 @@ class Commands(SiemensControl):
         self.unit = 1.0
         self.cycle: list[Statement] | None = None
         self.compensates = False
+        self.at_tip = False
 
     def _cycle(self, reader: TokenReader, name: str) -> None:
         place = reader.place
@@ -155,6 +157,21 @@ class Commands(SiemensControl):
         raise reader.fault(
             f"{reader.peek(-1)} is not read; {codes.REMEDY}", reader.tokens[reader.next - 1].at
         )
+
+    def _tool_point(self, reader: TokenReader) -> None:
+        """TRAORI and TRAFOOF, alone or with the number of the transformation, 1. Raises ProgramFault for another one, and for TRAORI on
+        a machine without kinematics."""
+        name = reader.peek(-1)
+        at = reader.tokens[reader.next - 1].at
+        if reader.take("(") and not (reader.take("1") and reader.take(")")):
+            raise reader.fault(f"{name} is read alone, or as {name}(1)", at)
+        if self.at_tip:
+            code = as_word("M", reader.place.at, Number(codes.TOOL_POINT[name]))
+            self.body.append(Line(reader.place, (code,), ()))
+        elif name == "TRAORI":
+            raise reader.fault(
+                "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file", at
+            )
 
     def _idle(self, reader: TokenReader) -> None:
         reader.next = len(reader.tokens)

@@ -5,12 +5,13 @@
     language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
                REPEATB label P=n
     commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 82 83 (`drilling`), CYCLE84 to 89, 840,
-               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`codes.IDLE`)
+               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`codes.IDLE`);
+               TRAORI and TRAFOOF on a machine with kinematics
 
 Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line, for AC and IC.
 
-Refused with their line: tilted frames (ROT X, CYCLE800 with angles, TRAORI), KONT, G451, RNDM, G331, polar coordinates (AP, RP), SLOT1,
-LONGHOLE and other cycles.
+Refused with their line: tilted frames (ROT X, CYCLE800 with angles), TRAORI without kinematics, KONT, G451, RNDM, G331, polar
+coordinates (AP, RP), SLOT1, LONGHOLE and other cycles.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class SiemensParser(BlockWords):
 
     def __init__(self, source: Source):
         super().__init__()
-        self.source = source
+        self.source, self.at_tip = source, source.at_tip
         self.compensates = bool(_COMPENSATES.search(source.words.data))
         self.faults: list[ProgramFault] = []
 
@@ -187,6 +188,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
     **dict.fromkeys(patterns.ARGUMENTS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
     **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
+    **dict.fromkeys(codes.TOOL_POINT, SiemensParser._tool_point),
     "PROC": SiemensParser._procedure,
     "CALL": SiemensParser._call_text,
     "RET": SiemensParser._return,

@@ -72,11 +72,11 @@ def verify_command(
 ) -> None:
     """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.geometry.build import toolpath_from_program
+    from planner.job.at_tip import Judged, judged
     from planner.nc.reader import read_program
     from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
-    from planner.verify import verify
     from planner.verify.axes import fit_axes
     from planner.verify.judge import NOT_LIMITED_NAMES
 
@@ -98,13 +98,16 @@ def verify_command(
         raise InputError("the program moves nothing: there is nothing to judge", source=str(job))
     motion, given, fitted = fit_axes(read.trajectory, read.given, toolpath)
     with ProgressBar(quiet=quiet) as progress:
-        verdict = verify(
+        verdict = judged(
             motion,
-            toolpath,
-            limits,
-            given=given,
-            not_limited=unjudged,
-            progress=lambda fraction: progress("verify", fraction),
+            Judged(
+                program=program,
+                toolpath=toolpath,
+                machine=limits,
+                given=given,
+                not_limited=unjudged,
+                progress=lambda fraction: progress("verify", fraction),
+            ),
         )
     notes = [*read.notes, *fitted, *verdict.notes]
     notes += [f"the file says: {text}" for text in says.sentences(from_file, taken is not None, as_planned)]

@@ -63,8 +63,14 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     tolerance : of the path [mm], which plan and chords share
 
     Where the plan leaves no room for chords the program as it is is written, and a note says so. Raises InputError if the motion leaves
-    the program.
+    the program, and for a program with the tool centre point on.
     """
+    if plan.joints is not None:
+        raise InputError(
+            "a program with the tool centre point on: chords and corners are reckoned in the axes, not at the tip; planned.ngc has its "
+            "planned feeds, and --for linuxcnc-stream and --for pvt play the setpoints of its joints",
+            source=plan.program.source,
+        )
     if control == LINUXCNC:
         return _for_linuxcnc(directory, plan, tolerance)
     room = _room(plan, tolerance)

@@ -16,6 +16,7 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.names import known_name
 from planner.base.units import MICROMETRE
+from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES
 from planner.report.colours import COLOURS, GREY, limit_colours
 from planner.report.html.data import Samples, programmed_path, samples_of
@@ -123,7 +124,7 @@ class PlanFigures:
         for trace in self._feed_traces(against):
             figure.add_trace(trace, row=1, col=1)
         figure.update_yaxes(title_text="feed [mm/s]", rangemode="tozero", row=1, col=1)
-        shown, machine, go = self._samples.shown, self._plan.machine, _graph_objects()
+        shown, machine, go = of_axes(self._plan, self._samples.shown), self._plan.machine, _graph_objects()
         for row, quantity in enumerate(QUANTITIES, start=2):
             shares = 100.0 * getattr(shown, quantity) / machine.limits(quantity, shown.axes)  # type: ignore[arg-type]
             for k, axis in enumerate(shown.axes):

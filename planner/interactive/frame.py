@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from planner.base.errors import InputError
+from planner.job.at_tip import joints_of
 from planner.report.trajectory_file import trajectory_columns, units
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
         ) from fault
     trajectory = plan.require().trajectory
     assert trajectory is not None
-    table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory))
-    table.attrs["units"] = units(trajectory.axes, extruder=plan.toolpath.extrusion is not None)
+    joints = joints_of(plan)
+    table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory, joints))
+    table.attrs["units"] = units(
+        trajectory.axes, extruder=plan.toolpath.extrusion is not None, tip=joints is not None
+    )
     return table

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
+from planner.job.at_tip import Judged, judged
 from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.methods.registry import DEFAULT_MACHINE
 from planner.nc.program import Program
@@ -17,7 +18,6 @@ from planner.report.trajectory_reader import trajectory_of_columns
 from planner.verify import Verdict
 from planner.verify.axes import fit_axes
 from planner.verify.judge import NOT_LIMITED_NAMES
-from planner.verify.judge import verify as judge
 
 
 def verify(
@@ -33,7 +33,8 @@ def verify(
     """Judge a motion, wherever it comes from, against a program and a machine: `Verdict.faults` says what is wrong with it.
 
     t           : (T,) times of the samples [s]
-    q           : (T, A) positions of the axes then [mm, rotary axes degrees]; velocities and so on are taken from their differences
+    q           : (T, A) positions of the axes then [mm, rotary axes degrees]; velocities and so on are taken from their differences.
+                  Of a program with the tool centre point on they are those of the joints
     program     : a file, or a program read before
     machine     : a machine file, the name of a built-in machine, or a machine; None means "mill"
     axes        : letters of the columns of q; "" for the first A of x, y, z
@@ -70,4 +71,5 @@ def verify(
         program = read_program(program, machine)
     toolpath = toolpath_from_program(program, machine, tolerance)
     trajectory, given, _ = fit_axes(read.trajectory, read.given, toolpath)
-    return judge(trajectory, toolpath, machine, given=given, not_limited=not_limited)
+    how = Judged(program=program, toolpath=toolpath, machine=machine, given=given, not_limited=not_limited)
+    return judged(trajectory, how)

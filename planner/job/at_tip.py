@@ -5,15 +5,42 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.geometry.toolpath import Toolpath
 from planner.job.plan import Plan
 from planner.kinematics import Chain, at_tip, kinematics_of
+from planner.kinematics.along_path import in_rad
 from planner.kinematics.limits import LinearJoint
 from planner.kinematics.setpoints import joint_setpoints
 from planner.machine import Machine
+from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
+from planner.verify.given import Given
 from planner.verify.joints import verify_joints
+from planner.verify.judge import WHOLE, verify
 from planner.verify.verdict import Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """What delivered setpoints are judged by.
+
+    program, toolpath, machine : as `verify` has them
+    given       : which columns were delivered, and with how many digits
+    not_limited : quantities that are reported and not judged
+    progress    : called now and then with the fraction done (0 to 1)
+    """
+
+    program: Program
+    toolpath: Toolpath
+    machine: Machine
+    given: Given = WHOLE
+    not_limited: tuple[str, ...] = ()
+    progress: Callable[[float], None] | None = None
 
 
 def chain_of(program: Program, machine: Machine) -> Chain | None:
@@ -22,6 +49,40 @@ def chain_of(program: Program, machine: Machine) -> Chain | None:
     if program.tool_point is None or any(isinstance(limit, LinearJoint) for limit in machine.own):
         return None
     return kinematics_of(machine, program.tool_point.length)
+
+
+def joints_of(plan: Plan) -> Callable[[Trajectory], Trajectory] | None:
+    """What makes setpoints of the joints of any samples of the plan's trajectory; None where that is one of the axes."""
+    chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
+    return None if chain is None else lambda samples: joint_setpoints(samples, chain)
+
+
+def of_axes(plan: Plan, samples: Trajectory) -> Trajectory:
+    """Samples of the plan's trajectory as the axes get them."""
+    made = joints_of(plan)
+    return samples if made is None else made(samples)
+
+
+def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
+    """(n, 3) unit vectors along the tool, from its tip to the spindle as seen from the workpiece, at samples of the plan's trajectory;
+    None where that is one of the axes."""
+    chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
+    if chain is None:
+        return None
+    columns = dict(zip(samples.axes, samples.position.T, strict=True))
+    return np.stack(np.broadcast_arrays(*chain.direction(in_rad(columns, samples.radius))), axis=1)
+
+
+def judged(setpoints: Trajectory, job: Judged) -> Verdict:
+    """The verdict on setpoints of the axes: in the joints and at the tip for a program with the tool centre point on.
+
+    Raises InputError as `verify` does.
+    """
+    chain = chain_of(job.program, job.machine)
+    how = {"given": job.given, "not_limited": job.not_limited, "progress": job.progress}
+    if chain is None:
+        return verify(setpoints, job.toolpath, job.machine, **how)  # type: ignore[arg-type]
+    return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how).verdict()  # type: ignore[arg-type]
 
 
 def planned(program: Program, machine: Machine, plan_on: Callable[[Program, Machine], Plan]) -> Plan:
@@ -72,6 +133,8 @@ def _both(tip: Verdict, joints: Verdict) -> Verdict:
         limits=limits,
         contour=max(tip.contour, joints.contour, key=lambda check: check.ratio),
         contour_error_mm=_larger(tip.contour_error_mm, joints.contour_error_mm),
+        linear_error_mm=_larger(tip.linear_error_mm, joints.linear_error_mm),
+        angle_error_deg=_larger(tip.angle_error_deg, joints.angle_error_deg),
         faults=tuple(dict.fromkeys((*tip.faults, *joints.faults))),
         notes=tuple(dict.fromkeys((*tip.notes, *joints.notes))),
     )

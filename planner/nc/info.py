@@ -19,7 +19,7 @@ from planner.nc.arcs import IN_PLANE
 from planner.nc.bezier import at, homogeneous, lengths
 from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
-from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program
+from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program, ToolPoint
 from planner.nc.reader import interpret, load, source_name
 from planner.nc.reading import AS_USUAL, Reading
 
@@ -51,6 +51,7 @@ class ProgramInfo:
     tools            : tool numbers in the order of their T words
     notes            : what the reader assumed
     expansion        : what was expanded: calls, turns of loops, lines executed; None where nothing was
+    tool_point       : where the tool centre point is on; None where x, y and z are those of the joints
     unsupported      : every construct that is not supported or not valid
     """
 
@@ -72,6 +73,7 @@ class ProgramInfo:
     tools: tuple[int, ...]
     notes: tuple[str, ...]
     expansion: Expansion | None
+    tool_point: ToolPoint | None
     unsupported: Sequence[Fault]
 
 
@@ -123,6 +125,7 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
         tools=tuple(int(event.text[1:]) for event in program.events if event.text[0] == "T"),
         notes=program.notes,
         expansion=program.expansion,
+        tool_point=program.tool_point,
         unsupported=unsupported,
     )
 

@@ -23,9 +23,11 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.job.at_tip import joints_of
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.info import PLACES_SHOWN
 from planner.nc.points import SOURCE, points_file
+from planner.nc.program import ToolPoint
 from planner.report.beside import beside_summary
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
@@ -72,13 +74,15 @@ def write_plan(
     kept = {name for name in (PLANNED, *KEPT) if _is_source(plan, directory / name)}
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
-        trajectory, blocks = plan.trajectory, None
+        trajectory, blocks, joints = plan.trajectory, None, joints_of(plan)
         if isinstance(trajectory, TrajectoryOnDemand):  # evaluated once for both files
             watch = BlockWatch(plan.toolpath)
-            write_trajectory(new / f"trajectory.{file_format}", trajectory.heard_by(watch.take), about)
+            write_trajectory(
+                new / f"trajectory.{file_format}", trajectory.heard_by(watch.take), about, joints
+            )
             blocks = watch.planned(trajectory)
         else:
-            write_trajectory(new / f"trajectory.{file_format}", trajectory, about)
+            write_trajectory(new / f"trajectory.{file_format}", trajectory, about, joints)
         program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
@@ -165,6 +169,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             **optimum_summary(plan.grid, plan.prices),
             "reading": plan.program.reading.changed(),
             "blocks": len(plan.program),
+            "tool_point": _tool_point(plan.program.tool_point),
             "grid_points": plan.grid_points,
             "notes": plan.notes,
             "timings_s": plan.timings,
@@ -194,6 +199,7 @@ def info_summary(info: ProgramInfo) -> dict[str, Any]:
     Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
     """
     fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
+    fields["tool_point"] = _tool_point(info.tool_point)
     fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
     fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
     fields["unsupported_places"] = len(info.unsupported)
@@ -217,11 +223,21 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "tolerance_mm": _uniform(plan.toolpath.tolerance),
             "reading": plan.program.reading.changed(),
             "not_limited": _not_limited(plan.verdict) if plan.verdict is not None else [],
-            "units": units(trajectory.axes, extruder=plan.toolpath.extrusion is not None),
+            "units": units(
+                trajectory.axes,
+                extruder=plan.toolpath.extrusion is not None,
+                tip=plan.joints is not None,
+            ),
+            "tool_point": _tool_point(plan.program.tool_point),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),
             "versions": versions(),
         }
     )
+
+
+def _tool_point(point: ToolPoint | None) -> dict[str, Any] | None:
+    """Where the tool centre point is on, and the tool's length; None where x, y and z are those of the joints."""
+    return None if point is None else dataclasses.asdict(point)
 
 
 def versions() -> dict[str, str]:

@@ -31,7 +31,7 @@ SHARE_MIN = 0.005  # constraints that limit a smaller share of the time are show
 
 def profiles_figure(plan: Plan) -> Figure:
     """Feed with the active limit below it, then acceleration and jerk of each moving axis with their limits, over time."""
-    trajectory = plan.trajectory
+    trajectory = plan.trajectory if plan.joints is None else plan.joints
     assert trajectory is not None
     moving = [k for k in range(len(trajectory.axes)) if np.ptp(trajectory.position[:, k]) > 0]
     band = plan.grid is not None and len(plan.grid.t) > 1

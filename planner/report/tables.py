@@ -149,6 +149,10 @@ def info_table(info: ProgramInfo) -> Group:
         table.add_row("other words", _counts(info.events))
     if info.expansion is not None:
         table.add_row("expanded", _expanded(info.expansion))
+    if (point := info.tool_point) is not None:
+        table.add_row(
+            "tool centre point", f"on by {point.word}, line {point.line}; a tool of {point.length:g} mm"
+        )
     notes = [Text(f"note: {note}") for note in info.notes]
     if not info.unsupported:
         return _titled(title, table, *notes, Text("every construct is supported", style="green"))
@@ -213,6 +217,9 @@ def _add_verdict(table: Table, verdict: Verdict) -> None:
         free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
         table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
     table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
+    if verdict.linear_error_mm is not None:
+        both = f"{verdict.linear_error_mm / MICROMETRE:.3f} µm in linear axes, {verdict.angle_error_deg:.4g}° in rotary ones"
+        table.add_row("of it", both)
     table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
     if (after := verdict.after_filters) is not None:
         table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))

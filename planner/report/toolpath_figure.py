@@ -17,7 +17,9 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.chords import points_on
+from planner.job.at_tip import directions_of
 from planner.machine import LINEAR_AXES
+from planner.motion.trajectory import Trajectory
 from planner.nc.program import Kind
 
 if TYPE_CHECKING:
@@ -27,12 +29,16 @@ PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are no more
 DENSE = 60_000  # points from which on thick lines would hide each other
 FLAT = 0.12  # third extent over the largest below which a path is shown from the side it is thinnest on
+TOOLS, TOOL_SHARE = 240, 0.12  # places at which the tool is drawn; its length, of the largest extent [-]
+TOOL = "#D55E00"
 GREY, LIGHT = "#8c8c8c", "#b5b5b5"
 DASHED = (0, (3, 2))  # of a line: from its start, 3 widths drawn and 2 not
 
 
 def toolpath_figure(plan: Plan) -> Figure:
-    """The motion coloured by feed over the programmed path; rapids are dashed."""
+    """The motion coloured by feed over the programmed path; rapids are dashed. Of a program with the tool centre point on the motion is
+    that of the tip, and the tool's direction is drawn at places of its
+    feed moves."""
     trajectory = plan.trajectory
     assert trajectory is not None
     linear = [k for k, axis in enumerate(trajectory.axes) if axis in LINEAR_AXES]
@@ -57,6 +63,9 @@ def toolpath_figure(plan: Plan) -> Figure:
     if moving.any():
         line.set_clim(0.0, float(feed[1:][moving].max()))
     axes.add_collection(line)
+    tools = _tools(plan, trajectory, linear)
+    if tools is not None:
+        axes.add_collection(make([*tools[:, :, shown]], colors=TOOL, linewidths=0.4, alpha=0.6, zorder=2.5))
     start: Any = {"marker": "o", "markersize": 7, "markerfacecolor": "white", "zorder": 5}
     end: Any = {"marker": "s", "markersize": 4, "markerfacecolor": "black", "zorder": 5}
     axes.plot(*points[:1].T, color="black", linestyle="", **start)
@@ -68,13 +77,15 @@ def toolpath_figure(plan: Plan) -> Figure:
     ]
     if rapid.any():
         handles.append(Line2D([], [], color=GREY, linewidth=0.8, linestyle=DASHED, label="rapid"))
+    if tools is not None:
+        handles.append(Line2D([], [], color=TOOL, linewidth=0.8, label="tool"))
     legend: Any = {"handles": handles, "ncols": len(handles), "columnspacing": 1.6}
     if view is not None:
         _flat_axes(axes, [names[k] for k in shown], _unseen(names, motion, shown))
         figure.legend(loc="outside upper center", **legend)
         bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.02)
     else:
-        _solid_axes(axes, names, motion)
+        _solid_axes(axes, names, motion if tools is None else np.vstack([motion, tools[:, 1]]))
         figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
         bar = figure.colorbar(line, cax=figure.add_axes((0.95, 0.22, 0.02, 0.5)))
     bar.set_label("feed [mm/s]")
@@ -129,6 +140,22 @@ def _programmed(plan: Plan, linear: list[int]) -> FloatArray:
     points = np.concatenate([piece for _, piece in pieces])[order]
     points = np.vstack([points, path.end[-1:]])[:, linear]
     return points[one_per_pixel(points)]
+
+
+def _tools(plan: Plan, trajectory: Trajectory, linear: list[int]) -> FloatArray | None:
+    """(n, 2, 3) the tip and a point on the tool on feed moves, at places that are as far from each other along the path; None without
+    a tool's direction."""
+    if plan.joints is None:
+        return None
+    at = np.searchsorted(trajectory.s, np.linspace(0.0, float(trajectory.s[-1]), TOOLS))
+    places = trajectory.rows(np.unique(np.minimum(at, len(trajectory) - 1)))
+    places = places.rows(np.flatnonzero(plan.program.kind[places.block] != Kind.RAPID))
+    directions = directions_of(plan, places)
+    if directions is None:
+        return None
+    tip = places.position[:, linear]
+    length = TOOL_SHARE * float(np.ptp(trajectory.position[:, linear], axis=0).max())
+    return np.stack([tip, tip + length * directions], axis=1)
 
 
 def _unseen(names: list[str], motion: FloatArray, shown: list[int]) -> str:

@@ -6,6 +6,9 @@ A trajectory file is a table, one row per sample:
     of an extruder  e [mm of filament] ve ae je,
     line (of the NC program), block (its index; several blocks can come from one line)
 
+Of a program with the tool centre point on, the axes are the joints, s and feed are those of the tip, and its place follows as
+tip_x, tip_y, tip_z [mm].
+
 as Parquet (`.parquet`), CSV (`.csv`: one header line, shortest digits that read back to the same float64) or
 NumPy (`.npz`: one array per column). Metadata (machine, tolerance, units, versions, `run_id`) is in the
 Parquet schema under the key `planner`, in the NPZ array `metadata`, and for CSV, which has no place for it,
@@ -15,24 +18,33 @@ in `trajectory.meta.json` beside it; always as JSON.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import Array
-from planner.machine import EXTRUDER, ROTARY_AXES
+from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.trajectory_reader import CSV_METADATA, FORMATS, Format, read_trajectory
 
 __all__ = ["FORMATS", "Format", "read_trajectory", "units", "write_trajectory"]
 
+Joints = Callable[[Trajectory], Trajectory]
+TIP = "tip_"  # before the names of the columns of the tool's tip
 ROW_GROUP = 2**20  # samples in memory while a file is written: 138 MB with three axes
 
 
-def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, Any] | None = None) -> None:
+def write_trajectory(
+    path: str | Path,
+    trajectory: Trajectory,
+    about: dict[str, Any] | None = None,
+    joints_of: Joints | None = None,
+) -> None:
     """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its metadata.
+
+    joints_of : the joints of a motion of the tip, of any of its samples; None where the trajectory is that of the axes
 
     Raises InputError for another suffix.
     """
@@ -40,28 +52,33 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, about: dict[str, 
     text = json.dumps(about or {}, allow_nan=False)
     match path.suffix:
         case ".parquet":
-            _write_parquet(path, trajectory, text)
+            _write_parquet(path, _groups(trajectory, joints_of), text)
         case ".csv":
-            _write_csv(path, trajectory)
+            _write_csv(path, _groups(trajectory, joints_of))
             path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
         case ".npz":
-            np.savez(path, metadata=np.array(text), allow_pickle=False, **trajectory_columns(trajectory))
+            columns = trajectory_columns(trajectory, joints_of)
+            np.savez(path, metadata=np.array(text), allow_pickle=False, **columns)
         case _:
             raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
 
 
-def units(axes: tuple[str, ...], *, extruder: bool = False) -> dict[str, str]:
-    """The unit of every column, by its name; `extruder`: there are columns of one."""
+def units(axes: tuple[str, ...], *, extruder: bool = False, tip: bool = False) -> dict[str, str]:
+    """The unit of every column, by its name; `extruder`: there are columns of one; `tip`: there are those of the tool's tip."""
     said = {"t": "s"}
     for axis in (*axes, EXTRUDER) if extruder else axes:
         length = "deg" if axis in ROTARY_AXES else "mm"
         for prefix, per in zip(("", "v", "a", "j"), ("", "/s", "/s2", "/s3"), strict=True):
             said[prefix + axis] = length + per
-    return said | {"s": "mm", "feed": "mm/s", "line": "1", "block": "1"}
+    said |= {"s": "mm", "feed": "mm/s", "line": "1", "block": "1"}
+    return said | ({TIP + axis: "mm" for axis in LINEAR_AXES} if tip else {})
 
 
-def trajectory_columns(trajectory: Trajectory) -> dict[str, Array]:
-    """The columns of a trajectory file by their names, each (T,)."""
+def trajectory_columns(trajectory: Trajectory, joints_of: Joints | None = None) -> dict[str, Array]:
+    """The columns of a trajectory file by their names, each (T,); `joints_of` as in `write_trajectory`."""
+    if joints_of is not None:
+        tip = {TIP + axis: trajectory.position[:, trajectory.axes.index(axis)] for axis in LINEAR_AXES}
+        return trajectory_columns(joints_of(trajectory)) | tip
     columns: dict[str, Array] = {"t": trajectory.t}
     for k, axis in enumerate(trajectory.axes):
         unit = trajectory.in_degrees[k] if axis in ROTARY_AXES else None
@@ -83,12 +100,12 @@ def trajectory_columns(trajectory: Trajectory) -> dict[str, Array]:
     }
 
 
-def _groups(trajectory: Trajectory) -> Iterator[dict[str, Array]]:
+def _groups(trajectory: Trajectory, joints_of: Joints | None) -> Iterator[dict[str, Array]]:
     """The columns of `ROW_GROUP` samples at a time."""
     parts: list[dict[str, Array]] = []
     count = 0
     for chunk in trajectory.chunks():
-        columns, done = trajectory_columns(chunk), 0
+        columns, done = trajectory_columns(chunk, joints_of), 0
         while done < len(chunk):
             new = min(ROW_GROUP - count, len(chunk) - done)
             parts.append({name: column[done : done + new] for name, column in columns.items()})
@@ -120,11 +137,11 @@ def _table(columns: dict[str, Array]) -> Any:
     )
 
 
-def _write_parquet(path: Path, trajectory: Trajectory, text: str) -> None:
+def _write_parquet(path: Path, groups: Iterator[dict[str, Array]], text: str) -> None:
     from pyarrow import parquet
 
     writer = None
-    for columns in _groups(trajectory):
+    for columns in groups:
         table = _table(columns).replace_schema_metadata({"planner": text})
         if writer is None:
             # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its fastest level
@@ -143,11 +160,11 @@ def _write_parquet(path: Path, trajectory: Trajectory, text: str) -> None:
     writer.close()
 
 
-def _write_csv(path: Path, trajectory: Trajectory) -> None:
+def _write_csv(path: Path, groups: Iterator[dict[str, Array]]) -> None:
     from pyarrow import csv
 
     with path.open("wb") as file:
-        for n, columns in enumerate(_groups(trajectory)):
+        for n, columns in enumerate(groups):
             if n == 0:
                 file.write((",".join(columns) + "\n").encode())  # pyarrow would put the names in quotes
             csv.write_csv(_table(columns), file, csv.WriteOptions(include_header=False, batch_size=65536))

@@ -13,7 +13,7 @@ angles change, d(direction)^2 = d(tilt)^2 + sin(tilt)^2 d(c)^2, so that the tole
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -67,12 +67,14 @@ class JointVerdict:
         contour = self.tip.contour
         more = self.tip_error_mm - (self.tip.contour_error_mm or 0.0) if known else 0.0
         value = contour.value + more
+        linear = self.tip.linear_error_mm
         return dataclasses.replace(
             self.tip,
             passed=self.passed,
             limits=self._of_joints_and_tip(),
             contour=dataclasses.replace(contour, value=value, ratio=contour.ratio + more / contour.limit),
             contour_error_mm=self.tip_error_mm if known else None,
+            linear_error_mm=None if linear is None else linear + more,
             faults=self.faults,
         )
 
@@ -91,12 +93,14 @@ def verify_joints(
     tool_length: float | None = None,
     given: Given | None = None,
     not_limited: tuple[str, ...] = (),
+    progress: Callable[[float], None] | None = None,
 ) -> JointVerdict:
     """Judge setpoints of the joints against a path of the tip and a machine with a table [kinematics].
 
     tool_length : [mm]; None for that of the machine file
     given       : which columns were delivered; None for all
     not_limited : quantities that are not judged, such as "jerk"
+    progress    : called now and then with the fraction done (0 to 1)
 
     Raises InputError for a machine without kinematics, and as `verify` does.
     """
@@ -113,6 +117,7 @@ def verify_joints(
         _of_tip(machine),
         given=dataclasses.replace(given, columns=()),
         not_limited=(*not_limited, NORMAL_NAME),
+        progress=progress,
     )
     gap = max((carried.gap(part) for part in _overlapping(setpoints, 1)), default=0.0)
     limits = _joint_checks(setpoints, machine, given, not_limited)

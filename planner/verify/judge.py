@@ -9,7 +9,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
-from planner.machine import LINEAR_AXES, Machine
+from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
 from planner.verify.exact import exact_faults
@@ -101,6 +101,7 @@ def verify(
     notes += extruder.notes
     after = after_filters(trajectory, motion, toolpath, machine, pieces)
     faults += after.faults if after is not None else ()
+    linear_error, angle_error = _both_errors(apart, toolpath)
     corners = error_allocation.check_corners(
         trajectory,
         looks,
@@ -121,6 +122,8 @@ def verify(
         corners=corners,
         vertex=apart.vertex_check(toolpath),
         contour_error_mm=contour_error,
+        linear_error_mm=linear_error,
+        angle_error_deg=angle_error,
         vertex_error_mm=vertex_error,
         end_error_mm=end_error,
         chord_error_mm=findings.largest_chord_error(looks),
@@ -133,6 +136,15 @@ def verify(
         notes=tuple(notes),
         after_filters=after,
     )
+
+
+def _both_errors(apart: contour.Apart, toolpath: Toolpath) -> tuple[float | None, float | None]:
+    """The parts of the contour error in linear axes [mm] and in rotary ones [deg]; None without rotary axes, and where it is not
+    known."""
+    if not apart.fits or not set(toolpath.axes) & set(ROTARY_AXES):
+        return None, None
+    linear, rotary = np.max([look.seen.apart for look in apart.looks], axis=0)
+    return float(linear), float(np.rad2deg(rotary / toolpath.radius))
 
 
 def _check_input(trajectory: Trajectory, toolpath: Toolpath, not_limited: tuple[str, ...]) -> None:

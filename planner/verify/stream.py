@@ -13,6 +13,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.motion.trajectory import Trajectory
+from planner.verify.axes_apart import both_apart
 from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
 from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
 from planner.verify.own import OwnSeen, SampleBlock
@@ -49,6 +50,7 @@ class Observed:
     """What a motion showed: R = GROUPS A + ROWS_ALONE rows as in `limits`, and the state of the matching.
 
     worst (R, 4); time (R,) [s]; at (R, A) [mm]; piece (R,)
+    apart (2,) largest distance of linear and of rotary axes from the path [mm] (axes_apart.py)
     """
 
     worst: FloatArray
@@ -57,6 +59,7 @@ class Observed:
     piece: Array
     match: Match
     own: OwnSeen = field(default_factory=lambda: OwnSeen((), ()))
+    apart: FloatArray = field(default_factory=lambda: np.zeros(2))
     samples: int = 0
     first: FloatArray = field(default_factory=lambda: np.empty(0))  # (A,) first and last position
     last: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -123,6 +126,7 @@ def _block(
     piece = np.zeros(len(t), dtype=np.int64)
     at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
     match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Located(piece, feed_max))
+    seen.apart = np.maximum(seen.apart, both_apart(pieces, piece[skip:], position[skip:], limits.axes))
     block = SampleBlock(
         t=t,
         position=position,

@@ -75,6 +75,9 @@ class Verdict:
     corners          : eq. 18-20 at the programmed corners
     contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if the
                        motion could not be followed
+    linear_error_mm  : of programs that move rotary axes: the linear part of the contour error, at the samples [mm]; with the tool
+                       centre point on it is that of the tip. None for other programs, and as for contour_error_mm
+    angle_error_deg  : its rotary part [deg]; the tool's direction is off by no more
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
     lost_after       : NC line of the last block along which the motion could be followed; None if it follows the whole program
     end_error_mm     : distance of the first sample from the start of the program, or of the last from its end, the larger one [mm]
@@ -101,6 +104,8 @@ class Verdict:
     lost: tuple[int, ...]
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
+    linear_error_mm: float | None = None
+    angle_error_deg: float | None = None
     after_filters: AfterFilters | None = None
     ringing: tuple[Ringing, ...] = ()
     lost_after: int | None = None
@@ -122,6 +127,11 @@ class Verdict:
                 "vertex_error_after_filters_mm": after.vertex_error_mm,
             }
         )
+        if self.linear_error_mm is not None:
+            behind |= {
+                "linear_error_mm": self.linear_error_mm,
+                "angle_error_deg": self.angle_error_deg,
+            }
         return behind | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},

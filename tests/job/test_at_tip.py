@@ -34,6 +34,8 @@ def test_planned_at_the_tip_and_judged_in_the_joints(plan: planner.Plan) -> None
         ratios
     )
     assert max(ratios[name] for name in ratios if not name.startswith("jerk")) == pytest.approx(1.0, abs=1e-3)
+    assert 0.0 < plan.verdict.linear_error_mm <= plan.verdict.contour_error_mm
+    assert 0.0 < plan.verdict.angle_error_deg <= np.rad2deg(MACHINE.tolerance / MACHINE.radius)
     # the setpoints of z move far more than the tip does
     assert plan.joints is not None
     assert plan.trajectory is not None

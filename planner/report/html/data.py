@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
+from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
 from planner.report.block_feeds import planned_blocks
@@ -131,11 +132,12 @@ def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
     if plan.grid is not None and len(plan.grid.t):
         at = np.clip(np.searchsorted(plan.grid.t, shown.t, side="right") - 1, 0, None)
         return _used(plan.grid.active_names, plan.grid.active[at])
+    axes = of_axes(plan, shown)
     names, ratios = [NO_LIMIT], [np.full(len(shown), 0.99)]
     for quantity in ("velocity", "acceleration", "jerk"):
-        of_axes = np.abs(getattr(shown, quantity)) / plan.machine.limits(quantity, shown.axes)
+        share = np.abs(getattr(axes, quantity)) / plan.machine.limits(quantity, shown.axes)
         names += [f"{quantity}.{axis}" for axis in shown.axes]
-        ratios += list(of_axes.T)
+        ratios += list(share.T)
     names.append("feed")
     ratios.append(shown.feed / plan.program.feed[shown.block])
     return _used(tuple(names), np.argmax(np.stack(ratios), axis=0))

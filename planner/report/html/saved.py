@@ -12,7 +12,9 @@ from typing import Any
 from planner.base.errors import InputError
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
+from planner.job.at_tip import Judged, chain_of, judged
 from planner.job.plan import Plan
+from planner.kinematics.setpoints import tip_of_setpoints
 from planner.machine import machine_from_dict
 from planner.nc.points import are_points
 from planner.nc.reader import load, parse_program
@@ -20,7 +22,7 @@ from planner.nc.reading import Reading
 from planner.report.export import json_ready, program_file
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
-from planner.verify import verify
+from planner.verify.axes import fit_axes
 from planner.verify.judge import NOT_LIMITED_NAMES
 
 
@@ -54,7 +56,11 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
             f"the program has {len(program):,} blocks now, and had {summary['blocks']:,} when it was planned; plan again",
             source=source,
         )
-    verdict = verify(read.trajectory, toolpath, machine, given=read.given, not_limited=about.not_limited)
+    motion, given, _ = fit_axes(read.trajectory, read.given, toolpath)
+    how = Judged(
+        program=program, toolpath=toolpath, machine=machine, given=given, not_limited=about.not_limited
+    )
+    chain = chain_of(program, machine)
     stop_time = summary.get("stop_time_s")
     plan = Plan(
         method=summary["method"],
@@ -65,8 +71,9 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         toolpath=toolpath,
         status=Status[summary["status"]],
         sentence=summary["sentence"],
-        trajectory=read.trajectory,
-        verdict=verdict,
+        trajectory=motion if chain is None else tip_of_setpoints(motion, chain),
+        joints=None if chain is None else motion,
+        verdict=judged(motion, how),
         rounded=None,
         grid=None,
         stop_time=math.inf if stop_time is None else stop_time,

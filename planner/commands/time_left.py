@@ -1,11 +1,11 @@
 """How much time a plan still needs, from what it has told of itself so far.
 
-Nobody knows beforehand how many rounds a spline gets, or whether a verdict asks for another one. So the time left is the sum of what is
-still expected, counted in a unit that this job has measured itself: one grid and one solve on it (the last ones of the rounds),
+Nobody knows beforehand how many rounds a spline gets, or whether a verdict asks for another one. The time left is the sum of what is
+still most likely, counted in a unit that this job has measured itself: one grid and one solve on it (the last ones of the rounds),
 
     rounds     those that the effort allows, fewer as soon as their gains fall; each as long as the last one
     after      final grid, single corners, tightening:  AFTER units; on corners alone a share of their solve
-    verdict    samples times SAMPLE seconds, at the speed of this machine, which the first solve tells; of four jobs one gets another
+    verdict    samples times SAMPLE seconds, at the speed of this machine, which the first solve tells
     prices     PRICES units
     files      samples times WRITTEN seconds, if any are written
 
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from planner.optimal.effort import Search
 
 ROUND = 4.5  # of the first round, in units
-AFTER, PRICES = 4.5, 1.5  # in units
+AFTER, PRICES = 4.5, 2.5  # in units
 FINAL_AFTER = 2.0  # what comes after the final grid, over that, as soon as it is solved [-]
 MORE_ROUNDS = 1.5  # rounds that there are, over those by which gains would fall to `ENOUGH` [-]
 IN_VAIN = 5, 3.0  # after so many rounds there are so many more: that gain too little before they are given up
 AFTER_CORNERS, PRICES_CORNERS = 0.3, 0.6  # where there are no splines, of the one solve
 POINT = 0.85e-6  # of a grid point and an iteration of the solver, on the machine where the others were measured [s]
-SAMPLE = 3.2e-6  # of a sample in a verdict [s]
+SAMPLE = 4e-6  # of a sample in a verdict [s]: 2.4e-6 to 6.6e-6
 WRITTEN = 1.5e-6  # of a sample in the files [s]
-AGAIN = 0.25  # further verdicts to be expected
+LEAST_WORK = 0.02  # that tells the speed of a machine [s]
 SPEED = (0.2, 20.0)  # how slow a machine may be, against that one [-]
 SLOWER = 1.2  # cycle time over that at the programmed feed, as long as nothing else is known [-]
 RIVAL = 0.5  # further verdicts of other plans on corners alone
@@ -93,7 +93,6 @@ class TimeLeft:
     _round: float = math.nan
     _gains: list[float] = field(default_factory=list)
     _slower: bool = False  # the last round as a whole
-    _verdicts: int = 0
     _told: float = 0.0  # when something was told last
     _search: SearchLeft | None = None  # where the plan goes that way
 
@@ -113,8 +112,6 @@ class TimeLeft:
             if name == "sample":
                 self._began.pop("verify", None)  # there is another one to come
                 self._go(DELIVER, now)
-            elif name == "verify":
-                self._verdicts += 1
             elif name == "report" and self._phase == DELIVER:
                 self._go(REPORT, now)
             elif name == "write":
@@ -132,9 +129,9 @@ class TimeLeft:
             if self.searched and steps <= self._dial().steps_max:
                 self._search = SearchLeft(_since=now)
         elif step.name == "splines":
-            self._splines = bool(step.facts.get("runs"))
             if self._search is not None and self._search.phase == BEGUN:
                 self._without_search(now)
+            self._splines = bool(step.facts.get("runs"))
         elif step.name == "search" and self._search is not None:
             self._search.step(step)
             if self._search.in_vain:
@@ -170,17 +167,20 @@ class TimeLeft:
     def _expected(self, now: float) -> float | None:
         write = self._samples() * WRITTEN * self._speed if self.writes else 0.0
         if self._search is not None and "write" not in self._began:
-            return self._search.left(now, write)
+            return self._search.left(now, write, self._verdict_takes())
         if self._phase == DONE:
             return self._running(now, "write", write) + (self._verdict(now) if self._plans == 1 else 0.0)
         unit, later = self._unit, write + self._verdict(now)
         if self._phase == BEGIN and self.solves:
             share = self._share if self._now_in == "solve" else 0.0
-            if share < SHARE_TOLD:
+            if share >= SHARE_TOLD:
+                solve = (now - self._began["solve"]) / share
+                unit = solve + self._grid
+                later += solve * (1.0 - share)
+            elif math.isnan(unit):
                 return None
-            solve = (now - self._began["solve"]) / share
-            unit = solve + self._grid
-            later += solve * (1.0 - share)
+            else:  # begun anew
+                later += self._rest(now - self._since, unit)
         elif not self.solves or self._plans:
             return later
         prices = (PRICES if self._splines else PRICES_CORNERS) * unit
@@ -203,8 +203,8 @@ class TimeLeft:
         return EFFORTS[self.effort].search
 
     def _without_search(self, now: float) -> None:
-        """The plan begins anew, and there is no search in it."""
-        self._search = None
+        """The plan begins anew, and there is no search in it: on splines, until it tells that it has none."""
+        self._search, self._splines = None, True
         self._go(BEGIN, now)
 
     def _go(self, phase: int, now: float) -> None:
@@ -221,9 +221,10 @@ class TimeLeft:
         seconds = now - self._began.get("solve", now)
         self._unit = seconds + self._grid
         self._points = int(step.facts.get("points") or 0)
-        work = self._points * int(step.facts.get("iterations") or 1) * POINT
+        solved = self._points - int(step.facts.get("held") or 0)
+        work = solved * int(step.facts.get("iterations") or 1) * POINT
         if self._phase == BEGIN:
-            if work > 0.0:
+            if work > LEAST_WORK:
                 self._speed = math.sqrt(min(max(seconds / work, SPEED[0]), SPEED[1]))
             self._go(ROUNDS if self._splines else FINISH, now)
 
@@ -258,21 +259,21 @@ class TimeLeft:
     def _samples(self) -> float:
         return self._cycle_time / self._dt
 
+    def _verdict_takes(self) -> float:
+        """Time of a verdict [s]."""
+        found = self._verdict_took
+        return self._samples() * SAMPLE * self._speed if math.isnan(found) else found
+
     def _verdict(self, now: float) -> float:
         """What is left of verdicts."""
-        each = self._samples() * SAMPLE * self._speed
-        if not math.isnan(self._verdict_took):
-            each = self._verdict_took
-        again = AGAIN if self.solves and not self._plans else 0.0
+        each = self._verdict_takes()
         rivals = RIVAL * each if self.solves and not self._splines and self._plans < 2 else 0.0
         if self._phase < DELIVER:
-            return (1.0 + again) * each + rivals
+            return each + rivals
         if self._phase > DELIVER:
             return rivals
         here = self._running(now, "verify", each)
-        if self._now_in == "verify":
-            each = now - self._began["verify"] + here
-        return here + again ** max(self._verdicts, 1) * each + (0.0 if self._plans else rivals)
+        return here + (0.0 if self._plans else rivals)
 
     def _running(self, now: float, stage: str, expected: float) -> float:
         """What is left of a stage of which so much time was expected, from the time or the share that it has had."""

@@ -36,8 +36,8 @@ from planner.tube.splice import Spliced, SplicedRun
 START_PERIOD, START_SAMPLES = 0.02, 200_000
 # Times nearer to each other than this share of a leg's mean time are one [-].
 LEAST_APART = 1e-6
-# What a search in long steps takes of one that goes on in shorter ones [-].
-FIRST_SEARCH = 0.3
+# What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each other [-].
+SEARCHES = (1.0, 1.2, 2.3)
 # Share of the time without prices from which that is said, and from which those of the start say more [-].
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
 
@@ -127,8 +127,8 @@ def solver_of(dial: Search, report: Callable[[float], None], *, divide: bool) ->
     """The search as the effort has it; `divide` windows that fail."""
     if not dial.finer:
         return TubeOwn(dial.gap, divide=divide, progress=report)
-    ends = np.linspace(FIRST_SEARCH, 1.0, len(dial.finer) + 1).tolist()
-    parts = [_part(report, *own) for own in pairwise([0.0, *ends])]
+    ends = np.cumsum([0.0, *SEARCHES[: len(dial.finer) + 1]])
+    parts = [_part(report, *own) for own in pairwise((ends / ends[-1]).tolist())]
     return InTwo(
         TubeOwn(dial.gap, divide=False, progress=parts[0]),
         tuple(

@@ -47,7 +47,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.names import AUTO, NORMAL, QUICK, SPLINE
-from planner.base.threads import beside
+from planner.base.threads import beside, threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.job.job import Delivered, Job
@@ -148,7 +148,7 @@ def plan_on_path(job: Job, settings: Settings) -> Plan:
         not_limited = () if settings.order.jerk_limited else ("jerk",)
         if not (settings.order.jerk_limited and settings.priced):
             made = _delivered(job, motion, not_limited)
-        elif len(best.samples) > PRICED_BESIDE:
+        elif len(best.samples) > PRICED_BESIDE and threads() > 1:
             made, prices = beside(
                 lambda: _delivered(job, motion, not_limited), lambda: prices_of(best, job.machine)
             )

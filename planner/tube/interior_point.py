@@ -122,9 +122,9 @@ def _predicted(on, slacks, along, dual, second):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def solve_window(legs, limits, x, u, place, tuning):
+def solve_window(legs, limits, x, u, place, tuning, at):
     """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns whether it has been
-    reached, the iterations, and the multipliers (N, R) of the rows, in units of time."""
+    reached, the iterations, and the multipliers (N, R) of the rows, in units of time. Meanwhile at[0] is the iteration."""
     N, axes = len(u), u.shape[1] - 1
     R, S, C, on = limits.on.shape[1], 3 * axes, axes + 1, limits.on
     many = (N, R)
@@ -148,6 +148,7 @@ def solve_window(legs, limits, x, u, place, tuning):
     rows = _start(on, lin.g, time, tuning, slacks)
     settled, prox, before, close, still = False, tuning.prox, time, 0, 0
     for iteration in range(ITERATIONS):
+        at[0] = iteration
         products, missed, broken = 0.0, 0.0, 0.0
         for i in range(N):
             for r in range(R):

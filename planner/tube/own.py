@@ -42,6 +42,9 @@ JOIN_WITHIN = 40
 TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
 # The most that rows may be missed by [-].
 MISSED_MOST = max(missed for _, missed in TRIES)
+# Iterations of a window, about, and the share of its work that is told to be done at most before all of it is [-].
+USUAL, NEARLY = 25.0, 0.9
+QUIET = 200  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-]: of any motion, and of one that is an optimum of longer
 # steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
 # and 0.01 693 and 364.
@@ -104,6 +107,17 @@ class TubeOwn:
             kept=search.kept,
             price=search.price,
         )
+
+
+class _Count:
+    """Of a window: its steps, whether it was solved at once, iterations so far, that of the present solve, and whether all is over."""
+
+    def __init__(self, steps: int):
+        self.steps, self.solved, self.iterations, self.at, self.over = steps, False, 0, np.zeros(1), False
+
+    def share(self) -> float:
+        """Of its work that is done, about [-]."""
+        return 1.0 if self.over else min(float(self.at[0]) / USUAL, NEARLY)
 
 
 class _Cut:
@@ -180,28 +194,27 @@ class _Search:
         """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are of no use, the first one
         that fails ends the search."""
 
-        done = [self._done]
+        def improve(lo: int, hi: int, count: _Count) -> None:
+            count.solved = self._improve(lo, hi, count)
+            self._stopped |= not (parts or count.solved)
+            count.over = True
 
-        def improve(lo: int, hi: int, count: list[int]) -> None:
-            count[0] = self._improve(lo, hi, count)
-            self._stopped |= not (parts or count[0])
-            done[0] += hi - lo
-
-        counts = [[0, 0] for _ in begin]  # of windows: solved at once, iterations
+        counts = [_Count(hi - lo) for lo, hi in zip(begin, end, strict=True)]
         work = [partial(improve, *one) for one in zip(begin, end, counts, strict=True)]
-        if len(work) > 1:
-            side_by_side(work, self._stop, lambda: self._tell(done[0]))
+        if sum(count.steps for count in counts) > QUIET:
+            side_by_side(work, self._stop, lambda: self._tell(counts))
         else:
             for one in work:
                 one()
-        self._done = done[0]
-        self._tell(self._done)
+        self._done += sum(count.steps for count in counts)
+        self._tell([])
         self.windows += len(counts)
-        self.solved += sum(count[0] for count in counts)
-        self.iterations += sum(count[1] for count in counts)
+        self.solved += sum(count.solved for count in counts)
+        self.iterations += sum(count.iterations for count in counts)
 
-    def _tell(self, done: int) -> None:
+    def _tell(self, running: list[_Count]) -> None:
         if self.settings.progress is not None:
+            done = self._done + sum(count.steps * count.share() for count in running)
             self.settings.progress(min(done / self._all, 1.0))
 
     def _stop(self) -> None:
@@ -213,9 +226,9 @@ class _Search:
         begin = max(near - JOIN_WITHIN, 0)
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
-    def _improve(self, lo: int, hi: int, count: list[int], tries: Tries = TRIES) -> bool:
+    def _improve(self, lo: int, hi: int, count: _Count, tries: Tries = TRIES) -> bool:
         """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found.
-        Whether it did not fail; count[1] takes the iterations."""
+        Whether it did not fail; `count` takes the iterations."""
         if self._improved(lo, hi, count, tries):
             return True
         if hi - lo < 2 * LEAST or not self.settings.divide:
@@ -230,7 +243,7 @@ class _Search:
             self._improved(lo, hi, count, tries)
         return False
 
-    def _improved(self, lo: int, hi: int, count: list[int], tries: Tries) -> bool:
+    def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it takes their place."""
         first = NEAR if self.settings.near else FAR
         watched = bool(np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any())
@@ -242,9 +255,9 @@ class _Search:
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
                 tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least, *first)
                 done, iterations, z = solve_window(
-                    window.legs, window.limits, window.x, window.u, window.place, tuning
+                    window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
                 )
-                count[1] += iterations
+                count.iterations += iterations
                 if not done:
                     break
                 if self._taken(lo, hi, window, tight):

@@ -28,6 +28,7 @@ from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
 WHOLE = Given()
+READING = 0.85  # share of a verdict's time that the first reading takes, about [-]
 
 
 def verify(
@@ -67,7 +68,7 @@ def verify(
         acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
         cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
     reader = Reader(trajectory, motion, limits, given, dt=machine.dt, cells=cells, seed=seed)
-    looks = reader.read(pieces, progress or (lambda done: None))
+    looks = reader.read(pieces, lambda done: None if progress is None else progress(READING * done))
     apart = contour.apart(looks, pieces, reader.read)
     contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
     checks = findings.limit_checks(looks, toolpath, machine, pieces, not_limited)
@@ -112,6 +113,8 @@ def verify(
         judged="acceleration" not in not_limited,
     )
     faults += error_allocation.faults(corners, toolpath.axes)
+    if progress is not None:
+        progress(1.0)
     return Verdict(
         passed=not faults,
         limits=checks,

@@ -237,11 +237,9 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     """The motion of the start between two windows that were found: verified, nothing jumps, and it is said."""
     asked = own.solve_window
 
-    def hasty(legs, limits, x, u, place, tuning):
+    def hasty(legs, limits, x, u, *more):
         return (
-            (False, 0, None)
-            if x[0].any() and abs(x[-1, 2:]).max() > 0
-            else asked(legs, limits, x, u, place, tuning)
+            (False, 0, None) if x[0].any() and abs(x[-1, 2:]).max() > 0 else asked(legs, limits, x, u, *more)
         )
 
     monkeypatch.setattr(own, "solve_window", hasty)
@@ -271,10 +269,10 @@ def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
     monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
     windows, asked = [], own.solve_window
 
-    def second_fails(legs, limits, x, u, place, tuning):
+    def second_fails(legs, limits, x, u, *more):
         if not windows or windows[-1] != x[0].tobytes():
             windows.append(x[0].tobytes())
-        return (False, 0, None) if len(windows) == 2 else asked(legs, limits, x, u, place, tuning)
+        return (False, 0, None) if len(windows) == 2 else asked(legs, limits, x, u, *more)
 
     monkeypatch.setattr(own, "solve_window", second_fails)
     use_threads(1)

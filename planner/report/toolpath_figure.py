@@ -17,10 +17,9 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.chords import points_on
-from planner.job.at_tip import directions_of
 from planner.machine import LINEAR_AXES
-from planner.motion.trajectory import Trajectory
 from planner.nc.program import Kind
+from planner.report.tool_lines import TOOL, tool_lines
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -29,8 +28,7 @@ PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are no more
 DENSE = 60_000  # points from which on thick lines would hide each other
 FLAT = 0.12  # third extent over the largest below which a path is shown from the side it is thinnest on
-TOOLS, TOOL_SHARE = 240, 0.12  # places at which the tool is drawn; its length, of the largest extent [-]
-TOOL = "#D55E00"
+TOOLS = 240  # places at which the tool is drawn
 GREY, LIGHT = "#8c8c8c", "#b5b5b5"
 DASHED = (0, (3, 2))  # of a line: from its start, 3 widths drawn and 2 not
 
@@ -63,7 +61,7 @@ def toolpath_figure(plan: Plan) -> Figure:
     if moving.any():
         line.set_clim(0.0, float(feed[1:][moving].max()))
     axes.add_collection(line)
-    tools = _tools(plan, trajectory, linear)
+    tools = tool_lines(plan, TOOLS)
     if tools is not None:
         axes.add_collection(make([*tools[:, :, shown]], colors=TOOL, linewidths=0.4, alpha=0.6, zorder=2.5))
     start: Any = {"marker": "o", "markersize": 7, "markerfacecolor": "white", "zorder": 5}
@@ -140,22 +138,6 @@ def _programmed(plan: Plan, linear: list[int]) -> FloatArray:
     points = np.concatenate([piece for _, piece in pieces])[order]
     points = np.vstack([points, path.end[-1:]])[:, linear]
     return points[one_per_pixel(points)]
-
-
-def _tools(plan: Plan, trajectory: Trajectory, linear: list[int]) -> FloatArray | None:
-    """(n, 2, 3) the tip and a point on the tool on feed moves, at places that are as far from each other along the path; None without
-    a tool's direction."""
-    if plan.joints is None:
-        return None
-    at = np.searchsorted(trajectory.s, np.linspace(0.0, float(trajectory.s[-1]), TOOLS))
-    places = trajectory.rows(np.unique(np.minimum(at, len(trajectory) - 1)))
-    places = places.rows(np.flatnonzero(plan.program.kind[places.block] != Kind.RAPID))
-    directions = directions_of(plan, places)
-    if directions is None:
-        return None
-    tip = places.position[:, linear]
-    length = TOOL_SHARE * float(np.ptp(trajectory.position[:, linear], axis=0).max())
-    return np.stack([tip, tip + length * directions], axis=1)
 
 
 def _unseen(names: list[str], motion: FloatArray, shown: list[int]) -> str:

@@ -14,7 +14,9 @@ from planner.kinematics import kinematics_of
 from planner.machine import load_machine
 from planner.nc.reader import read_program
 from planner.report.block_feeds import planned_blocks
+from planner.report.html.picture import path_picture
 from planner.report.html.saved import saved_plan
+from planner.report.tool_lines import tool_lines
 from planner.report.toolpath_figure import toolpath_figure
 from tests.commands.command_line import run
 
@@ -135,6 +137,10 @@ def test_the_picture_has_the_tool(made: Path) -> None:
     figure = toolpath_figure(plan)
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert "tool" in labels
+    lines = tool_lines(plan, 500)
+    assert 10 < len(lines) <= 500
+    assert np.allclose(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), 0.12 * 52.0, rtol=0.05)
+    assert path_picture(plan, 300.0).count('stroke="#D55E00"') > 5
     places = plan.trajectory.rows(np.array([0, len(plan.trajectory) - 1]))
     begin, end = directions_of(plan, places)
     assert np.allclose(begin, [0.0, 0.0, 1.0])

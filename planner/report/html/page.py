@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import in_degrees
 from planner.report.colours import LOW_TO_HIGH, limit_colours
@@ -68,7 +69,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
     """Columns of numbers by name, and what the page has to know of them."""
     samples = samples_of(plan)
     shown, axes = samples.shown, samples.shown.axes
-    lines = lines_of(plan, samples)
+    lines, joints = lines_of(plan, samples), of_axes(plan, shown)
     scale = in_degrees(axes, plan.toolpath.radius)
     columns: dict[str, Array] = {
         "t": shown.t,
@@ -91,8 +92,8 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         columns["frame"] = program.frame[shown.block].astype(np.int32)
     for k, axis in enumerate(axes):
         columns[axis] = (shown.position[:, k] * scale[k]).astype(np.float32)
-        columns[f"a{axis}"] = (shown.acceleration[:, k] * scale[k]).astype(np.float32)
-        columns[f"j{axis}"] = (shown.jerk[:, k] * scale[k]).astype(np.float32)
+        columns[f"a{axis}"] = (joints.acceleration[:, k] * scale[k]).astype(np.float32)
+        columns[f"j{axis}"] = (joints.jerk[:, k] * scale[k]).astype(np.float32)
     if samples.price is not None:
         columns["price"] = (samples.price * MICROSECONDS_PER_MICROMETRE).astype(np.float32)
     if lines.more_feed is not None and lines.more is not None:

@@ -9,15 +9,18 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.report.colours import CIVIDIS
+from planner.report.tool_lines import TOOL, tool_lines
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
 
+TOOLS = 120  # places at which the tool is drawn
 POINTS = 3000  # of the motion: several for each pixel of its width
 
 
 def path_picture(plan: Plan, size: float) -> str:
-    """The motion seen along its thinnest direction, coloured by feed, as SVG. The plan must have a trajectory.
+    """The motion seen along its thinnest direction, coloured by feed, as SVG, with the tool's direction if it is one of the tip. The
+    plan must have a trajectory.
 
     size : of the longer side [px]
     """
@@ -28,9 +31,12 @@ def path_picture(plan: Plan, size: float) -> str:
     position = shown.position[:, [k for k, axis in enumerate(shown.axes) if axis in LINEAR_AXES]]
     across = np.sort(np.argsort(-np.ptp(position, axis=0), kind="stable")[:2])
     points = position[:, across] * [1.0, -1.0]  # the picture's y goes down
-    extent = np.ptp(points, axis=0)
+    tools = tool_lines(plan, TOOLS)
+    ends = np.zeros((0, 2, 2)) if tools is None else tools[:, :, across] * [1.0, -1.0]
+    everything = np.vstack([points, ends.reshape(-1, 2)])
+    low, extent = everything.min(axis=0), np.ptp(everything, axis=0)
     scale = size / max(float(extent.max()), 1e-9)
-    points = (points - points.min(axis=0)) * scale + 4.0
+    points, ends = ((place - low) * scale + 4.0 for place in (points, ends))
     width, height = extent * scale + 8.0
     asked = np.isfinite(
         plan.program.feed[shown.block]
@@ -38,6 +44,9 @@ def path_picture(plan: Plan, size: float) -> str:
     highest = float(shown.feed[asked].max() if asked.any() else shown.feed.max())
     colour = np.minimum(shown.feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
     lines = "".join(
+        f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends
+    )
+    lines += "".join(
         f'<polyline points="{_points(points[first : last + 1])}" stroke="{CIVIDIS[colour[first]]}"/>'
         for first, last in _runs(colour)
     )

@@ -37,24 +37,30 @@ class MethodName:
     settings : arguments of the class that the name stands for
     solvers  : names of the solvers that it can use, the default first; empty where it has no choice
     shapes   : whether it takes a geometry, a corner shape, an effort, rounds of reshaping, and `shaped`
+    joints   : whether it keeps limits of joints, and others that are functions of the place
     """
 
     home: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     solvers: tuple[str, ...] = ()
     shapes: bool = False
+    joints: bool = False
 
 
 METHODS: dict[str, MethodName] = {
     OPTIMAL: MethodName(
         home="planner.methods.optimal:OptimalMethod",
         shapes=True,
+        joints=True,
         solvers=("own", "ipopt", "fatrop", "sequential-convex"),
     ),
     SECOND_ORDER: MethodName(
-        home="planner.methods.second_order:SecondOrderMethod", shapes=True, solvers=("reachability", "toppra")
+        home="planner.methods.second_order:SecondOrderMethod",
+        shapes=True,
+        joints=True,
+        solvers=("reachability", "toppra"),
     ),
-    "bezier": MethodName(home="planner.methods.bezier:BezierMethod"),
+    "bezier": MethodName(home="planner.methods.bezier:BezierMethod", joints=True),
     "kinematic": MethodName(home="planner.methods.kinematic:KinematicMethod"),
     "fir": MethodName(home="planner.methods.fir:FirMethod"),
     "fir-plain": MethodName(home="planner.methods.fir:FirMethod", settings={"plain": True}),
@@ -62,7 +68,9 @@ METHODS: dict[str, MethodName] = {
     "fir-spline-plain": MethodName(
         home="planner.methods.fir_spline:FirSplineMethod", settings={"plain": True}
     ),
-    "tube": MethodName(home="planner.methods.tube:TubeMethod", solvers=("own", "ipopt", "fatrop")),
+    "tube": MethodName(
+        home="planner.methods.tube:TubeMethod", joints=True, solvers=("own", "ipopt", "fatrop")
+    ),
     "stop": MethodName(home="planner.methods.stop:StopMethod"),
 }
 # Names of earlier versions, which keep working.

@@ -14,7 +14,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.job.plan import Plan
 from planner.kinematics import Chain, at_tip, kinematics_of
 from planner.kinematics.along_path import in_rad
-from planner.kinematics.limits import LinearJoint
+from planner.kinematics.limits import WIDE, LinearJoint
 from planner.kinematics.setpoints import joint_setpoints
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
@@ -85,12 +85,17 @@ def judged(setpoints: Trajectory, job: Judged) -> Verdict:
     return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how).verdict()  # type: ignore[arg-type]
 
 
-def planned(program: Program, machine: Machine, plan_on: Callable[[Program, Machine], Plan]) -> Plan:
-    """The plan of a program by `plan_on`, through the kinematics where its tool centre point is on."""
+def planned(
+    program: Program, machine: Machine, plan_on: Callable[[Program, Machine], Plan], *, joints: bool = True
+) -> Plan:
+    """The plan of a program by `plan_on`, through the kinematics where its tool centre point is on.
+
+    joints : whether `plan_on` keeps limits of joints; otherwise it is given those of the axes for the tip's coordinates
+    """
     chain = chain_of(program, machine)
     if chain is None:
         return plan_on(program, machine)
-    return in_joints(plan_on(program, at_tip(machine, chain)), machine, chain)
+    return in_joints(plan_on(program, at_tip(machine, chain, wide=WIDE if joints else None)), machine, chain)
 
 
 def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:

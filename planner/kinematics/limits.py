@@ -37,27 +37,30 @@ class LinearJoint(JointLimit):
         return self.kinematics.joints(in_rad(place, self.radius))[self.letter]
 
 
-def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: float = WIDE) -> Machine:
+def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: float | None = WIDE) -> Machine:
     """The machine as it is planned for on paths of the tool's tip: limits of the linear joints through the kinematics, those of the
     rotary ones as they are.
 
     kinematics : None for those of the machine file
-    wide       : limits of the tip's coordinates, of the largest ones of the linear joints (module text) [-]
+    wide       : limits of the tip's coordinates, of the largest ones of the linear joints (module text) [-]; None for those of the
+                 machine, for methods that do not know limits of joints: where the rotary axes stand at 0 they are the same
 
     Raises InputError if it has none, if it lacks one of their axes, and for a factor below 1.
     """
     found = kinematics_of(machine) if kinematics is None else kinematics
-    if not 1.0 <= wide < np.inf:
+    if wide is not None and not 1.0 <= wide < np.inf:
         raise InputError(f"wide = {wide:g}; it must be 1 or more")
     for letter in found.axes:
         machine.limits("velocity", (letter,))
     radius = machine.radius
     linear = [machine.axes[letter] for letter in LINEAR]
-    free = Axis(
-        velocity=wide * max(axis.velocity for axis in linear),
-        acceleration=wide * max(axis.acceleration for axis in linear),
-        jerk=wide * max(axis.jerk for axis in linear),
-    )
-    axes = {letter: free if letter in LINEAR else axis for letter, axis in machine.axes.items()}
+    axes = machine.axes
+    if wide is not None:
+        free = Axis(
+            velocity=wide * max(axis.velocity for axis in linear),
+            acceleration=wide * max(axis.acceleration for axis in linear),
+            jerk=wide * max(axis.jerk for axis in linear),
+        )
+        axes = {letter: free if letter in LINEAR else axis for letter, axis in axes.items()}
     joints = [LinearJoint(letter, machine.axes[letter], found, radius) for letter in LINEAR]
     return machine.model_copy(update={"axes": axes}).with_own([*machine.own, *joints])

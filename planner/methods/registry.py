@@ -89,6 +89,7 @@ def plan(
     that the method does not use.
     """
     given = check_settings(method, **settings)
+    joints = not isinstance(method, str) or METHODS[method_name(method)].joints
     if isinstance(method, str):
         method = make_method(method, **given)
     if not isinstance(machine, Machine):
@@ -104,11 +105,11 @@ def plan(
     if isinstance(program, Program):
         if reading != AS_USUAL:
             raise InputError("reading: the program is read already; give the settings to read_program")
-        return planned(program, machine, on)
+        return planned(program, machine, on, joints=joints)
     stages = Stages(progress)
     with stages.stage("read"):
         program = read_program(program, machine, reading)
-    made = planned(program, machine, on)
+    made = planned(program, machine, on, joints=joints)
     return dataclasses.replace(made, timings=stages.timings | made.timings)
 
 

@@ -69,3 +69,14 @@ def test_setpoints_on_demand_are_those_of_the_whole(plan: planner.Plan) -> None:
     assert isinstance(found.joints, TrajectoryOnDemand)
     assert np.array_equal(found.joints.position, plan.joints.position)
     assert found.verdict.passed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["stop", "kinematic"])
+def test_methods_that_do_not_know_joints_keep_them_where_nothing_turns(method: str) -> None:
+    text = "G21\nM428\nG1 X2 F6000\nX8 Z5\nA1 F60\nA0\nG0 X0 Z0\n"
+    found = planner.plan(parse_program(text, MACHINE), MACHINE, method=method)
+    assert found.verdict is not None
+    still = {name: check for name, check in found.verdict.limits.items() if name[-2:] in (".x", ".z")}
+    assert max(check.ratio for check in still.values()) > 0.99  # of the slower z too
+    assert all(not check.broken for check in still.values()), found.verdict.faults

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import nearest
 from planner.geometry.toolpath import Joint, Toolpath
@@ -47,16 +47,28 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
 
     motion : sampled so often that between samples it runs straight to within the tolerance
+
+    A motion that stands still as often as the path has full stops passes the joints between two of them between its standstills.
     """
-    return passing_times_of([motion], toolpath)
+    stop = np.flatnonzero(toolpath.joint == Joint.STOP)
+    begin, end = _standing(motion)
+    if len(begin) != len(stop) or len(stop) == 2:
+        return passing_times_of([motion], toolpath)
+    times = np.empty(len(toolpath) + 1)
+    for first, last, leaves, arrives in zip(stop[:-1], stop[1:], end[:-1], begin[1:], strict=True):
+        run = slice(leaves, arrives + 1)
+        seen, wanted = _Seen(motion.position[run], motion.s[run], motion.t[run]), _wanted(toolpath, first, last)
+        of_run = times[first : last + 1]
+        of_run[0] = seen.t[0]
+        _pass(seen, wanted, of_run, 1, 0.0, True)
+        of_run[-1] = seen.t[-1]
+    return times
 
 
 def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
     """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one before."""
-    vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
-    times = np.empty(len(vertex))
-    slack = SLACK * np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
-    wanted, seen = _Wanted(vertex, toolpath.length, slack), None
+    times = np.empty(len(toolpath) + 1)
+    wanted, seen = _wanted(toolpath, 0, len(toolpath)), None
     done, share = 1, 0.0
     for chunk in chunks:
         new = _Seen(chunk.position, chunk.s, chunk.t)
@@ -78,14 +90,28 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     motion : sampled at the ends of its pieces too
     times  : (M+1,) when it passes the joints, from `passing_times`
     """
-    still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
-    group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1
-    begin, end = (
-        still[np.searchsorted(group, group, side="left")],
-        still[np.searchsorted(group, group, side="right") - 1],
-    )
-    at = nearest(motion.t[still], times[toolpath.joint == Joint.STOP])
+    begin, end = _standing(motion)
+    stop = times[toolpath.joint == Joint.STOP]
+    if len(begin) == len(stop):
+        return motion.t[begin], motion.t[end]
+    count = end - begin + 1
+    still = np.repeat(end + 1 - np.cumsum(count), count) + np.arange(count.sum())
+    at = np.repeat(np.arange(len(begin)), count)[nearest(motion.t[still], stop)]
     return motion.t[begin[at]], motion.t[end[at]]
+
+
+def _standing(motion: Trajectory) -> tuple[Array, Array]:
+    """(n,) the first and the last sample of each time that the motion stands still."""
+    still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
+    new = np.diff(still) > 1
+    return still[np.append(True, new)[: len(still)]], still[np.append(new, True)[: len(still)]]
+
+
+def _wanted(toolpath: Toolpath, first: int, last: int) -> _Wanted:
+    """The joints from one to another."""
+    vertex = np.vstack([toolpath.start[first:last], toolpath.end[last - 1 : last]])
+    slack = SLACK * np.maximum(toolpath.tolerance[first:last], toolpath.tolerance[first + 1 : last + 1])
+    return _Wanted(vertex, toolpath.length[first:last], slack)
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,265 @@
+"""The jobs of the campaign: from a number a random program, machine, tolerance, interpolation period and method.
+
+Programs of eleven sources: of lines and arcs in three axes (never_slower.py), of up to nine axes (axes_campaign.py), of everything that
+moves in one program and of points on a curve (campaign_programs.py), and those that are compared with LinuxCNC's interpreter: cycles,
+offsets, feed modes, lathe, cutter compensation, splines, and all of these in subprograms, loops and branches (tests/nc/random_nc.py,
+random_splines.py, random_together.py).
+
+A job whose motion would have more than `SAMPLES` samples gets a larger period, and then faster limits and feeds, which make the same
+motion in less time; dwells are cut. So a job is a small one, whatever its program asks for.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks import axes_campaign, never_slower
+from benchmarks.campaign_programs import BLOCKS, dense, mixed
+from planner.base.errors import InputError
+from planner.machine import Axis, Fir, Machine, Mode
+from planner.nc.program import Program
+from planner.nc.reader import parse_program
+
+TESTS = Path(__file__).resolve().parent.parent / "tests" / "nc"
+SAMPLES = 2000  # of a motion from stop to stop, about
+# Of jobs with more axes or blocks than these only a share is planned with effort normal, which takes tens of seconds.
+AXES_OF_NORMAL, BLOCKS_OF_NORMAL, SHARE_OF_NORMAL = 4, 8, 0.1
+PERIOD_MAX = 0.016  # [s]
+DWELL_MAX = 0.05  # [s]
+DRAWS = 60  # of a program until one has few blocks and moves
+VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 2e3, 5e4, 1e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
+STREAM = 41  # of random numbers
+PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004, 0.008, 0.016)  # [s]
+# Methods with their settings, and how often each is drawn.
+METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (
+    (36, "optimal", {"effort": "quick"}),
+    (8, "optimal", {}),
+    (3, "optimal", {"corner": "bezier"}),
+    (3, "optimal", {"corner": "fir"}),
+    (3, "optimal", {"corner": "kinematic"}),
+    (3, "optimal", {"geometry": "spline", "effort": "quick"}),
+    (3, "optimal", {"effort": "quick", "shaped": True}),
+    (6, "second-order", {}),
+    (2, "second-order", {"corner": "bezier"}),
+    (8, "kinematic", {}),
+    (7, "stop", {}),
+    (5, "bezier", {}),
+    (5, "fir", {}),
+    (2, "fir-plain", {}),
+    (3, "fir-spline", {}),
+    (1, "fir-spline-plain", {}),
+    (2, "tube", {}),
+)
+SOURCES = {
+    "lines and arcs": 18,
+    "axes": 14,
+    "mixed": 26,
+    "dense": 10,
+    "compensated": 5,
+    "cycles": 6,
+    "offsets": 4,
+    "feeds": 4,
+    "lathe": 4,
+    "splines": 5,
+    "together": 4,
+}
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job:
+    """What is planned: a program, or the message with which it was refused, on a machine.
+
+    tolerance : that is given beside program and machine [mm], or None
+    """
+
+    seed: int
+    source: str
+    text: str
+    program: Program | None
+    refusal: str
+    machine: Machine
+    method: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    tolerance: float | None = None
+
+    @property
+    def way(self) -> str:
+        """Method and settings in a word."""
+        return "/".join(
+            [self.method, *(str(value) if key != "shaped" else key for key, value in self.settings.items())]
+        )
+
+
+def job(seed: int) -> Job:
+    """The job of that number."""
+    rng = np.random.default_rng([STREAM, seed])
+    names, weights = list(SOURCES), np.array([*SOURCES.values()], dtype=float)
+    source = names[rng.choice(len(names), p=weights / weights.sum())]
+    shares = np.array([share for share, _, _ in METHODS])
+    _, method, settings = METHODS[rng.choice(len(METHODS), p=shares / shares.sum())]
+    found: tuple[str, Machine, Program | None, str] | None = None
+    most = int(min(3 + rng.exponential(10.0), BLOCKS))  # of most draws
+    for draw in range(DRAWS):
+        found = _drawn(source, rng)
+        if found[2] is None or 0 < len(found[2]) <= (most if draw < DRAWS // 2 else BLOCKS):
+            break
+    assert found is not None
+    text, machine, program, refusal = found
+    wide = program is not None and (len(machine.axes) > AXES_OF_NORMAL or len(program) > BLOCKS_OF_NORMAL)
+    if (method, settings) == ("optimal", {}) and wide and rng.random() > SHARE_OF_NORMAL:
+        settings = {"effort": "quick"}
+    if settings.get("shaped"):
+        modes = tuple(
+            Mode(frequency=float(10 ** rng.uniform(0.7, 2.0)), damping=float(rng.uniform(0, 0.2)))
+            for _ in range(rng.integers(1, 3))
+        )
+        machine = machine.model_copy(update={"modes": modes})
+    tolerance = float(10 ** rng.uniform(-3.0, 0.0)) if rng.random() < 0.3 else None
+    if program is not None and len(program) > BLOCKS:
+        program, refusal = None, f"{len(program)} blocks are too many for this campaign"
+    if program is not None:
+        program, machine = _short(program, machine)
+    return Job(
+        seed=seed, source=source, text=text, program=program, refusal=refusal,
+        machine=machine, method=method, settings=dict(settings), tolerance=tolerance,
+    )  # fmt: skip
+
+
+def _drawn(source: str, rng: Rng) -> tuple[str, Machine, Program | None, str]:
+    """Text, machine, and program or refusal."""
+    if source == "lines and arcs":
+        program, _ = never_slower.job(int(rng.integers(1 << 30)))
+        return "", machine_of(rng, "xyz"), program, ""
+    if source == "axes":
+        text, other = axes_campaign.job(int(rng.integers(1 << 30)))
+        machine = machine_of(rng, "".join(other.axes))
+    else:
+        machine = machine_of(rng, "xyz" if source in ("mixed", "dense") and rng.random() < 0.8 else "xyzabc")
+        text = _text(source, rng, machine)
+    try:
+        return text, machine, parse_program(text, machine, source=f"{source} job"), ""
+    except InputError as fault:
+        return text, machine, None, str(fault)
+
+
+def _text(source: str, rng: Rng, machine: Machine) -> str:
+    if source == "mixed":
+        return mixed(rng, machine)
+    if source == "dense":
+        return dense(rng)
+    if str(TESTS) not in sys.path:
+        sys.path.insert(0, str(TESTS))
+    if source == "splines":
+        return str(importlib.import_module("random_splines").random_splines(rng))
+    if source == "together":
+        return str(importlib.import_module("random_together").together(rng))
+    return str(importlib.import_module("random_nc").KINDS[source](rng))
+
+
+# ---- machines ----------------------------------------------------------------------------------------------------------------
+
+
+def machine_of(rng: Rng, letters: str) -> Machine:
+    """A machine with limits over decades, and sometimes filters, vibration modes, a normal acceleration, a largest feed."""
+    velocity, acceleration = 10 ** rng.uniform(1.0, 3.0), 10 ** rng.uniform(2.0, 4.5)
+    delay = 10 ** rng.uniform(-3.0, -0.7)  # acceleration / jerk [s]
+    apart = rng.uniform(0.0, 0.6)  # of the axes, in decades to both sides
+    axes = {}
+    for letter in letters:
+        own = 10 ** rng.uniform(-apart, apart, 3)
+        a = acceleration * own[1]
+        axes[letter] = Axis(velocity=velocity * own[0], acceleration=a, jerk=a / (delay * own[2]))
+    more: dict[str, Any] = {}
+    if rng.random() < 0.2:
+        more["feed_max"] = 10 ** rng.uniform(0.5, 2.5)
+    if rng.random() < 0.2:
+        more["normal_acceleration"] = acceleration * 10 ** rng.uniform(-1.0, 0.3)
+    if rng.random() < 0.3:
+        more["blend_rapids"] = True
+    if rng.random() < 0.15:
+        more["path_control"] = str(rng.choice(["exact_path", "exact_stop"]))
+    if set(letters) & set("abc"):
+        more["rotary_radius"] = 10 ** rng.uniform(0.5, 2.5)
+    if rng.random() < 0.15:
+        lag = {"phase_lag_max": rng.uniform(5.0, 60.0)} if rng.random() < 0.3 else {}
+        more["fir"] = Fir(time_constants=tuple(10 ** rng.uniform(-3.0, -1.3, rng.integers(1, 4))), **lag)
+    if rng.random() < 0.15:
+        more["modes"] = tuple(
+            Mode(frequency=10 ** rng.uniform(0.5, 2.2), damping=rng.uniform(0.0, 0.3))
+            for _ in range(rng.integers(1, 3))
+        )
+    if rng.random() < 0.1 and set(letters) == set("xyz"):
+        axes["e"] = Axis(velocity=velocity, acceleration=acceleration, jerk=acceleration / delay)
+    return Machine(
+        name="random", dt=float(rng.choice(PERIODS)), tolerance=float(10 ** rng.uniform(-3.0, 0.0)),
+        feed_default=10.0, axes=axes, tools={str(n): {"length": 5.0 * n, "diameter": 1.0 * n} for n in range(1, 5)}, **more,
+    )  # fmt: skip
+
+
+def _short(program: Program, machine: Machine) -> tuple[Program, Machine]:
+    """The job with a larger period, faster limits and shorter dwells, if its motion would have more than `SAMPLES` samples."""
+    program = dataclasses.replace(program, dwell=np.minimum(program.dwell, DWELL_MAX))
+    time = duration(program, machine)
+    dt = float(np.clip(time / SAMPLES, machine.dt, PERIOD_MAX))
+    machine = machine.model_copy(update={"dt": dt})
+    faster = time / (SAMPLES * dt)
+    for _ in range(2):  # the second time for what the limits do not allow
+        if faster > 1.0:
+            program, machine = quicker(program, machine, faster)
+            faster = duration(program, machine) / (SAMPLES * dt)
+    return program, machine
+
+
+def quicker(program: Program, machine: Machine, by: float) -> tuple[Program, Machine]:
+    """The same motion in a time that is shorter by a factor: feeds, velocities, accelerations and jerks by its powers, as
+    far as a machine goes."""
+    axes = {
+        letter: Axis(
+            velocity=max(min(a.velocity * by, VELOCITY_MAX), a.velocity),
+            acceleration=max(min(a.acceleration * by**2, ACCELERATION_MAX), a.acceleration),
+            jerk=max(min(a.jerk * by**3, JERK_MAX), a.jerk),
+            wrapped=a.wrapped,
+        )
+        for letter, a in machine.axes.items()
+    }
+    update: dict[str, Any] = {"axes": axes}
+    if machine.feed_max is not None:
+        update["feed_max"] = machine.feed_max * by
+    if machine.normal_acceleration is not None:
+        update["normal_acceleration"] = machine.normal_acceleration * by**2
+    return dataclasses.replace(program, feed=program.feed * by), machine.model_copy(update=update)
+
+
+def duration(program: Program, machine: Machine) -> float:
+    """How long the program takes from stop to stop, about [s]."""
+    position = np.vstack([program.start, program.end])
+    way = np.abs(np.diff(position, axis=0))
+    for k, block in enumerate(program.arc_block):
+        radius = np.linalg.norm((position[block] - program.arc_center[k])[:3])
+        way[block, :3] = np.maximum(way[block, :3], radius * abs(program.arc_sweep[k]))
+    for block, points in zip(program.splines.block, program.splines.points, strict=True):
+        way[block] += np.abs(np.diff(points, axis=0)).sum(axis=0)
+    rotary = np.array([letter in "abc" for letter in program.axes])
+    angular = np.where(rotary, 180.0 / np.pi, 1.0)
+    total = float(program.dwell.sum())
+    feed = np.where(np.isfinite(program.feed), program.feed, np.inf)
+    total += float((np.linalg.norm(way, axis=1) / feed).sum())
+    for k, letter in enumerate(program.axes):
+        if letter in machine.axes:
+            axis, run = machine.axes[letter], way[:, k] * angular[k]
+            total += float(
+                (
+                    run / axis.velocity + 2 * np.sqrt(run / axis.acceleration) + 3 * np.cbrt(run / axis.jerk)
+                ).sum()
+            )
+    if machine.feed_max is not None:
+        total += float(np.linalg.norm(way, axis=1).sum()) / machine.feed_max
+    return total

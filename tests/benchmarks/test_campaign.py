@@ -1,0 +1,206 @@
+"""The campaign: its second judge accepts right motions and finds faults, its laws keep what they should, and its rows are resumed."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.campaign import blocks_of, is_wrong, kept_rows, motion_of, outcome, rows_of
+from benchmarks.campaign_course import course
+from benchmarks.campaign_judge import Motion, faults, filtered, matched
+from benchmarks.campaign_laws import ALLOWED, mirrored, reversed_program, scaled, scaled_machine, split
+from planner.job.plan import Plan
+from planner.machine import Axis, Machine
+from planner.methods.registry import plan
+from planner.nc.reader import parse_program
+
+AXIS = Axis(velocity=120.0, acceleration=2000.0, jerk=60000.0)
+MACHINE = Machine(
+    name="test", dt=0.001, tolerance=0.05, axes=dict.fromkeys("xyz", AXIS), normal_acceleration=1500.0
+)
+TEXT = """G21 G17 G90 G94 G64 F3000
+G1 X10
+G1 X10 Y8
+G2 X14 Y12 I4 J0
+G4 P0.02
+G1 X20 Y12
+G61
+G3 X26 Y18 R6
+G64
+G5 X34 Y26 I3 J0 P-3 Q0
+G0 X30 Y30
+G1 X0 Y30 F1200
+M2
+"""
+
+
+@functools.cache
+def planned(method: str) -> Plan:
+    """The program by a method."""
+    found = plan(parse_program(TEXT, MACHINE), MACHINE, method=method)
+    assert found.verdict is not None
+    assert found.verdict.passed, found.verdict.faults
+    return found
+
+
+def judged(found: Plan, motion: Motion, text: str = TEXT) -> list[str]:
+    program = parse_program(text, MACHINE)
+    return faults(motion, course(blocks_of(program, MACHINE, ("x", "y", "z"), None)))
+
+
+@pytest.mark.parametrize("method", ["stop", "kinematic", "second-order", "optimal"])
+def test_right_motions_have_no_fault(method: str) -> None:
+    found = planned(method)
+    assert judged(found, motion_of(found)) == []
+
+
+def late(motion: Motion) -> Motion:
+    k = len(motion.q) // 3
+    return dataclasses.replace(motion, q=np.insert(motion.q, k, motion.q[k], axis=0)[:-1])
+
+
+def moved(motion: Motion) -> Motion:
+    q = motion.q.copy()
+    q[len(q) // 2 :] += np.array([0.0, 0.06, 0.0])
+    return dataclasses.replace(motion, q=q)
+
+
+def cut(motion: Motion) -> Motion:
+    return dataclasses.replace(motion, q=motion.q[:-40], t=motion.t[:-40])
+
+
+def begun_late(motion: Motion) -> Motion:
+    return dataclasses.replace(motion, q=motion.q[40:], t=motion.t[:-40])
+
+
+def hurried(motion: Motion) -> Motion:
+    """Every limit of the machine 3 % below what the motion reaches."""
+    return dataclasses.replace(motion, limits=motion.limits * 0.97)
+
+
+def turned_harder(motion: Motion) -> Motion:
+    return dataclasses.replace(motion, normal_acceleration=400.0)
+
+
+def mirror(motion: Motion) -> Motion:
+    return dataclasses.replace(motion, q=motion.q * np.array([1.0, 1.0, -1.0]) + np.array([0, 0, 0.1]))
+
+
+def smeared(motion: Motion) -> Motion:
+    return dataclasses.replace(motion, filters=(0.08,))
+
+
+def period_left_out(motion: Motion) -> Motion:
+    rows = np.delete(np.arange(len(motion.t)), 100)
+    return dataclasses.replace(motion, t=motion.t[rows], q=motion.q[rows])
+
+
+MUTATIONS = (late, moved, cut, begun_late, hurried, turned_harder, mirror, smeared, period_left_out)
+
+
+@pytest.mark.parametrize("mutated", MUTATIONS, ids=lambda change: change.__name__)
+def test_the_second_judge_finds_faults_of_a_motion(mutated) -> None:
+    found = planned("optimal")
+    assert judged(found, mutated(motion_of(found)))
+
+
+@pytest.mark.parametrize(
+    ("was", "now"),
+    [
+        ("G1 X10\n", "G1 X10.08\n"),
+        ("G4 P0.02", "G4 P0.03"),
+        ("G4 P0.02\n", "G4 P0.02\nG1 X15 Y12\nG1 X14 Y12\n"),
+        ("F3000", "F2900"),
+        ("R6", "R6.3"),
+        ("I3 J0", "I3.4 J0"),
+        ("G1 X20 Y12\n", "G1 X20 Y12\nG61.1\nG1 X19.9 Y12\nX20 Y12\nG64\n"),
+        ("G64\nG5", "G5"),
+        ("G1 X10\n", "G61.1\nG1 X10\nG64\n"),
+    ],
+)
+def test_the_second_judge_finds_the_motion_of_another_program(was: str, now: str) -> None:
+    found = planned("optimal")
+    assert was in TEXT
+    assert judged(found, motion_of(found), TEXT.replace(was, now, 1))
+
+
+def test_moving_averages_of_a_ramp_are_the_ramp_half_the_length_later() -> None:
+    t = np.arange(0.0, 1.0, 0.01)
+    motion = Motion(
+        t=t,
+        q=np.stack([5 + t, t], axis=1),
+        dt=0.01,
+        limits=np.ones((3, 2)),
+        linear=np.ones(2, bool),
+        filters=(0.1, 0.06),
+    )
+    places, error = filtered(motion)
+    inside = (places[:, 1] > 0.2) & (places[:, 1] < 0.9)
+    step = np.diff(places[inside], axis=0)
+    assert np.allclose(step, step[0])
+    assert np.allclose(places[inside][:, 0] - places[inside][:, 1], 5.0)
+    assert np.allclose(places[0], [5.0, 0.0])
+    assert np.allclose(places[-1], motion.q[-1], atol=error)
+
+
+@pytest.mark.parametrize("change", ["mirrored", "reversed", "scaled"])
+def test_laws_keep_the_time_of_full_stops(change: str) -> None:
+    """The time of the method `stop` is a sum over blocks, so that a wrongly changed program shows."""
+    text = TEXT.replace("G61\n", "").replace("G64\n", "")
+    program, machine = parse_program(text, MACHINE), MACHINE
+    before = plan(program, machine, method="stop").cycle_time
+    if change == "mirrored":
+        program = mirrored(program)
+    elif change == "reversed":
+        program = reversed_program(program)
+    else:
+        program, machine = scaled(program, 3.0), scaled_machine(machine, 3.0)
+    after = plan(program, machine, method="stop")
+    assert after.verdict is not None
+    assert after.verdict.passed
+    assert after.cycle_time == pytest.approx(before, abs=10 * machine.dt)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_as_two_is_the_same_path(seed: int) -> None:
+    program = parse_program(TEXT, MACHINE)
+    other = split(program, np.random.default_rng(seed))
+    assert other is not None
+    assert len(other) == len(program) + 1
+    before, after = (course(blocks_of(one, MACHINE, ("x", "y", "z"), None)) for one in (program, other))
+    off = matched(before.points, after, np.full(len(after.block), 1e-9))
+    assert off[1] == ""
+    found = plan(other, MACHINE, method="second-order")
+    assert found.cycle_time <= planned("second-order").cycle_time * (1 + ALLOWED)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 9, 11, 15, 17, 20])
+def test_jobs_of_the_campaign_are_as_they_should_be(seed: int) -> None:
+    row = outcome(seed)
+    assert not is_wrong(row), row
+
+
+def test_a_run_keeps_its_rows_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "rows.jsonl"
+    file.write_text(
+        json.dumps({"seed": 20, "outcome": "kept"}) + "\n" + '{"seed": 21, "outc', encoding="utf-8"
+    )
+    assert kept_rows(file) == {20: {"seed": 20, "outcome": "kept"}}
+    file.write_text(json.dumps({"seed": 20, "outcome": "kept"}) + "\n", encoding="utf-8")
+    assert main(["campaign", "--seed", "20", "--count", "1", "--file", str(file)]) == 0
+    assert kept_rows(file)[20]["outcome"] == "kept"
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.slow
+def test_a_job_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.campaign.LIMIT", -1.0)
+    rows = list(rows_of([20, 21], 1, np.inf))
+    assert [row["outcome"] for row in rows] == ["hang", "hang"]

@@ -80,11 +80,13 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     """
     still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
     group = np.cumsum(np.append(True, np.diff(still) > 1)) - 1
-    begin, end = (
-        still[np.searchsorted(group, group, side="left")],
-        still[np.searchsorted(group, group, side="right") - 1],
-    )
-    at = nearest(motion.t[still], times[toolpath.joint == Joint.STOP])
+    rests = int(group[-1]) + 1
+    begin = still[np.searchsorted(group, np.arange(rests), side="left")]
+    end = still[np.searchsorted(group, np.arange(rests), side="right") - 1]
+    near = group[nearest(motion.t[still], times[toolpath.joint == Joint.STOP])]
+    # one rest for each stop, in their order: where a block is as short as the tolerance, the rest nearest in time may be the next one's
+    stop = np.arange(len(near))
+    at = np.minimum(np.maximum.accumulate(near - stop), rests - len(near)) + stop if rests >= len(near) else near
     return motion.t[begin[at]], motion.t[end[at]]
 
 

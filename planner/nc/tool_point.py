@@ -252,8 +252,11 @@ class _Pieces:
     def program(self) -> Program:
         """The program of the pieces."""
         whole = self.whole
+        rapids = np.flatnonzero(self.off & (whole.kind == Kind.RAPID)).tolist()
+        if not rapids:
+            return dataclasses.replace(whole, end=self.end)
         ends = [self.end[k : k + 1] for k in range(len(whole))]
-        for k in np.flatnonzero(self.off & (whole.kind == Kind.RAPID)).tolist():
+        for k in rapids:
             begin = self.end[k - 1] if k else whole.start
             ends[k] = self._chords(self._of(self.chain.joints, begin[None])[0], whole.end[k])
         count = np.array([len(pieces) for pieces in ends])

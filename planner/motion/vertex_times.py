@@ -86,7 +86,11 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     near = group[nearest(motion.t[still], times[toolpath.joint == Joint.STOP])]
     # one rest for each stop, in their order: where a block is as short as the tolerance, the rest nearest in time may be the next one's
     stop = np.arange(len(near))
-    at = np.minimum(np.maximum.accumulate(near - stop), rests - len(near)) + stop if rests >= len(near) else near
+    at = (
+        np.minimum(np.maximum.accumulate(near - stop), rests - len(near)) + stop
+        if rests >= len(near)
+        else near
+    )
     return motion.t[begin[at]], motion.t[end[at]]
 
 

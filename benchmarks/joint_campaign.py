@@ -139,8 +139,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         if "fault" in row:
             text += f"\nJob {row['seed']} on {row['machine']} was refused: {row['fault']}\n"
     return (
-        "`optimal` as it is by default against `optimal` with rounds of reshaping and no search.\n\n"
-        + text
+        "`optimal` as it is by default against `optimal` with rounds of reshaping and no search.\n\n" + text
     )
 
 

@@ -45,7 +45,11 @@ def legs_of_two_lengths(share: float) -> Program:
 
 def jobs() -> list[tuple[str, Program, dict[str, Any]]]:
     """Name, program, settings of the machine."""
-    shapes = {"pentagon": problems.pentagon(), "zig-zag": problems.zigzag(), "circle": problems.chord_circle()}
+    shapes = {
+        "pentagon": problems.pentagon(),
+        "zig-zag": problems.zigzag(),
+        "circle": problems.chord_circle(),
+    }
     found: list[tuple[str, Program, dict[str, Any]]] = []
     for (name, program), tolerance in itertools.product(shapes.items(), TOLERANCES):
         found.append((f"{name}, tolerance {1e3 * tolerance:g} um", program, {"tolerance": tolerance}))

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import itertools
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -99,8 +100,16 @@ class Job:
 
 
 def job(seed: int) -> Job:
-    """The job of that number."""
-    rng = np.random.default_rng([STREAM, seed])
+    """The job of that number: the first that can be drawn whose machine has limits that there may be."""
+    for attempt in itertools.count():
+        try:
+            return _job(seed, np.random.default_rng([STREAM, seed, attempt]))
+        except ValueError:  # of an axis that is refused
+            continue
+    raise AssertionError
+
+
+def _job(seed: int, rng: Rng) -> Job:
     names, weights = list(SOURCES), np.array([*SOURCES.values()], dtype=float)
     source = names[rng.choice(len(names), p=weights / weights.sum())]
     shares = np.array([share for share, _, _ in METHODS])

@@ -4,7 +4,7 @@ Nobody knows beforehand how many rounds a spline gets, or whether a verdict asks
 still most likely, counted in a unit that this job has measured itself: one grid and one solve on it (the last ones of the rounds),
 
     rounds     those that the effort allows, fewer as soon as their gains fall; each as long as the last one
-    after      final grid, single corners, tightening:  AFTER units; on corners alone a share of their solve
+    after      final grid, single corners, tightening:  AFTER units of that grid; on corners alone a share of their solve
     verdict    samples times SAMPLE seconds, at the speed of this machine, which the first solve tells
     prices     PRICES units
     files      samples times WRITTEN seconds, if any are written
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from planner.optimal.effort import Search
 
 ROUND = 4.5  # of the first round, in units
-AFTER, PRICES = 4.5, 2.5  # in units
+AFTER, PRICES = 2.5, 2.5  # in units, the first of the final grid
 FINAL_AFTER = 2.0  # what comes after the final grid, over that, as soon as it is solved [-]
 MORE_ROUNDS = 1.5  # rounds that there are, over those by which gains would fall to `ENOUGH` [-]
 IN_VAIN = 5, 3.0  # after so many rounds there are so many more: that gain too little before they are given up
@@ -184,7 +184,7 @@ class TimeLeft:
         elif not self.solves or self._plans:
             return later
         prices = (PRICES if self._splines else PRICES_CORNERS) * unit
-        after = (AFTER if self._splines else AFTER_CORNERS) * unit
+        after = (AFTER * self._finer() if self._splines else AFTER_CORNERS) * unit
         if not math.isnan(self._final):
             after = FINAL_AFTER * self._final
         later += prices if self._phase < REPORT else self._running(now, "report", prices)
@@ -227,6 +227,13 @@ class TimeLeft:
             if work > LEAST_WORK:
                 self._speed = math.sqrt(min(max(seconds / work, SPEED[0]), SPEED[1]))
             self._go(ROUNDS if self._splines else FINISH, now)
+
+    def _finer(self) -> float:
+        """How many times as many points the final grid has as that of the rounds, about: its error goes with their square."""
+        from planner.optimal.effort import EFFORTS
+
+        sizes = EFFORTS[self.effort].grids(self._points)
+        return math.sqrt(sizes.rounds / sizes.final)
 
     def _more_rounds(self) -> float:
         """Rounds that are still to be expected."""

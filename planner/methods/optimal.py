@@ -6,7 +6,8 @@ Corners are rounded, tangent joints with a jump of the curvature too: a jump wou
 The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no round
 has reshaped, with a motion that need not be fit for delivery (at_once.py). Where it leaves some of that, it begins on the plan of the
 first splines; where it leaves much of that, or there are too many steps for it, the splines are reshaped and it begins there once more;
-the faster plan is taken. Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
+the faster plan is taken. With a limit of the normal acceleration it begins on reshaped splines at once: from the first ones it ended up
+to 1e-2 slower than these without it (`benchmarks.joint_hard`). Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
 """
 
 from __future__ import annotations
@@ -111,13 +112,17 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
             return fastest_plan(job.afresh(), settings)
     if not dial.again:
         return fastest_plan(job.afresh(), settings)
-    on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
+    once: Plan | None = None
+    if job.machine.normal_acceleration is None:
+        on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
+        again = job.afresh()
+        on_these = freed(again, fastest_plan(again, on_first), dial)
+        if on_these.kept <= dial.kept:
+            return on_these.plan
+        once = on_these.plan
     again = job.afresh()
-    once = freed(again, fastest_plan(again, on_first), dial)
-    if once.kept <= dial.kept:
-        return once.plan
-    again = job.afresh()
-    return faster(freed(again, fastest_plan(again, settings), dial).plan, once.plan)
+    reshaped = freed(again, fastest_plan(again, settings), dial).plan
+    return reshaped if once is None else faster(reshaped, once)
 
 
 def _at_feed(job: Job) -> float:

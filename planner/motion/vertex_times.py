@@ -57,7 +57,10 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     times = np.empty(len(toolpath) + 1)
     for first, last, leaves, arrives in zip(stop[:-1], stop[1:], end[:-1], begin[1:], strict=True):
         run = slice(leaves, arrives + 1)
-        seen, wanted = _Seen(motion.position[run], motion.s[run], motion.t[run]), _wanted(toolpath, first, last)
+        seen, wanted = (
+            _Seen(motion.position[run], motion.s[run], motion.t[run]),
+            _wanted(toolpath, first, last),
+        )
         of_run = times[first : last + 1]
         of_run[0] = seen.t[0]
         _pass(seen, wanted, of_run, 1, 0.0, True)
@@ -91,12 +94,14 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     times  : (M+1,) when it passes the joints, from `passing_times`
     """
     begin, end = _standing(motion)
-    stop = times[toolpath.joint == Joint.STOP]
-    if len(begin) == len(stop):
-        return motion.t[begin], motion.t[end]
     count = end - begin + 1
     still = np.repeat(end + 1 - np.cumsum(count), count) + np.arange(count.sum())
-    at = np.repeat(np.arange(len(begin)), count)[nearest(motion.t[still], stop)]
+    rest = np.repeat(np.arange(len(begin)), count)
+    near = rest[nearest(motion.t[still], times[toolpath.joint == Joint.STOP])]
+    # one rest for each stop, in their order: where a block is as short as the tolerance, the rest nearest in time may be the next one's
+    stop = np.arange(len(near))
+    spare = len(begin) - len(near)
+    at = np.minimum(np.maximum.accumulate(near - stop), spare) + stop if spare >= 0 else near
     return motion.t[begin[at]], motion.t[end[at]]
 
 

@@ -44,7 +44,7 @@ TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
 MISSED_MOST = max(missed for _, missed in TRIES)
 # Iterations of a window, about, and the share of its work that is told to be done at most before all of it is [-].
 USUAL, NEARLY = 25.0, 0.9
-QUIET = 200  # steps: of windows that have fewer together nothing is told before they end
+QUIET = 1000  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-]: of any motion, and of one that is an optimum of longer
 # steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
 # and 0.01 693 and 364.

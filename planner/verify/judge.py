@@ -28,7 +28,7 @@ from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
 WHOLE = Given()
-READING = 0.85  # share of a verdict's time that the first reading takes, about [-]
+READING = 0.9  # share of a verdict's time that the first reading takes, about [-]
 
 
 def verify(

@@ -91,7 +91,13 @@ class Reader:
                     task()
             if taken is not None:
                 self.comparison.compare(taken)
-                progress(min(1.0, float(taken.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+            end = max(self.motion.end, PERIOD_ROUNDING)
+            evaluated_to, read_to, compared_to = (
+                end if part is None else float(part.t[-1])
+                for part in (next(iter(found), None), evaluated, taken)
+            )
+            begun = taken is not None or evaluated is None
+            progress(min(1.0, (evaluated_to + read_to + begun * compared_to) / (3.0 * end)))
             evaluated, taken = next(iter(found), None), evaluated
         return between
 

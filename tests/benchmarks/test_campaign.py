@@ -13,6 +13,7 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.campaign import blocks_of, is_wrong, kept_rows, motion_of, outcome, rows_of
 from benchmarks.campaign_course import course
+from benchmarks.campaign_jobs import job
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
 from benchmarks.campaign_laws import ALLOWED, mirrored, reversed_program, scaled, scaled_machine, split
 from planner.job.plan import Plan
@@ -197,6 +198,12 @@ def test_a_run_keeps_its_rows_and_goes_on(tmp_path: Path, capsys: pytest.Capture
     assert main(["campaign", "--seed", "20", "--count", "1", "--file", str(file)]) == 0
     assert kept_rows(file)[20]["outcome"] == "kept"
     assert capsys.readouterr().out == ""
+
+
+def test_the_same_number_makes_the_same_job() -> None:
+    one, other = job(7), job(7)
+    assert one.text == other.text
+    assert one.machine == other.machine
 
 
 @pytest.mark.slow

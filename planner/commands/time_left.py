@@ -94,6 +94,7 @@ class TimeLeft:
     _gains: list[float] = field(default_factory=list)
     _slower: bool = False  # the last round as a whole
     _told: float = 0.0  # when something was told last
+    _steps: int = 0  # that the motion has at least
     _search: SearchLeft | None = None  # where the plan goes that way
 
     def stage(self, now: float, name: str, fraction: float) -> None:
@@ -125,8 +126,8 @@ class TimeLeft:
         self._told = now
         if step.name == "programmed feed":
             self._cycle_time, self._dt = SLOWER * (step.found or 0.0), float(step.facts.get("dt") or math.inf)
-            steps = LEAST_STEPS * int(step.facts.get("segments") or 0)
-            if self.searched and steps <= self._dial().steps_max:
+            self._steps = LEAST_STEPS * int(step.facts.get("segments") or 0)
+            if self.searched and self._steps <= self._dial().steps_max:
                 self._search = SearchLeft(_since=now)
         elif step.name == "splines":
             if self._search is not None and self._search.phase == BEGUN:
@@ -200,7 +201,7 @@ class TimeLeft:
     def _dial(self) -> Search:
         from planner.optimal.effort import EFFORTS
 
-        return EFFORTS[self.effort].search
+        return EFFORTS[self.effort].search.of(self._steps)
 
     def _without_search(self, now: float) -> None:
         """The plan begins anew, and there is no search in it: on splines, until it tells that it has none."""

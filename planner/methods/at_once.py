@@ -24,12 +24,12 @@ from planner.tube.splice import Spliced, SplicedRun
 class AtOnce(NamedTuple):
     """What the search finds from the first motion.
 
-    plan      : None where it does not find all of it
-    too_large : whether it was not begun, because the motion has more steps than the effort is for
+    plan  : None where it does not find all of it, and where the motion has more steps than the effort is for
+    steps : of the motion
     """
 
     plan: Plan | None
-    too_large: bool = False
+    steps: int
 
 
 def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
@@ -43,9 +43,13 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
         start = Start(planned.motion(), job, dial.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
-        if steps > dial.steps_max:
-            job.tell("search", steps=steps, of=dial.steps_max)
-            return AtOnce(None, too_large=True)
+        most = dial.steps_max
+        if steps > dial.small:  # no finer than what is delivered
+            most = min(most, start.motion.end / job.machine.dt)
+        if steps > most:
+            job.tell("search", steps=steps, of=most)
+            return AtOnce(None, steps)
+        dial = dial.of(steps)
         found: list[FoundRun] = []
         done, parts = 0, list[SplicedRun]()
         for k, run in enumerate(runs):
@@ -54,14 +58,14 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
             found.append(search(k, run, [start], solver_of(dial, progress, divide=False)))
             if not found[-1].whole:
                 job.tell("search", steps=steps, of_runs=len(runs), whole=k)
-                return AtOnce(None)
+                return AtOnce(None, steps)
             parts += parts_of(job.toolpath, found[-1], start.spliced(k))
             done += of_run
     made = job.deliver(Spliced(runs=tuple(parts)))
     trajectory, verdict = made
     job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)
     if not verdict.passed or trajectory.cycle_time > job.stop_time:
-        return AtOnce(None)
+        return AtOnce(None, steps)
     job.note(*path_notes(job.toolpath, planned))
     status, sentence = said(job, start, found, [], "", "a path first, then its feed")
     plan = job.plan(
@@ -74,4 +78,4 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
         tables=tabled(job, None, trajectory, found, []),
     )
-    return AtOnce(plan)
+    return AtOnce(plan, steps)

@@ -83,6 +83,7 @@ def freed(job: Job, plan: Plan, dial: Search) -> Freed:
             job.tell("search", steps=steps, of=dial.steps_max)
             return Freed(plan, 1.0)
         found, done = [], 0
+        dial = dial.of(steps)
         for k, run in enumerate(runs):
             of_run = len(start.guess(k, run))
             solver = solver_of(dial, part_of(report, done, of_run, steps), divide=True)

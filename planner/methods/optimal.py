@@ -108,9 +108,8 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
         found = searched_at_once(job.afresh(), settings, begun)
         if found.plan is not None:
             return found.plan
-        if found.too_large:  # from a plan, too, it has as many steps: 112,143 instead of 114,552 on 20,000 blocks of stellabee1
-            return fastest_plan(job.afresh(), settings)
-    if not dial.again:
+        steps = found.steps  # from a plan, too, it has as many: 112,143 instead of 114,552 on 20,000 blocks of stellabee1
+    if steps > dial.steps_max or not dial.of(steps).again:
         return fastest_plan(job.afresh(), settings)
     once: Plan | None = None
     if job.machine.normal_acceleration is None:

@@ -20,6 +20,10 @@ OUTCOMES = {
         Status.ITERATION_LIMIT,
         "not converged within the iterations allowed; raise max_iterations, or plan with method optimal",
     ),
+    "Maximum_CpuTime_Exceeded": (
+        Status.ITERATION_LIMIT,
+        "not converged in the computing time that a run may take; plan with method optimal",
+    ),
     "Infeasible_Problem_Detected": (
         Status.INFEASIBLE,
         "no motion inside the tolerance was found from its start; raise the tolerance, or plan with method optimal",

@@ -22,6 +22,8 @@ BARRIER = 0.1
 # The search of ipopt may end when the time changes by less than this fraction in each of so many iterations [-], with all rows kept and
 # the complementarity below the last of them [-].
 SETTLED, SETTLED_ITERATIONS, COMPLEMENTARITY = 1e-7, 4, 1e-7
+# CPU time that ipopt may take for a run [s]. Its iterations do not bound it: one random job of less than 120 steps took 15 minutes.
+SECONDS = 300.0
 
 
 class Sizes(NamedTuple):
@@ -53,6 +55,7 @@ def options(solver: str, sizes: Sizes, tol: float, max_iterations: int) -> dict[
             "ipopt.mu_init": BARRIER,
             "ipopt.tol": tol,
             "ipopt.max_iter": max_iterations,
+            "ipopt.max_cpu_time": SECONDS,
             "ipopt.constr_viol_tol": FEASIBILITY,
             "ipopt.acceptable_tol": 1e10,  # not asked for: the multipliers of equal optima need not settle
             "ipopt.acceptable_compl_inf_tol": COMPLEMENTARITY,

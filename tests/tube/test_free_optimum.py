@@ -11,6 +11,7 @@ from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.motion.timing import dense_motion
 from planner.motion.trajectory import joined
+from planner.tube import stages
 from planner.tube.guess import guess_from
 from planner.tube.nlp import TubeNLP
 from planner.tube.own import TubeOwn
@@ -46,6 +47,14 @@ def test_a_line_from_rest_to_rest_takes_its_closed_form(slower, solver):
     assert steps.h.sum() == pytest.approx(LEAST, rel=3e-4)
     assert np.abs(steps.jerk).max() <= JERK * (1 + 1e-9)
     assert steps.h.sum() >= LEAST * (1 - 1e-9)
+
+
+def test_ipopt_that_takes_too_long_says_so(monkeypatch):
+    monkeypatch.setattr(stages, "SECONDS", 1e-3)
+    solution = TubeNLP().solve(*begun(1.5))
+    assert solution.status is Status.ITERATION_LIMIT
+    assert solution.steps is None
+    assert "computing time" in solution.sentence
 
 
 def test_a_guess_is_the_motion_that_it_was_cut_from():

@@ -5,9 +5,10 @@ Corners are rounded, tangent joints with a jump of the curvature too: a jump wou
 
 The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no round
 has reshaped, with a motion that need not be fit for delivery (at_once.py). Where it leaves some of that, it begins on the plan of the
-first splines; where it leaves much of that, or there are too many steps for it, the splines are reshaped and it begins there once more;
-the faster plan is taken. With a limit of the normal acceleration it begins on reshaped splines at once: from the first ones it ended up
-to 1e-2 slower than these without it (`benchmarks.joint_hard`). Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
+first splines; where it leaves much of that, or the path doubles back within the tolerance, the splines are reshaped and it begins there
+once more; the faster plan is taken. With a limit of the normal acceleration it goes on with reshaped splines at once: from a plan on
+the first ones it ended up to 1e-2 slower than these without it (`benchmarks.joint_hard`). Rounds of reshaping alone end up to 5e-2
+slower (docs/joint.md).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
 from planner.geometry.legs import legs_of
+from planner.geometry.toolpath import Joint
 from planner.job.job import Job
 from planner.job.method import Method, faster
 from planner.job.plan import Plan
@@ -101,18 +103,19 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
     if first.too_large:
         return fastest_plan(job.afresh(), settings)
     begun = first.planned
+    once: Plan | None = None
     if begun is not None:
         if steps > CHEAP and begun.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
             job.tell("search", left=begun.solution.cycle_time / _at_feed(job) - 1.0)
             return fastest_plan(job.afresh(), settings)
         found = searched_at_once(job.afresh(), settings, begun)
-        if found.plan is not None:
-            return found.plan
-        steps = found.steps  # from a plan, too, it has as many: 112,143 instead of 114,552 on 20,000 blocks of stellabee1
+        once, steps = found.plan, found.steps
+        # from a plan, too, it has as many steps: 112,143 instead of 114,552 on 20,000 blocks of stellabee1
+        if once is not None and not (dial.of(steps).again and _doubles_back(job)):
+            return once
     if steps > dial.steps_max or not dial.of(steps).again:
         return fastest_plan(job.afresh(), settings)
-    once: Plan | None = None
-    if job.machine.normal_acceleration is None:
+    if once is None and job.machine.normal_acceleration is None:
         on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
         again = job.afresh()
         on_these = freed(again, fastest_plan(again, on_first), dial)
@@ -122,6 +125,16 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
     again = job.afresh()
     reshaped = freed(again, fastest_plan(again, settings), dial).plan
     return reshaped if once is None else faster(reshaped, once)
+
+
+def _doubles_back(job: Job) -> bool:
+    """Whether the path turns back on both ends of a block so short that one place is within the tolerance of both: splines that are
+    reshaped find a way without the detour, the search does not find it from the first ones (7 of 320 random jobs, by up to 12 %)."""
+    path = job.toolpath
+    turn = np.sum(path.tangent_end[:-1] * path.tangent_start[1:], axis=1)
+    back = (turn < 0.0) & (path.joint[1:-1] != Joint.STOP)
+    short = (path.length < path.tolerance[:-1] + path.tolerance[1:])[1:-1]
+    return bool((short & back[:-1] & back[1:]).any())
 
 
 def _at_feed(job: Job) -> float:

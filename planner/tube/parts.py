@@ -83,24 +83,25 @@ def _motion(toolpath: Toolpath, found: FoundRun, lo: int, hi: int) -> AxisMotion
     first, last = run.first[0], run.first[-1]
     before = toolpath.dwell[first] if lo == 0 else 0.0
     behind = toolpath.dwell[last] if last == len(toolpath) and hi == len(steps.h) else 0.0
-    standing = int(before > 0)  # a step without motion before the others
+    standing, still = int(before > 0), int(behind > 0)  # steps without motion before and after the others
     along = np.append(0.0, np.cumsum(toolpath.length[first:last]))
     inside = np.searchsorted(along[1:-1], (place[lo:hi] + place[lo + 1 : hi + 1]) / 2, side="right")
-    segment: Array = np.append([first] * standing, first + inside).astype(np.int64)
+    segment: Array = np.concatenate([[first] * standing, first + inside, [last - 1] * still]).astype(np.int64)
     columns = {}
     for name in ("position", "velocity", "acceleration", "jerk"):
-        whole = np.zeros((standing + hi - lo, len(toolpath.axes)))
+        whole = np.zeros((standing + hi - lo + still, len(toolpath.axes)))
         if name == "position":
             whole += toolpath.start[first]
-        whole[standing:, run.axis] = getattr(steps, name)[lo:hi]
+            whole[len(whole) - still :] = toolpath.end[last - 1]
+        whole[standing : len(whole) - still, run.axis] = getattr(steps, name)[lo:hi]
         columns[name] = whole
-    t = np.append(0.0, np.cumsum(np.append([before] * standing, steps.h[lo:hi])))
+    t = np.append(0.0, np.cumsum(np.concatenate([[before] * standing, steps.h[lo:hi], [behind] * still])))
     return AxisMotion(
         axes=toolpath.axes,
         radius=toolpath.radius,
         t=t[:-1],
         block=toolpath.block[segment],
         line=toolpath.line[segment],
-        end=float(t[-1] + behind),
+        end=float(t[-1]),
         **columns,
     )

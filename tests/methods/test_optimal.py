@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from quick import slow_but
 
 import planner
 from benchmarks import problems
+from planner.base.names import NORMAL, QUICK
 from planner.constraints.assemble import CURVATURE_MARGIN
 from planner.corners.bezier import kappa_max
 from planner.corners.smooth import CLOSE
@@ -16,6 +19,7 @@ from planner.job.job import Job
 from planner.job.stages import Stages
 from planner.job.trace import Trace
 from planner.methods.optimal import SIGMA2, OptimalMethod
+from planner.optimal.effort import EFFORTS, Search
 from planner.tube.own import WINDOW
 
 JOBS = problems.all_jobs()
@@ -107,3 +111,41 @@ def test_a_search_of_several_windows_held_by_the_feed_ends_at_the_first_attempt(
     assert plan.verdict.passed
     assert [step.kept for step in searches] == [True]
     assert searches[0].facts["steps"] > WINDOW
+
+
+def test_a_dwell_at_the_end_is_stood_through():
+    corner = "G21 G90 F6000\nG1 X4\nY4\n"
+    with_dwell, without = (
+        planner.plan(planner.read_program(text=corner + end), MACHINE) for end in ("G4 P0.25\n", "")
+    )
+    for made in (with_dwell, without):
+        assert made.verdict.passed, made.verdict.faults
+        assert "together" in made.sentence  # what the search found, not what it began with
+    assert with_dwell.cycle_time == pytest.approx(without.cycle_time + 0.25, abs=MACHINE.dt)
+    still = with_dwell.trajectory.t > without.cycle_time
+    np.testing.assert_allclose(
+        with_dwell.trajectory.position[still], [[4.0, 4.0, 0.0]] * still.sum(), atol=1e-9
+    )
+
+
+@pytest.mark.slow
+def test_where_the_path_doubles_back_within_the_tolerance_it_is_not_slower_than_reshaped_splines():
+    """Both ends of the block of 0.07 mm are within 0.05 mm of one place: the search alone does not find the way without the detour."""
+    points = [[0, 0], [-1.7, 0.77], [-1.66, 0.71], [-1.84, 0.78], [-1.83, -0.29]]
+    job = problems.polyline(points, feed=173.0)
+    reshaped = planner.plan(job, MACHINE, rounds=40).cycle_time
+    assert planner.plan(job, MACHINE).cycle_time <= reshaped * (1 + 1e-9)
+    assert planner.plan(job, MACHINE, effort="quick").cycle_time > reshaped * (1 + 1e-2)
+
+
+def test_large_motions_are_searched_where_their_steps_are_no_finer_than_what_is_delivered(monkeypatch):
+    """A zig-zag counts as large: it is searched in long steps only, and not at all with an interpolation period longer than them."""
+    job = problems.zigzag(4)
+    monkeypatch.setitem(
+        EFFORTS, NORMAL, dataclasses.replace(EFFORTS[NORMAL], search=Search(steps_max=1e6, small=4))
+    )
+    long, quick = (planner.plan(job, MACHINE, effort=effort) for effort in (NORMAL, QUICK))
+    assert "together" in long.sentence
+    assert long.cycle_time == pytest.approx(quick.cycle_time, rel=1e-9)
+    coarse = planner.plan(job, MACHINE.model_copy(update={"dt": 0.05}))
+    assert "together" not in coarse.sentence

@@ -15,6 +15,8 @@ and speeds up along another.
 2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is more than the tolerance,
    `with_less_tolerance` subtracts the excess from the tolerance of the corner. Where the chords alone would use nearly all of the
    tolerance, the corner becomes a full stop.
+3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error after all. If the verdict
+   finds it too large inside a block, `with_less_inside` takes the excess from the tolerance of the block.
 """
 
 from __future__ import annotations
@@ -44,6 +46,9 @@ USED = 0.99
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
+# Of an excess inside a block by so many times in the first round, twice that in the second ...: its chords have a share of the
+# tolerance only, and some methods use it in steps.
+REDUCED_INSIDE = 2.0
 # A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
 
@@ -203,3 +208,17 @@ def with_less_tolerance(
     )
     tolerance[hopeless] = planned.tolerance[hopeless]
     return dataclasses.replace(planned.with_joints(hopeless, Joint.STOP), tolerance=tolerance)
+
+
+def with_less_inside(
+    planned: Toolpath, programmed: Toolpath, line: int, ratio: float, again: int
+) -> Toolpath | None:
+    """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are `ratio` times the
+    tolerance off while they keep it at the vertices; None where next to nothing would be left. again: the round, from 1."""
+    segment = np.flatnonzero(planned.line == line)
+    joints = np.union1d(segment, segment + 1)
+    tolerance = planned.tolerance.copy()
+    tolerance[joints] *= max(1.0 - again * REDUCED_INSIDE * (ratio - 1.0), 0.5)
+    if not len(joints) or (tolerance[joints] < LEFT_MIN * programmed.tolerance[joints]).any():
+        return None
+    return dataclasses.replace(planned, tolerance=tolerance)

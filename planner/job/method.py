@@ -100,6 +100,9 @@ class Method(ABC):
             with job.stage("geometry"):
                 near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
                 less = periods.with_less_tolerance(planned, programmed, near, far)
+                if less is None and made.verdict is not None and made.verdict.contour.broken:
+                    worst = made.verdict.contour
+                    less = periods.with_less_inside(planned, programmed, worst.line, worst.ratio, again)
             if less is None:
                 break
             planned = less
@@ -169,7 +172,7 @@ def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
     """What the period took from the corners, for the notes."""
     stops = (planned.joint == Joint.STOP) & (programmed.joint != Joint.STOP)
     less = (planned.tolerance < programmed.tolerance) & ~stops
-    first = programmed.line[np.flatnonzero(stops | less)[0] - 1]
+    first = programmed.line[max(int(np.flatnonzero(stops | less)[0]) - 1, 0)]
     return (
         f"samples {made.machine.dt * 1e3:g} ms apart: {less.sum()} corners are planned with less of the tolerance, and "
         f"{stops.sum()} are full stops; the first is at the end of line {first}"

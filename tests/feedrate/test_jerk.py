@@ -123,6 +123,17 @@ def test_without_convergence_the_profile_stops_more_often_and_says_where():
     assert best.cycle_time < solution.cycle_time
 
 
+@pytest.mark.parametrize("intervals", range(99, 107))
+def test_a_window_that_does_not_converge_is_divided_to_an_end(intervals):
+    """Of 101 to 104 intervals the smaller window was the same one again, without end."""
+    s = np.linspace(0.0, 50.0, intervals + 1)
+    direction = np.stack([np.cos(s / 8), np.sin(s / 8)], axis=1)
+    problem = make_problem(s, direction, np.stack([-direction[:, 1], direction[:, 0]], axis=1) / 8)
+    solution = JerkLimited(iterations=1).solve(problem)
+    assert solution.status is Status.ACCEPTABLE
+    assert np.isfinite(solution.cycle_time)
+
+
 def test_a_piece_with_too_few_intervals_is_refused():
     problem = make_problem([0.0, 1.0, 2.0], np.ones((3, 1)), np.zeros((3, 1)))
     solution = JerkLimited().solve(problem)

@@ -42,7 +42,8 @@ LARGER_COSTS = 0.2
 FASTER = 1.6
 # A window ends where the grid is finest on this part of a usual window behind what is needed [-]: a stop needs points.
 END_SHARE = 0.1
-# Intervals: a smaller window that does not converge is not divided any further: from rest the plain start does for so few.
+# Intervals: a smaller window that does not converge is not divided any further: from rest the plain start does for so few. (The last
+# one may have `INTERVALS_MIN` more.)
 SMALLEST_WINDOW = 100
 # Into so many smaller windows one that does not converge is divided.
 DIVISION = 5
@@ -106,7 +107,7 @@ class Chain:
                 self.failed = True
                 continue
             if found is None:
-                if end - begin > SMALLEST_WINDOW and self.profile.x[begin] == 0.0:
+                if end - begin > SMALLEST_WINDOW + INTERVALS_MIN and self.profile.x[begin] == 0.0:
                     size, divided = max((end - begin) // DIVISION, SMALLEST_WINDOW), True
                     self.divided += 1
                 else:

@@ -41,7 +41,7 @@ from planner.methods.registry import plan
 from planner.nc.program import Kind, Program
 
 KEPT = RESULTS / "campaign.jsonl"
-LIMIT = 60.0  # of a job, its law included [CPU s]
+LIMIT = 30.0  # of a job, its law included [CPU s]
 WALL_LIMIT = 10 * LIMIT  # [s]
 LAW_EVERY = 10  # jobs
 PASSED, FAILED, DOCUMENTED, UNSOLVED, REFUSED, CRASH, HANG = (

@@ -31,16 +31,20 @@ from planner.nc.reader import parse_program
 
 TESTS = Path(__file__).resolve().parent.parent / "tests" / "nc"
 SAMPLES = 2000  # of a motion from stop to stop, about
-SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (30, 400), 4.0, 30  # of a usual job, the blocks on the mean above 2, and one in so many is larger
+SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (
+    (30, 400),
+    4.0,
+    30,
+)  # of a usual job, the blocks on the mean above 2, and one in so many is larger
 # Of jobs with more axes or blocks than these only a share is planned with effort normal, which takes tens of seconds.
 AXES_OF_NORMAL, BLOCKS_OF_NORMAL, SHARE_OF_NORMAL = 4, 8, 0.1
 SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines that have none [-]
-PERIOD_MAX = 0.004  # [s]
+PERIOD_MAX = 0.002  # [s]
 DWELL_MAX = 0.05  # [s]
 DRAWS = 60  # of a program until one has few blocks and moves
 VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 2e4, 1e6, 1e9  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
-PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004, 0.008, 0.016)  # [s]
+PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
 # Methods with their settings, and how often each is drawn.
 METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (
     (36, "optimal", {"effort": "quick"}),

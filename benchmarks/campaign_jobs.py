@@ -5,9 +5,9 @@ moves in one program and of points on a curve (campaign_programs.py), and those 
 offsets, feed modes, lathe, cutter compensation, splines, and all of these in subprograms, loops and branches (tests/nc/random_nc.py,
 random_splines.py, random_together.py).
 
-Most jobs are small, so that many can be made: a few blocks and some hundred samples; one in `LARGE` has up to `BLOCKS` and `SAMPLES`. A job
-whose motion would have more samples than it may gets a larger period, and then faster limits and feeds, which make the same motion in
-less time; dwells are cut.
+Most jobs are small, so that many can be made: a few blocks and some hundred samples; one in `LARGE` has up to `BLOCKS` and `SAMPLES`. A
+job whose motion would have more samples than it may gets a larger period, and then faster limits and feeds, which make the same motion
+in less time; dwells are cut.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines t
 PERIOD_MAX = 0.002  # [s]
 DWELL_MAX = 0.05  # [s]
 DRAWS = 60  # of a program until one has few blocks and moves
-VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 2e4, 1e6, 1e9  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
+VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
 PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
 # Methods with their settings, and how often each is drawn.

@@ -118,8 +118,10 @@ def documented(made: Job, said: tuple[str, ...]) -> str:
     if made.method.endswith("-plain"):
         return "methods as their papers describe them"
     assert made.program is not None
-    under_g61 = made.method in ("fir", "fir-spline") or (
-        made.method == "kinematic" and len(made.program.splines)
+    under_g61 = (
+        made.method in ("fir", "fir-spline")
+        or "shaped" in made.settings
+        or (made.method == "kinematic" and len(made.program.splines))
     )
     only = all(fault.startswith("exact path") for fault in said)
     return "chords within the tolerance under G61" if under_g61 and only else ""

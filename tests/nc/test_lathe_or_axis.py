@@ -21,5 +21,5 @@ def test_a_w_of_the_machine_moves_it():
 
 
 def test_a_w_that_the_machine_has_not_is_a_lathe_s():
-    turned = planner.read_program(text="G98 S100 M3\n" + TEXT.replace("G91 ", ""), machine=machine("xyz"))
+    turned = planner.read_program(text="G21 G98 F600 S100 M3\nG1 X26 Z12\nX20 W2\nM2\n", machine=machine("xyz"))
     assert any("lathe" in note for note in turned.notes)

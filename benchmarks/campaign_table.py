@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.record import markdown, write_results
 
 Row = dict[str, Any]
-OUTCOMES = ("passed", "failed", "fails as documented", "not solved", "refused", "crash", "hang")
+OUTCOMES = ("passed", "failed", "fails as documented", "not solved", "refused", "crash", "too long")
 KEPT_OF_A_ROW = (
     "seed",
     "source",
@@ -64,7 +64,7 @@ def write_summary(rows: list[Row]) -> None:
 
 def wrongs(row: Row) -> list[str]:
     """What is wrong with a row, in words for counting."""
-    found = [row["outcome"]] if row["outcome"] in ("failed", "crash", "hang") else []
+    found = [row["outcome"]] if row["outcome"] in ("failed", "crash", "too long") else []
     found += ["unexplained"] if row["outcome"] in ("refused", "not solved") and not row.get("said") else []
     if row["outcome"] == "fails as documented":
         return []

@@ -93,6 +93,7 @@ M_GROUP: dict[int, str] = {
 
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
 _POST = "give the machine a table of this axis, or choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
+_ANGLES = "choose a post-processor that writes the angles of the rotary axes, with G43.4"
 _PROBE = Refusal(
     "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
 )
@@ -100,6 +101,7 @@ _PROBE = Refusal(
 G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
     **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
+    435: Refusal("the tool's direction as a vector (G43.5 with I J K) is", _ANGLES, True),
     500: Refusal("presetting coordinates with G50 is", "write G92", True),
     510: Refusal("scaling is", "write the scaled coordinates out"),
     **dict.fromkeys(

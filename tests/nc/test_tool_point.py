@@ -174,3 +174,25 @@ def test_other_languages(text: str, tool: str, length: float) -> None:
 def test_other_languages_without_kinematics(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read(text, MACHINE.model_copy(update={"kinematics": None}))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "G21 G43.5 H1\nG1 X1 I0 J0 K1 F100\n",
+            "<text>:1:5: .*direction as a vector .*angles of the rotary axes",
+        ),
+        (
+            "N10 G71 G90\nTRAORI\nG1 X5 A3=0 B3=0 C3=1 F600\nM30\n",
+            "<text>:3:7: .*A3=, a direction .*angles of the rotary axes",
+        ),
+        (
+            "0 BEGIN PGM P MM\n1 LN X+1 Y+1 Z+1 TX+0 TY+0 TZ+1 F100\n2 END PGM P MM\n",
+            "<text>:2:3: .*direction of the tool .*angles A, B, C are read.*L, C and CC",
+        ),
+    ],
+)
+def test_directions_of_the_tool_are_refused_with_what_to_do(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read(text)

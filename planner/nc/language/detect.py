@@ -77,7 +77,8 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
     """Whether a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of the machine decides.
 
-    Otherwise it has no Y and V, and U or W beside X and Z, a cycle G70 to G73 with P and Q, or a G76 with K and D.
+    Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle G70 to G73 with P and Q, or
+    a G76 with K and D.
     """
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
@@ -90,7 +91,8 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     if _has(words, "Y") or _has(words, "V"):
         return False
     letters = {chr(c) for c in np.unique(words.letter) if c}
-    if letters >= set("XZ") and letters & set("UW"):
+    own = set() if machine is None else {letter.upper() for letter in machine.axes}
+    if letters >= set("XZ") and letters & (set("UW") - own):
         return not letters & set(reading.ignore)
     for codes, needed in (((70.0, 71.0, 72.0, 73.0), "PQ"), ((76.0,), "KD")):
         cycles = np.flatnonzero((words.letter == ord("G")) & np.isin(words.value, codes))

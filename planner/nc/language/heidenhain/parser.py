@@ -307,7 +307,7 @@ class HeidenhainParser(Definitions):
 
 _REMEDY = "let the CAM system write the moves out as L, C and CC"
 _WHY = {
-    "LN": "moves with a normal of the surface need compensation in space, or axes that turn",
+    "LN": "moves with a normal of the surface or a direction of the tool need its compensation in space; angles A, B, C are read",
     **dict.fromkeys(
         ("FL", "FLT", "FC", "FCT", "FPOL", "FSELECT"), "free contours (FK) are completed by the control"
     ),

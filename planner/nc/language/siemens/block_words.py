@@ -33,6 +33,9 @@ _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
 _ARCS = {"CIP": "arc through", "CT": "tangent arc"}
 
 
+_ANGLES = "choose a post-processor that writes the angles of the rotary axes (A=, B=, C=)"
+
+
 class BlockWords(Calls):
     """Rows of words. source : the file; circular : CIP or CT was written, and no other motion code since."""
 
@@ -168,6 +171,8 @@ class BlockWords(Calls):
                     operation("+", value, ONE) if name == "TURN" else value,
                 )
             ]
+        if letter in ("A", "B", "C") and name != letter and number is None:
+            raise reader.fault(f"{name}=, a direction of the tool, is not read; {_ANGLES}", at - reader.start)
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
             raise reader.fault(f"{name} is not read; {codes.REMEDY}", at - reader.start)
         given = Number(number) if number is not None else self._given(reader, letter, at)

@@ -224,3 +224,15 @@ def test_linuxcnc_reads_the_flat_program(tmp_path: Path) -> None:
     (tmp_path / "flat.ngc").write_text(found[0])
     canon = ask_oracle([{"path": str(tmp_path / "flat.ngc"), **offsets_in_inches()}], tmp_path)[0]
     assert_same_motion(again, canon, centre=1e-6, feeds=False)
+
+
+def test_an_axis_of_the_machine_is_no_increment_of_a_lathe() -> None:
+    own = MACHINE.model_copy(update={"axes": MACHINE.axes | {"w": MACHINE.axes["z"]}})
+    text = "G21 G91 F1000\nG1 X-6.4\nX26 Z12 W20\nM2\n"
+    found = read(text, own)
+    assert np.allclose(
+        found.end[-1],
+        found.start + [19.6 if axis == "x" else {"z": 12, "w": 20}.get(axis, 0) for axis in own.axes],
+    )
+    with pytest.raises(InputError, match="G95"):
+        read(text, MACHINE)

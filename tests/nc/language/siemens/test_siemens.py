@@ -178,6 +178,10 @@ def test_exact_stops_and_units() -> None:
         ("G41 G451 X1", "G451, outer corners"),
         ("RNDM=3", "RNDM is not read"),
         ("TRAORI", "TRAORI is not read"),
+        (
+            "G0 X0\nG1 X1 A3=0 B3=0 C3=1 F100",
+            "<text>:2:7: .*A3=, a direction of the tool, .*angles of the rotary axes",
+        ),
         ("X=FOO", "<text>:1:3: .*FOO is not declared"),
         ("CYCLE800(1,,2,3,10,0,0)", "tilts the part"),
         ("POCKET3(1,2)", "POCKET3 needs SDIS"),

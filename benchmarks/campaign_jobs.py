@@ -5,8 +5,9 @@ moves in one program and of points on a curve (campaign_programs.py), and those 
 offsets, feed modes, lathe, cutter compensation, splines, and all of these in subprograms, loops and branches (tests/nc/random_nc.py,
 random_splines.py, random_together.py).
 
-A job whose motion would have more than `SAMPLES` samples gets a larger period, and then faster limits and feeds, which make the same
-motion in less time; dwells are cut. So a job is a small one, whatever its program asks for.
+Most jobs are small, so that many can be made: a few blocks and some hundred samples; one in `LARGE` has up to `BLOCKS` and `SAMPLES`. A
+job whose motion would have more samples than it may gets a larger period, and then faster limits and feeds, which make the same motion
+in less time; dwells are cut.
 """
 
 from __future__ import annotations
@@ -24,24 +25,30 @@ import numpy as np
 from benchmarks import axes_campaign, never_slower
 from benchmarks.campaign_programs import BLOCKS, dense, mixed
 from planner.base.errors import InputError
-from planner.machine import Axis, Fir, Machine, Mode
+from planner.machine import ROTARY_AXES, Axis, Fir, Machine, Mode
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 
 TESTS = Path(__file__).resolve().parent.parent / "tests" / "nc"
 SAMPLES = 2000  # of a motion from stop to stop, about
+SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (
+    (30, 400),
+    4.0,
+    30,
+)  # of a usual job, the blocks on the mean above 2, and one in so many is larger
 # Of jobs with more axes or blocks than these only a share is planned with effort normal, which takes tens of seconds.
 AXES_OF_NORMAL, BLOCKS_OF_NORMAL, SHARE_OF_NORMAL = 4, 8, 0.1
-PERIOD_MAX = 0.016  # [s]
+SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines that have none [-]
+PERIOD_MAX = 0.002  # [s]
 DWELL_MAX = 0.05  # [s]
 DRAWS = 60  # of a program until one has few blocks and moves
-VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 2e3, 5e4, 1e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
+VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
-PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004, 0.008, 0.016)  # [s]
+PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
 # Methods with their settings, and how often each is drawn.
 METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (
     (36, "optimal", {"effort": "quick"}),
-    (8, "optimal", {}),
+    (4, "optimal", {}),
     (3, "optimal", {"corner": "bezier"}),
     (3, "optimal", {"corner": "fir"}),
     (3, "optimal", {"corner": "kinematic"}),
@@ -69,7 +76,7 @@ SOURCES = {
     "feeds": 4,
     "lathe": 4,
     "splines": 5,
-    "together": 4,
+    "together": 2,
 }
 Rng = np.random.Generator
 
@@ -115,7 +122,9 @@ def _job(seed: int, rng: Rng) -> Job:
     shares = np.array([share for share, _, _ in METHODS])
     _, method, settings = METHODS[rng.choice(len(METHODS), p=shares / shares.sum())]
     found: tuple[str, Machine, Program | None, str] | None = None
-    most = int(min(3 + rng.exponential(10.0), BLOCKS))  # of most draws
+    large = bool(rng.random() < 1.0 / LARGE)
+    most = int(min(2 + rng.exponential(BLOCKS / 3 if large else SMALL_BLOCKS), BLOCKS))  # of most draws
+    samples = SAMPLES if large else int(rng.integers(*SMALL_SAMPLES))
     for draw in range(DRAWS):
         found = _drawn(source, rng)
         if found[2] is None or 0 < len(found[2]) <= (most if draw < DRAWS // 2 else BLOCKS):
@@ -135,7 +144,7 @@ def _job(seed: int, rng: Rng) -> Job:
     if program is not None and len(program) > BLOCKS:
         program, refusal = None, f"{len(program)} blocks are too many for this campaign"
     if program is not None:
-        program, machine = _short(program, machine)
+        program, machine = _short(program, machine, samples)
     return Job(
         seed=seed, source=source, text=text, program=program, refusal=refusal,
         machine=machine, method=method, settings=dict(settings), tolerance=tolerance,
@@ -153,10 +162,23 @@ def _drawn(source: str, rng: Rng) -> tuple[str, Machine, Program | None, str]:
     else:
         machine = machine_of(rng, "xyz" if source in ("mixed", "dense") and rng.random() < 0.8 else "xyzabc")
         text = _text(source, rng, machine)
+        machine = _narrow(machine, text) if rng.random() < SHARE_OF_NARROW else machine
     try:
         return text, machine, parse_program(text, machine, source=f"{source} job"), ""
     except InputError as fault:
         return text, machine, None, str(fault)
+
+
+def _narrow(machine: Machine, text: str) -> Machine:
+    """The machine without its rotary axes, if the program can be read for that: many programs do not move them."""
+    linear = machine.model_copy(
+        update={"axes": {letter: axis for letter, axis in machine.axes.items() if letter not in ROTARY_AXES}}
+    )
+    try:
+        parse_program(text, linear)
+    except InputError:
+        return machine
+    return linear
 
 
 def _text(source: str, rng: Rng, machine: Machine) -> str:
@@ -213,17 +235,17 @@ def machine_of(rng: Rng, letters: str) -> Machine:
     )  # fmt: skip
 
 
-def _short(program: Program, machine: Machine) -> tuple[Program, Machine]:
-    """The job with a larger period, faster limits and shorter dwells, if its motion would have more than `SAMPLES` samples."""
+def _short(program: Program, machine: Machine, samples: int) -> tuple[Program, Machine]:
+    """The job with a larger period, faster limits and shorter dwells, if its motion would have more samples than that."""
     program = dataclasses.replace(program, dwell=np.minimum(program.dwell, DWELL_MAX))
     time = duration(program, machine)
-    dt = float(np.clip(time / SAMPLES, machine.dt, PERIOD_MAX))
+    dt = float(np.clip(time / samples, machine.dt, PERIOD_MAX))
     machine = machine.model_copy(update={"dt": dt})
-    faster = time / (SAMPLES * dt)
+    faster = time / (samples * dt)
     for _ in range(2):  # the second time for what the limits do not allow
         if faster > 1.0:
             program, machine = quicker(program, machine, faster)
-            faster = duration(program, machine) / (SAMPLES * dt)
+            faster = duration(program, machine) / (samples * dt)
     return program, machine
 
 

@@ -26,6 +26,7 @@ Array = np.ndarray
 ULPS = 8.0  # rounding of a position, in units of 2^-52 of the coordinates and of the way [-]
 RATIO = 1e-6  # share of a limit that is rounding [-]
 PLACE = 2e-6  # [mm] places closer than this are the same
+STILL = 1e-12  # [mm/s] slower is standing
 NEAR = 32  # segments that are looked at first
 FINE = 8  # places of a filtered motion in a period or in the shortest filter
 FINE_MOST = 40_000  # places of a filtered motion at most
@@ -110,7 +111,7 @@ def _normal(motion: Motion, second: tuple[Array, Array]) -> Iterator[str]:
     along = chord / np.maximum(way, 1e-300)[:, None]
     across = np.linalg.norm(value - (value * along).sum(axis=1)[:, None] * along, axis=1) - 3.0 * error
     most = float(np.linalg.norm(motion.limits[1][motion.linear]))
-    turn = np.minimum(motion.normal_acceleration * span / np.maximum(speed, 1e-300), np.pi / 2)
+    turn = np.minimum(motion.normal_acceleration * span / np.maximum(speed, STILL), np.pi / 2)
     over = across - np.minimum(motion.normal_acceleration * (1 + RATIO) + most * np.sin(turn), np.inf)
     over[(speed <= 0) | (size == 0)] = -1.0
     if over.size and over.max() > 0:

@@ -135,13 +135,14 @@ class Behind:
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
         """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a longer rest is enough."""
-        early, late = self.runs_within(runs_of(motion), time)
+        runs = runs_of(motion)
+        early, late = self.runs_within(runs.begin, runs.end, time)
         return early < late
 
-    def runs_within(self, runs: MotionRuns, time: FloatArray) -> tuple[Array, Array]:
-        """First and last (n,) of the runs of which the filters hold something at `time` (n,) [s]."""
-        early = np.searchsorted(runs.end, time - self.filters.delay, side="right")
-        late = np.maximum(np.searchsorted(runs.begin, time) - 1, 0)
+    def runs_within(self, begin: FloatArray, end: FloatArray, time: FloatArray) -> tuple[Array, Array]:
+        """First and last (n,) of the runs from `begin` to `end` (G,) of which the filters hold something at `time` (n,) [s]."""
+        early = np.searchsorted(end, time - self.filters.delay, side="right")
+        late = np.maximum(np.searchsorted(begin, time) - 1, 0)
         return np.minimum(early, late), late
 
     def rests(self, motion: Timed, runs: MotionRuns) -> FloatArray:
@@ -218,12 +219,14 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     made = motion
     for n in range(ROUNDS):
         slower = slower_runs(motion, runs, factor)
-        rest = np.maximum(behind.rests(slower, runs_of(slower)), least)
-        made = standing_longer(slower, runs, np.maximum(rest - gap, 0.0))
+        timed = runs.of(slower)
+        rest = np.maximum(behind.rests(slower, timed), least)
+        longer = np.maximum(rest - gap, 0.0)
+        made = standing_longer(slower, runs, longer)
         places = behind.places(made, path)
         if not len(places.time):
             break
-        early, late = behind.runs_within(runs_of(made), places.time)
+        early, late = behind.runs_within(*timed.behind(longer), places.time)
         own = early == late
         more = np.clip(
             1.0 / np.sqrt(places.less[own]), min(FACTOR_LEAST ** (n + 1), FACTOR_MOST), FACTOR_MOST

@@ -42,6 +42,16 @@ class MotionRuns:
     def __len__(self) -> int:
         return len(self.first)
 
+    def of(self, motion: Timed) -> MotionRuns:
+        """The same runs of a motion with the same pieces and other times."""
+        edges = np.append(motion.t, motion.end)
+        return dataclasses.replace(self, begin=edges[self.first], end=edges[self.last])
+
+    def behind(self, by: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(G,) begins and ends of the runs [s], each but the last followed by a longer standstill, `by` (G,) [s]."""
+        later = np.append(0.0, np.cumsum(by[:-1]))
+        return self.begin + later, self.end + later
+
 
 def runs_of(motion: Timed) -> MotionRuns:
     """The runs of a motion; none if it stands still all the time."""

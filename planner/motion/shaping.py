@@ -132,13 +132,15 @@ class ShapedMotion:
         begin = int(np.searchsorted(times, 0.0, side="right"))
         stop = begin + int(inside.sum())
         columns: dict[str, Array] = {}
-        there = self.motion.at(times[begin:stop], dt) if stop > begin else None
+        # two times next to each other may be one after a delay was subtracted
+        single, which = np.unique(times[begin:stop], return_inverse=True)
+        there = self.motion.at(single, dt) if stop > begin else None
         for name in ("position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line"):
             first, last = (getattr(end, name)[0] for end in self._ends)
             column = np.empty((len(times), *np.shape(first)), dtype=np.asarray(first).dtype)
             still = name in ("velocity", "acceleration", "jerk", "feed")
             column[:begin], column[stop:] = (0.0, 0.0) if still else (first, last)
             if there is not None:
-                column[begin:stop] = getattr(there, name)
+                column[begin:stop] = getattr(there, name)[which]
             columns[name] = column
         return columns

@@ -51,7 +51,7 @@ CANDIDATES = ((SHARP, 1.0), (SHARP, 1.5), (SHARP, 1.75), (SHARP, 2.0), (np.inf, 
 OF_PATH = 0.5
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 # D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
-EXCESS, SPARE = 1e-6, 1e-5
+EXCESS, SPARE = 2e-7, 1e-5
 # Of the tolerance, what looking at other times may find more [-].
 SPARE_ERROR = 2e-3
 # What path and samples leave of the tolerance counts as this share at least [-]: in one step the speed falls by at most

@@ -94,3 +94,13 @@ def test_it_begins_and_ends_at_rest_where_the_motion_does():
     assert not ends.velocity.any()
     assert (np.diff(shaped.t) > 0).all()
     assert shaped.t[0] == 0.0
+
+
+def test_times_next_to_each_other_may_be_one_after_a_delay():
+    motion, shaper = hop(), shaper_of((Mode(frequency=18.0, damping=0.03),))
+    times = np.random.default_rng(0).uniform(0.05, 0.1, 10_000)
+    after = np.nextafter(times, 1.0)
+    one = np.flatnonzero(times - shaper.delay[1] == after - shaper.delay[1])
+    assert len(one)
+    seen = ShapedMotion(motion, shaper).at(np.array([times[one[0]], after[one[0]]]), 1e-3)
+    assert seen.position[1] == pytest.approx(seen.position[0], abs=1e-9)

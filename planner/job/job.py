@@ -225,6 +225,7 @@ class Job:
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=tables.prices,
+            pricing=tables.pricing,
             notes=(*job_notes(self.program, *self.real), *self.noted),
             timings=self.stages.timings,
         )

@@ -65,7 +65,11 @@ class Method(ABC):
         at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
         require_samples(at_feed, machine.dt)
         stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
-        return self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+        made = self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+        if made.pricing is None:
+            return made
+        with stages.stage("report"):
+            return dataclasses.replace(made, prices=made.pricing(), pricing=None)
 
     def plan_best(self, job: Job) -> Plan:
         """The plan of a job; on a machine with filters the fastest of those that are tried (`ways`)."""
@@ -90,12 +94,17 @@ class Method(ABC):
         """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
         return True
 
-    def plan_within_periods(self, job: Job) -> Plan:
-        """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py)."""
+    def plan_within_periods(self, job: Job, within: float = np.inf) -> Plan:
+        """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py).
+
+        within : a motion that takes longer than this is not planned again: with less tolerance it would hardly be faster [s]
+        """
         made = self.plan_job(job)
         given, planned, (machine, programmed) = job, job.toolpath, job.real
         for again in range(1, PERIOD_ROUNDS + 1):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
+                break
+            if made.cycle_time > within:
                 break
             with job.stage("geometry"):
                 near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
@@ -118,9 +127,11 @@ class Method(ABC):
         if job is given:
             return made
         # what less tolerance costs is not in the problem's prices
-        made = dataclasses.replace(made, prices=None, notes=(*made.notes, _said(made, programmed, planned)))
+        made = dataclasses.replace(
+            made, prices=None, pricing=None, notes=(*made.notes, _said(made, programmed, planned))
+        )
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
-            rival = other.plan_within_periods(given.afresh())
+            rival = other.plan_within_periods(given.afresh(), _time(made))
             wins = faster(made, rival) is rival
             job.tell(
                 "another method",

@@ -9,7 +9,7 @@ from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.job.beside import Beside, beside_motion
-from planner.job.records import CornerTable, GridHistory, PriceList
+from planner.job.records import CornerTable, GridHistory, PriceList, Pricing
 from planner.job.shown import Shown
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
@@ -32,6 +32,7 @@ class Plan(Shown):
     rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
+    pricing             : finds `prices`, in a plan that may not be the one that is taken; None in a plan that is delivered
     stop_time           : cycle time if every block ran from rest to rest [s], dwells included
     grid_points         : number of grid points of the problem that was solved
     notes               : what was assumed and what was given up, each with its first line and a count
@@ -54,6 +55,7 @@ class Plan(Shown):
     grid_points: int
     joints: Trajectory | None = None
     prices: PriceList | None = None
+    pricing: Pricing | None = None
     notes: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -161,6 +162,9 @@ class PriceList:
         return sorted(worth, key=lambda entry: -entry[1])
 
 
+Pricing = Callable[[], PriceList | None]  # finds a plan's prices, once the plan is the one that is taken
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tables:
     """What a method can say of its plan besides the motion, as far as it can: fields of `Plan`."""
@@ -168,6 +172,7 @@ class Tables:
     rounded: CornerTable | None = None
     grid: GridHistory | None = None
     prices: PriceList | None = None
+    pricing: Pricing | None = None
 
 
 NO_TABLES = Tables()

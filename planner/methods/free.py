@@ -103,6 +103,7 @@ def freed(job: Job, plan: Plan, dial: Search) -> Freed:
         rounded=None,
         grid=tables.grid,
         prices=tables.prices,
+        pricing=tables.pricing,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
         sentence=said(job, start, found, kept, why, "a path first, then its feed")[1],
         notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),
@@ -331,13 +332,14 @@ def tabled(
         )
     moving = trajectory.cycle_time - float(job.toolpath.dwell.sum())
     unpriced = 1.0 - sum(one.priced_time() for one in taken) / moving
+    pricing = None
     if prices is None or unpriced > UNPRICED_MOST:
-        prices = start.prices if start else None
-        if prices is not None:
+        prices, pricing = (start.prices, start.pricing) if start else (None, None)
+        if prices is not None or pricing is not None:
             job.note("what limits cost is told of the motion before geometry and feed were found together")
     elif unpriced > UNPRICED:
         job.note(f"what limits cost leaves out {unpriced:.2g} of the time, on which the motion before stays")
-    return Tables(grid=grid, prices=prices)
+    return Tables(grid=grid, prices=prices, pricing=pricing)
 
 
 def _missed(job: Job, motion: MotionInTime, found: list[FoundRun]) -> set[int]:

@@ -5,10 +5,10 @@ Corners are rounded, tangent joints with a jump of the curvature too: a jump wou
 
 The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no round
 has reshaped, with a motion that need not be fit for delivery (at_once.py). Where it leaves some of that, it begins on the plan of the
-first splines; where it leaves much of that, or the path doubles back within the tolerance, the splines are reshaped and it begins there
-once more; the faster plan is taken. With a limit of the normal acceleration it goes on with reshaped splines at once: from a plan on
-the first ones it ended up to 1e-2 slower than these without it (`benchmarks.joint_hard`). Rounds of reshaping alone end up to 5e-2
-slower (docs/joint.md).
+first splines; where it leaves much of that, or the path of a small job doubles back within the tolerance, the splines are reshaped and
+it begins there once more; the faster plan is taken. With a limit of the normal acceleration it goes on with reshaped splines at once:
+from a plan on the first ones it ended up to 1e-2 slower than these without it (`benchmarks.joint_hard`). Rounds of reshaping alone end
+up to 5e-2 slower (docs/joint.md).
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ from planner.optimal.shaped import shaped_plan
 # (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
 SIGMA2 = 0.94
 # A motion of more steps than the second that takes no more than the first over what its feed asks for is not searched [-]: on 30,000
-# lines of dense chords the search took half of the computing and found nothing; on a random job of ten blocks it found 9e-4.
+# lines of dense chords the search took half of the computing and found nothing; on a random job of ten blocks it found 9e-4. Nor are
+# the splines of such a motion reshaped because its path doubles back somewhere: 4,153 blocks of a V-carving took 50 CPU s instead of 19
+# for 8e-5 of the time.
 LEAST_LEFT, CHEAP = 1e-3, 10_000
 # Steps that a motion has on a leg at least (tube/guess.py).
 LEAST_STEPS = 2
@@ -111,12 +113,12 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
         found = searched_at_once(job.afresh(), settings, begun)
         once, steps = found.plan, found.steps
         # from a plan, too, it has as many steps: 112,143 instead of 114,552 on 20,000 blocks of stellabee1
-        if once is not None and not (dial.of(steps).again and _doubles_back(job)):
+        if once is not None and not (dial.of(steps).again and steps <= CHEAP and _doubles_back(job)):
             return once
     if steps > dial.steps_max or not dial.of(steps).again:
         return fastest_plan(job.afresh(), settings)
     if once is None and job.machine.normal_acceleration is None:
-        on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0, priced=False)
+        on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0)
         again = job.afresh()
         on_these = freed(again, fastest_plan(again, on_first), dial)
         if on_these.kept <= dial.kept:

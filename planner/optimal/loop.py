@@ -52,6 +52,7 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
+from planner.job.records import Tables
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
 from planner.motion.timing import Motion
@@ -64,7 +65,7 @@ from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order
 from planner.optimal.reshape import chosen, reshape, run_times
-from planner.optimal.result import plan_of_solution, prices_of
+from planner.optimal.result import plan_of_solution, pricing_of
 from planner.optimal.tighten import within_limits, without_seen_excess
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
@@ -97,7 +98,6 @@ class Settings:
     bezier : the corner of "bezier", and where there is no spline
     effort : grids and rounds of reshaping
     rounds : of reshaping; None for those of the effort
-    priced : whether it is told what limits cost
     """
 
     method: str
@@ -106,7 +106,6 @@ class Settings:
     bezier: CornerShape = field(default_factory=BezierCorner)
     effort: Effort = EFFORTS[NORMAL]
     rounds: int | None = None
-    priced: bool = True
 
 
 def fastest_plan(job: Job, settings: Settings) -> Plan:
@@ -133,32 +132,30 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
         return smooth
     best = dataclasses.replace(best, method=smooth.method, corner=smooth.corner, timings=job.stages.timings)
     if counted_time(smooth) < (1.0 + SAME_MOTION) * counted_time(best):
-        best = dataclasses.replace(best, prices=smooth.prices, grid=smooth.grid)
+        best = dataclasses.replace(best, prices=smooth.prices, pricing=smooth.pricing, grid=smooth.grid)
     return best
 
 
 def plan_on_path(job: Job, settings: Settings) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered."""
-    found, made, prices = [time_optimal(job, settings)], None, None
+    found, made, prices, pricing = [time_optimal(job, settings)], None, None, None
     if found[0].solution.solved:
         with job.stage("solve"):  # which lets go of what is found: a third of a kilobyte a point
             best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
         not_limited = () if settings.order.jerk_limited else ("jerk",)
-        if not (settings.order.jerk_limited and settings.priced):
-            made = _delivered(job, motion, not_limited)
-        elif len(best.samples) > PRICED_BESIDE and threads() > 1:
-            made, prices = beside(
-                lambda: _delivered(job, motion, not_limited), lambda: prices_of(best, job.machine)
-            )
+        if settings.order.jerk_limited:
+            pricing = pricing_of(best, job.machine)
+        if pricing is not None and len(best.samples) > PRICED_BESIDE and threads() > 1:
+            made, prices = beside(lambda: _delivered(job, motion, not_limited), pricing)
+            pricing = None
         else:
             made = _delivered(job, motion, not_limited)
-            with job.stage("report"):
-                prices = prices_of(best, job.machine)
     else:
         best = found.pop()
-    return plan_of_solution(job, best, made, method=settings.method, corner=settings.corner, prices=prices)
+    tables = Tables(prices=prices, pricing=pricing)
+    return plan_of_solution(job, best, made, method=settings.method, corner=settings.corner, tables=tables)
 
 
 def time_optimal(job: Job, settings: Settings) -> OnPath:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from functools import partial
+
 import numpy as np
 
 from planner.corners.smooth import CornerShape
 from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
-from planner.job.records import PriceList, Tables
+from planner.job.records import NO_TABLES, PriceList, Pricing, Tables
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import Motion
@@ -26,7 +29,7 @@ def plan_of_solution(
     *,
     method: str,
     corner: str | CornerShape,
-    prices: PriceList | None = None,
+    tables: Tables = NO_TABLES,
 ) -> Plan:
     """The plan of a solution and what was delivered of it, None unless solved."""
     rounded = grid = None
@@ -47,15 +50,21 @@ def plan_of_solution(
         status=best.solution.status,
         sentence=best.solution.sentence,
         grid_points=len(best.samples),
-        tables=Tables(rounded=rounded, grid=grid, prices=prices),
+        tables=dataclasses.replace(tables, rounded=rounded, grid=grid),
     )
 
 
-def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
-    """What the limits of a jerk-limited motion cost; None where the solver does not tell, and behind filters, of which the problem
-    knows only a part. With limits of one's own the tolerance of splines has no price: the machine alone pulls at their shapes."""
+def pricing_of(best: OnPath, machine: Machine) -> Pricing | None:
+    """What finds the prices of a jerk-limited motion's limits; None where the solver does not tell, and behind filters, of which the
+    problem knows only a part."""
     if not best.solution.multipliers or machine.fir is not None:
         return None
+    return partial(_prices, best, machine)
+
+
+def _prices(best: OnPath, machine: Machine) -> PriceList | None:
+    """The prices of its limits. With limits of one's own the tolerance of splines has no price: the machine alone pulls at their
+    shapes."""
     by_site = None
     # what the corridor of the splines costs
     if best.shape is not None and len(best.path.spline) and not machine.own:

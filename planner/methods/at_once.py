@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 from planner.job.job import Job
 from planner.job.plan import Plan
-from planner.methods.free import Start, part_of, said, search, solver_of, tabled
+from planner.methods.all_runs import searched_runs
+from planner.methods.free import Start, said, tabled
 from planner.optimal.loop import Settings
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.tube.parts import FoundRun, parts_of
+from planner.tube.parts import parts_of
 from planner.tube.run import tube_runs_of
 from planner.tube.splice import Spliced, SplicedRun
 
@@ -50,17 +51,13 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
             job.tell("search", steps=steps, of=most)
             return AtOnce(None, steps)
         dial = dial.of(steps)
-        found: list[FoundRun] = []
-        done, parts = 0, list[SplicedRun]()
-        for k, run in enumerate(runs):
-            of_run = len(start.guess(k, run))
-            progress = part_of(report, done, of_run, steps)
-            found.append(search(k, run, [start], solver_of(dial, progress, divide=False)))
-            if not found[-1].whole:
-                job.tell("search", steps=steps, of_runs=len(runs), whole=k)
-                return AtOnce(None, steps)
-            parts += parts_of(job.toolpath, found[-1], start.spliced(k))
-            done += of_run
+        found = searched_runs(runs, start, dial, report, divide=False)
+        if found is None:
+            job.tell("search", steps=steps, of_runs=len(runs))
+            return AtOnce(None, steps)
+        parts: list[SplicedRun] = []
+        for k, one in enumerate(found):
+            parts += parts_of(job.toolpath, one, start.spliced(k))
     made = job.deliver(Spliced(runs=tuple(parts)))
     trajectory, verdict = made
     job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)

@@ -28,7 +28,7 @@ from planner.tube.outcome import TubeSolution
 from planner.tube.own import TubeOwn
 from planner.tube.parts import FoundRun, parts_of
 from planner.tube.refine import divided, searched_again
-from planner.tube.run import TubeRun, tube_runs_of
+from planner.tube.run import TubeRun
 from planner.tube.solvers import TubeSolver
 from planner.tube.splice import Spliced, SplicedRun
 
@@ -42,16 +42,6 @@ SEARCHES = (1.0, 1.2, 2.3)
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
 
 
-class Freed(NamedTuple):
-    """A plan after the search.
-
-    kept : share of the time on which the motion from which it began stays [-]; 1 where there was no search
-    """
-
-    plan: Plan
-    kept: float
-
-
 def searchable(job: Job) -> bool:
     """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no limits of one's own, no
     range in step with the spindle; and whether the path leaves it anything to find."""
@@ -63,58 +53,6 @@ def searchable(job: Job) -> bool:
         and not toolpath.held.any()
         and not toolpath.exact.all()
     )
-
-
-def freed(job: Job, plan: Plan, dial: Search) -> Freed:
-    """The plan with a faster motion near its own where one is found (tube/own.py), else the plan.
-
-    job  : a searchable one
-    dial : how finely, and up to which size: a motion that has more steps of constant jerk is left as it is
-
-    What holds the motion, and what limits cost, is told from the search (`tabled`).
-    """
-    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
-        return Freed(plan, 1.0)
-    with job.stage("search") as report:
-        runs = list(tube_runs_of(job.toolpath, job.machine))
-        start = Start(job.motion_of[plan.trajectory], job, dial.cut, plan)
-        steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
-        if steps > dial.steps_max:
-            job.tell("search", steps=steps, of=dial.steps_max)
-            return Freed(plan, 1.0)
-        found, done = [], 0
-        dial = dial.of(steps)
-        for k, run in enumerate(runs):
-            of_run = len(start.guess(k, run))
-            solver = solver_of(dial, part_of(report, done, of_run, steps), divide=True)
-            found.append(search(k, run, [start], solver))
-            done += of_run
-    made, kept, why = delivered(job, start, found)
-    better = made[0] is not plan.trajectory
-    share = _share_kept(start, found, kept) if better else 1.0
-    job.tell("search", found=made[0].cycle_time, before=plan.trajectory.cycle_time, kept=better, steps=steps)
-    if not better:
-        return Freed(plan, share)
-    tables = tabled(job, plan, made[0], found, kept)
-    faster = dataclasses.replace(
-        plan,
-        trajectory=made[0],
-        verdict=made[1],
-        rounded=None,
-        grid=tables.grid,
-        prices=tables.prices,
-        pricing=tables.pricing,
-        grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
-        sentence=said(job, start, found, kept, why, "a path first, then its feed")[1],
-        notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),
-        timings=job.stages.timings,
-    )
-    return Freed(faster, share)
-
-
-def part_of(report: Callable[[float], None], done: int, of_run: int, steps: int) -> Callable[[float], None]:
-    """Tells which share of all steps is done, from the share of a run that is."""
-    return lambda share: report((done + share * of_run) / steps)
 
 
 class InTwo(NamedTuple):
@@ -143,19 +81,6 @@ def solver_of(dial: Search, report: Callable[[float], None], *, divide: bool) ->
 def _part(report: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
     """Tells the share of the whole, from that of the part between two shares of it."""
     return lambda share: report(begin + share * (end - begin))
-
-
-def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
-    """Share of the time on which the start's motion stays [-]."""
-    stays = 0.0
-    for k, one in enumerate(found):
-        if one.run.exact:  # there is nothing to be found
-            continue
-        if k in kept or one.steps is None:
-            stays += start.lasting(k)
-        elif one.kept is not None:
-            stays += float(one.steps.h[one.kept].sum())
-    return stays / sum(start.lasting(k) for k in range(len(found)))
 
 
 class Start:

@@ -97,7 +97,8 @@ def _freed_plan(job: Job, settings: Settings) -> Plan:
     if steps > dial.steps_max:
         return fastest_plan(job, settings)
     from planner.methods.at_once import searched_at_once  # other plans need not load what they use
-    from planner.methods.free import freed, searchable
+    from planner.methods.free import searchable
+    from planner.methods.from_plan import freed
 
     if not searchable(job):
         return fastest_plan(job, settings)

@@ -125,7 +125,7 @@ def test_a_search_that_leaves_something_comes_once_more() -> None:
     """8 s for 80 % of it, and then a plan: 3 s took as much as that needs, and the search 10 s; quick makes no other one."""
     left, now = searched()
     left.stage(now + 8.0, "search", 0.8)
-    left.step(now + 8.0, step("search", 1e-6, of_runs=2, whole=1))
+    left.step(now + 8.0, step("search", 1e-6, of_runs=2))
     left.stage(now + 8.0, "geometry", 0.0)
     more = search_left.PLAN * 3.0 + 10.0 * (1.0 + search_left.DELIVERY)
     assert left.left(now + 8.0) == pytest.approx(more)

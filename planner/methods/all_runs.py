@@ -1,0 +1,51 @@
+"""The search for geometry and feed together along all runs of a job: long runs one after the other, the windows of each side by side,
+then short ones side by side. What is found does not depend on the number of threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from planner.base.threads import side_by_side
+from planner.methods.free import Start, search, solver_of
+from planner.optimal.effort import Search
+from planner.tube.parts import FoundRun
+from planner.tube.run import TubeRun
+
+LONG = 3_000  # steps of a run that is divided into windows enough for itself
+
+
+def searched_runs(
+    runs: list[TubeRun], start: Start, dial: Search, report: Callable[[float], None], *, divide: bool
+) -> list[FoundRun] | None:
+    """What is found on each run; None where a run is not found as a whole and `divide` is not asked for.
+
+    divide : divide windows that fail, and keep the guess where nothing faster is found (tube/own.py)
+    """
+    size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
+    found: dict[int, FoundRun] = {}
+    stopped: list[int] = []  # at runs that are not whole
+
+    def done() -> int:
+        return sum(size[k] for k in found)
+
+    def one(k: int, tell: Callable[[float], None]) -> None:
+        if not stopped:
+            found[k] = search(k, runs[k], [start], solver_of(dial, tell, divide=divide))
+            if not (divide or found[k].whole):
+                stopped.append(k)
+
+    def share(before: int, of_run: int, part: float) -> None:
+        report((before + part * of_run) / sum(size))
+
+    for k in range(len(runs)):
+        if size[k] > LONG:
+            one(k, partial(share, done(), size[k]))
+    short = [k for k in range(len(runs)) if size[k] <= LONG]
+    work = [partial(one, k, lambda _: None) for k in short]
+    if sum(size[k] for k in short) > LONG:
+        side_by_side(work, lambda: stopped.append(-1), lambda: share(done(), 0, 0.0))
+    else:
+        for task in work:
+            task()
+    return None if stopped else [found[k] for k in range(len(runs))]

@@ -42,6 +42,7 @@ filters (job/method.py). How often each of these fires, and what plans lose with
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,7 +56,7 @@ from planner.job.plan import Plan
 from planner.job.records import Tables
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
-from planner.motion.timing import Motion
+from planner.motion.timing import Motion, MotionInTime
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
@@ -148,10 +149,10 @@ def plan_on_path(job: Job, settings: Settings) -> Plan:
         if settings.order.jerk_limited:
             pricing = pricing_of(best, job.machine)
         if pricing is not None and len(best.samples) > PRICED_BESIDE and threads() > 1:
-            made, prices = beside(lambda: _delivered(job, motion, not_limited), pricing)
+            made, prices = beside(lambda: judged(job, motion, not_limited), pricing)
             pricing = None
         else:
-            made = _delivered(job, motion, not_limited)
+            made = judged(job, motion, not_limited)
     else:
         best = found.pop()
     tables = Tables(prices=prices, pricing=pricing)
@@ -324,15 +325,20 @@ def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> 
     job.tell(name, found=tried.solution.cycle_time, before=before, kept=tried.faster_than(best), **facts)
 
 
-def _delivered(job: Job, motion: Motion, not_limited: tuple[str, ...]) -> Delivered:
-    """Setpoints and verdict of a motion. If the verdict finds a tiny excess the motion is slowed down, and judged at other times, from
-    which nothing was fed back."""
-    made = job.deliver(motion, not_limited)
+def judged(
+    job: Job,
+    motion: Motion,
+    not_limited: tuple[str, ...],
+    made_of: Callable[[Motion], MotionInTime] | None = None,
+) -> Delivered:
+    """Setpoints and verdict of a motion, or of what is `made_of` it. If the verdict finds a tiny excess the motion is slowed down, and
+    judged at other times, from which nothing was fed back."""
+    made = job.deliver(motion if made_of is None else made_of(motion), not_limited)
     for again in range(SEEN_ROUNDS):
         gentler = without_seen_excess(motion, made[1], again)
         if gentler is None:
             break
         job.tell("slower for verdict", found=gentler.end, before=motion.end, round=again + 1)
         motion = gentler
-        made = job.deliver(motion, not_limited, seed=again + 1)
+        made = job.deliver(motion if made_of is None else made_of(motion), not_limited, seed=again + 1)
     return made

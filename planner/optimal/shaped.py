@@ -10,8 +10,7 @@ tolerance; p does not. It follows that:
   with the shortest rest that is enough. At full stops of the program p rests for the whole length of the shaper, so that D stands
   still.
 * Where D exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the times of all copies, and
-is
-  solved again. What remains after `ROUNDS` is removed by slowing down runs of p.
+  is solved again. What remains after `ROUNDS` is removed by slowing down runs of p.
 
 Of the `CANDIDATES` the fastest D is delivered. There always is one: with the limits as they are, stops at all corners and rests of the
 whole length, every limit and the tolerance are kept.
@@ -36,7 +35,7 @@ from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion, Shaper, shaper_of
 from planner.motion.timing import Motion, in_chunks, inside_pieces
-from planner.optimal.loop import Settings, time_optimal
+from planner.optimal.loop import Settings, judged, time_optimal
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import solve_again
 from planner.optimal.result import plan_of_solution
@@ -270,6 +269,8 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0,
             sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
         )  # fmt: skip
-    made = job.deliver(found.delivered, () if settings.order.jerk_limited else ("jerk",))
+    not_limited = () if settings.order.jerk_limited else ("jerk",)
+    shaper = found.delivered.shaper
+    made = judged(job, found.motion, not_limited, lambda planned: ShapedMotion(planned, shaper))
     plan = plan_of_solution(job, found.planned, made, method=settings.method, corner=settings.corner)
     return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

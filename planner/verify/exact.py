@@ -1,7 +1,8 @@
 """Blocks under G61 and G61.1: the delivered samples lie on the path itself.
 
-Which block a sample is at follows from the times at which the joints are passed (matching.py); the nearest of it and of its neighbours
-counts. On a line the distance is that from the chord, on an arc that from the place p(x) where the sample is perpendicular to the arc,
+Which block a sample is at follows from the times at which the joints are passed (matching.py), to within a period; the nearest of the
+blocks of these times and of their neighbours counts. On a line the distance is that from the chord, on an arc that from the place p(x)
+where the sample is perpendicular to the arc,
 
     (p(x) - q) p'(x) = 0,      by Newton's method from the angle at which q is seen from the axis, in each turn,
 
@@ -37,23 +38,34 @@ def exact_faults(
     passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     worst, when, line = 0.0, 0.0, 0
     for chunk in trajectory.chunks():
-        k = np.clip(np.searchsorted(passed, chunk.t, side="right") - 1, 0, len(toolpath) - 1)
+        k = _segment(passed, chunk.t, len(toolpath))
         inside = np.flatnonzero(toolpath.exact[k] & ~_of_a_corner(toolpath, chunk.position, k))
         if not len(inside):
             continue
-        off = np.min(
-            [
-                _distance(toolpath, chunk.position[inside], np.clip(k[inside] + step, 0, len(toolpath) - 1))
-                for step in (-1, 0, 1)
-            ],
-            axis=0,
-        )
+        near = [_segment(passed, chunk.t[inside] + by * chunk.dt, len(toolpath)) for by in (-1.0, 1.0)]
+        off = _least_distance(toolpath, chunk.position[inside], near[0] - 1, near[1] + 1)
         at = int(off.argmax())
         if off[at] > worst:
             worst, when, line = float(off[at]), float(chunk.t[inside[at]]), int(toolpath.line[k[inside[at]]])
     if worst <= PLACE_ROUNDING + float(np.linalg.norm(rounding)):
         return []
     return [f"exact path: {worst:.6g} mm off at t = {when:.6g} s, line {line}: G61 asks for the path itself"]
+
+
+def _segment(passed: FloatArray, t: FloatArray, count: int) -> Array:
+    """(n,) segment of `count` on which the motion is at times t (n,) [s], by when the joints are passed (count - 1,) [s]."""
+    found: Array = np.clip(np.searchsorted(passed, t, side="right") - 1, 0, count - 1)
+    return found
+
+
+def _least_distance(toolpath: Toolpath, q: FloatArray, first: Array, last: Array) -> FloatArray:
+    """(n,) distance of points q (n, A) from the nearest of the segments `first` to `last`."""
+    first, last = np.maximum(first, 0), np.minimum(last, len(toolpath) - 1)
+    least = np.full(len(q), np.inf)
+    for step in range(int((last - first).max()) + 1):
+        at = np.flatnonzero(first + step <= last)
+        least[at] = np.minimum(least[at], _distance(toolpath, q[at], first[at] + step))
+    return least
 
 
 def _of_a_corner(toolpath: Toolpath, q: FloatArray, segment: Array) -> Array:

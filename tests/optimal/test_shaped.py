@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import never_slower, problems
 from planner.base.errors import InputError
-from planner.machine import Fir, Mode
+from planner.machine import Axis, Fir, Machine, Mode
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
 
@@ -89,3 +89,14 @@ def test_refusals(pentagon):
         plan(pentagon, problems.machine(), shaped=True)
     with pytest.raises(InputError, match="shaped = True: method kinematic does not use it"):
         plan(pentagon, SHAKEN, method="kinematic", shaped=True)
+
+
+def test_a_peak_between_the_places_looked_at_is_made_good():
+    """Found by the campaign of random jobs: the verdict saw a jerk of 1.0003 times the limit between them."""
+    limits = {"x": (655.0, 343.0, 24934.0), "y": (1443.0, 254.0, 10157.0), "z": (1797.0, 287.0, 16282.0)}
+    axes = {letter: Axis(velocity=v, acceleration=a, jerk=j) for letter, (v, a, j) in limits.items()}
+    mode = Mode(frequency=18.137218255521244, damping=0.037526160405827264)
+    machine = Machine(name="soft", dt=0.002, tolerance=0.0149, feed_default=10.0, axes=axes, modes=(mode,))
+    text = "G21 G17 G90 G94 F1183.5\nG64 P0.0149\nG2 X-0.0274 Y0.0947 R0.393019\nG1 X0.0146 Y-0.0506\nM2\n"
+    made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
+    assert made.verdict.passed, made.verdict.faults

@@ -11,6 +11,7 @@ import planner
 from planner.base.arrays import FloatArray
 from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
+from planner.machine import Axis, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import verify
 
@@ -72,3 +73,19 @@ def test_under_g64_the_tolerance_counts(plan: Plan) -> None:
     motion = dataclasses.replace(plan.trajectory, position=shifted)
     assert faults(plan, motion, "G61.1") != []
     assert faults(plan, motion, "G64") == []
+
+
+def test_a_sample_beyond_pieces_shorter_than_a_period_is_on_the_path() -> None:
+    """Found by the campaign of random jobs: a spline of seven pieces is passed within two periods, and the joints' times are good to
+    one."""
+    limits = {"x": (1356.63, 29283.7), "y": (1407.18, 32242.24), "z": (1481.96, 35410.65)}
+    axes = {letter: Axis(velocity=v, acceleration=a, jerk=3e7) for letter, (v, a) in limits.items()}
+    machine = Machine(name="quick", dt=0.002, tolerance=0.8036, feed_default=10.0, axes=axes)
+    text = (
+        "G21 G17 G61 F118474.054\nG5 X-0.072072 Y-0.006866 I0.002819 J0.042341 P-0.001324 Q-0.021307\n"
+        "G1 X-0.218 Y0.069 F62582.44\nG0 X-0.330 Y-0.147\nG1 X-0.712 Y-0.886\nG2 X-1.35 Y-2.121 R-3.586437\n"
+        "G1 X-1.5009 Y-2.413 F8092.1\nG1 X-1.577 Y-2.56 Z0.085\nG1 X-2.3679 Y-4.0905\n"
+    )
+    made = planner.plan(planner.read_program(text=text, machine=machine), machine, method="second-order")
+    assert made.verdict is not None
+    assert made.verdict.passed, made.verdict.faults

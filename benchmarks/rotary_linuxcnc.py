@@ -60,7 +60,7 @@ def ini(machine: Machine, peers: Path, work: Path) -> str:
     """LinuxCNC's configuration for the machine: one joint per axis; in both, rotary limits are in degrees."""
     limits = {name: (axis.velocity, axis.acceleration) for name, axis in machine.axes.items()}
     linear = np.array([limits[name] for name in machine.axes if name not in ROTARY])
-    turning = np.array([limits[name] for name in machine.axes if name in ROTARY])
+    turning = np.array([limits[name] for name in machine.axes if name in ROTARY] or linear)
     (v, a), (w, b) = np.sqrt((linear**2).sum(axis=0)), np.sqrt((turning**2).sum(axis=0))
     letters = "".join(machine.axes).upper()
     parts = [

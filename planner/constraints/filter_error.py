@@ -27,8 +27,12 @@ def rate(machine: Machine) -> float:
 
 
 def at_stops(a: FloatArray, tolerance: FloatArray, held: Array, machine: Machine) -> FloatArray:
-    """Accelerations a (n,) of moves from stop to stop [mm/s2], at most the tolerances (n,) over `rate`: a full stop is rounded by
-    filters. Moves in step with the spindle, `held` (n,), keep theirs, for which their run-in is made; they rest at their ends."""
+    """Accelerations with which filters round full stops within the tolerance.
+
+    a         : (n,) of moves from stop to stop [mm/s2]
+    tolerance : (n,) at their ends [mm]; over `rate` it is the most
+    held      : (n,) moves in step with the spindle keep theirs, for which their run-in is made; they rest at their ends
+    """
     if machine.fir is None:
         return a
     return np.where(held, a, np.minimum(a, tolerance / rate(machine)))

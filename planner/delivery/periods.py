@@ -16,7 +16,7 @@ and speeds up along another.
    `with_less_tolerance` subtracts the excess from the tolerance of the corner. Where the chords alone would use nearly all of the
    tolerance, the corner becomes a full stop.
 3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error after all. If the verdict
-   finds it too large inside a block, `with_less_inside` takes the excess from the tolerance of the block.
+   finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the tolerance of the block.
 """
 
 from __future__ import annotations
@@ -214,7 +214,10 @@ def with_less_inside(
     planned: Toolpath, programmed: Toolpath, line: int, ratio: float, again: int
 ) -> Toolpath | None:
     """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are `ratio` times the
-    tolerance off while they keep it at the vertices; None where next to nothing would be left. again: the round, from 1."""
+    tolerance off while they keep it at the vertices for all that `missed` sees; None where next to nothing would be left.
+
+    again : the round, from 1
+    """
     segment = np.flatnonzero(planned.line == line)
     joints = np.union1d(segment, segment + 1)
     tolerance = planned.tolerance.copy()

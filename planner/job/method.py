@@ -20,6 +20,7 @@ from planner.job.trace import Log
 from planner.machine import Machine
 from planner.motion.timing import require_samples
 from planner.nc.program import Program
+from planner.verify import Verdict
 
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
@@ -109,9 +110,8 @@ class Method(ABC):
             with job.stage("geometry"):
                 near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
                 less = periods.with_less_tolerance(planned, programmed, near, far)
-                if less is None and made.verdict is not None and made.verdict.contour.broken:
-                    worst = made.verdict.contour
-                    less = periods.with_less_inside(planned, programmed, worst.line, worst.ratio, again)
+                if less is None and made.verdict is not None and (worst := _worst(made.verdict)) is not None:
+                    less = periods.with_less_inside(planned, programmed, *worst, again)
             if less is None:
                 break
             planned = less
@@ -177,6 +177,18 @@ def _inside(made: Plan) -> bool:
     return verdict is None or not (
         verdict.vertex.broken or verdict.contour.broken or verdict.corners.overdrawn.any()
     )
+
+
+def _worst(verdict: Verdict) -> tuple[int, float] | None:
+    """Where chords are most off in the judge's eyes: the NC line, and how far off as a share of the tolerance; None where they keep
+    it. Eq. (18) bounds them by the curvature at the vertex, which can be more than any phase of the samples shows."""
+    if verdict.contour.broken:
+        return verdict.contour.line, verdict.contour.ratio
+    corners = verdict.corners
+    if not corners.overdrawn.any():
+        return None
+    at = int(corners.budget_ratio.argmax())
+    return int(corners.line[at]), float(corners.budget_ratio[at])
 
 
 def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:

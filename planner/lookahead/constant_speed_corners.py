@@ -141,14 +141,10 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
 
 
 def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """Limits v, a, j (3, M) along every segment; a is at most the tolerance over the rate at which filters err: a full stop is rounded
-    by them."""
+    """Limits v, a, j (3, M) along every segment; with a, filters round full stops within the tolerance."""
     v, a, j = block_limits(toolpath, machine)
-    if machine.fir is not None:
-        a = np.minimum(
-            a, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]) / filter_error.rate(machine)
-        )
-    return np.stack([v, a, j])
+    tolerance = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
+    return np.stack([v, filter_error.at_stops(a, tolerance, toolpath.held, machine), j])
 
 
 @njit(cache=True, error_model="numpy")

@@ -39,12 +39,13 @@ EASE_MIN = 1e-12
 def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     """Limits of the legs of a path of lines, and of arcs between full stops.
 
-    The acceleration a is at most the tolerance over the rate at which filters err: a full stop is rounded by them.
+    The acceleration a is one with which filters round full stops within the tolerance (constraints/filter_error.py).
     """
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
-    if machine.fir is not None:
-        tolerance = toolpath.tolerance[path.first]
-        a = np.minimum(a, np.minimum(tolerance[:-1], tolerance[1:]) / filter_error.rate(machine))
+    tolerance = toolpath.tolerance[path.first]
+    a = filter_error.at_stops(
+        a, np.minimum(tolerance[:-1], tolerance[1:]), toolpath.held[path.first[:-1]], machine
+    )
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
     return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)

@@ -67,7 +67,7 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order
 from planner.optimal.reshape import chosen, reshape, run_times
 from planner.optimal.result import plan_of_solution, pricing_of
-from planner.optimal.tighten import within_limits, without_seen_excess
+from planner.optimal.tighten import SEEN_EXCESS_MAX, within_limits, without_seen_excess
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
 
@@ -330,12 +330,13 @@ def judged(
     motion: Motion,
     not_limited: tuple[str, ...],
     made_of: Callable[[Motion], MotionInTime] | None = None,
+    most: float = SEEN_EXCESS_MAX,
 ) -> Delivered:
-    """Setpoints and verdict of a motion, or of what is `made_of` it. If the verdict finds a tiny excess the motion is slowed down, and
-    judged at other times, from which nothing was fed back."""
+    """Setpoints and verdict of a motion, or of what is `made_of` it. If the verdict finds a tiny excess, of `most` at most, the motion
+    is slowed down, and judged at other times, from which nothing was fed back."""
     made = job.deliver(motion if made_of is None else made_of(motion), not_limited)
     for again in range(SEEN_ROUNDS):
-        gentler = without_seen_excess(motion, made[1], again)
+        gentler = without_seen_excess(motion, made[1], again, most)
         if gentler is None:
             break
         job.tell("slower for verdict", found=gentler.end, before=motion.end, round=again + 1)

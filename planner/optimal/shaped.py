@@ -51,6 +51,8 @@ OF_PATH = 0.5
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 # D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
 EXCESS, SPARE = 2e-7, 1e-5
+# What the verdict may see more of a limit than that, between the places where D was looked at [-]: 9e-3 of a jerk on a random job.
+SEEN_MOST = 0.05
 # Of the tolerance, what looking at other times may find more [-].
 SPARE_ERROR = 2e-3
 # What path and samples leave of the tolerance counts as this share at least [-]: in one step the speed falls by at most
@@ -271,6 +273,6 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
         )  # fmt: skip
     not_limited = () if settings.order.jerk_limited else ("jerk",)
     shaper = found.delivered.shaper
-    made = judged(job, found.motion, not_limited, lambda planned: ShapedMotion(planned, shaper))
+    made = judged(job, found.motion, not_limited, lambda planned: ShapedMotion(planned, shaper), SEEN_MOST)
     plan = plan_of_solution(job, found.planned, made, method=settings.method, corner=settings.corner)
     return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

@@ -215,13 +215,15 @@ def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
     return np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(motion.law.run[-1] + 1)))
 
 
-def without_seen_excess(motion: Motion, verdict: Verdict, again: int) -> Motion | None:
+def without_seen_excess(
+    motion: Motion, verdict: Verdict, again: int, most: float = SEEN_EXCESS_MAX
+) -> Motion | None:
     """The motion slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing: the verifier looks
-    between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done; `again` counts
-    the times before. The slower motion needs a verdict at other times."""
+    between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done, or it is more
+    than `most` [-]; `again` counts the times before. The slower motion needs a verdict at other times."""
     limited = [check for check in verdict.limits.values() if check.limited]
     over = [check for check in limited if check.broken]
-    if not over or max(check.ratio for check in limited) > 1.0 + SEEN_EXCESS_MAX:
+    if not over or max(check.ratio for check in limited) > 1.0 + most:
         return None
     factor = max(check.ratio ** (1.0 / ORDER[check.name.partition(".")[0]]) for check in over)
     more = SLOWING_MORE * 10.0**again

@@ -7,7 +7,8 @@ where the sample is perpendicular to the arc,
     (p(x) - q) p'(x) = 0,      by Newton's method from the angle at which q is seen from the axis, in each turn,
 
 or from its ends; on a spline of the program the same, from the nearest of `STARTS` places (curves.py). Between samples the tolerance
-counts (contour.py), and on the half of a block beside one under G64, where the corner between them may be rounded.
+counts (contour.py), and within a period of a block under G64, and on the half of a block beside one, where the corner between them may
+be rounded.
 """
 
 from __future__ import annotations
@@ -36,14 +37,15 @@ def exact_faults(
     if not toolpath.exact.any():
         return []
     passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    free = np.append(0, np.cumsum(~toolpath.exact))  # blocks before that need not be followed exactly
     worst, when, line = 0.0, 0.0, 0
     for chunk in trajectory.chunks():
-        k = _segment(passed, chunk.t, len(toolpath))
-        inside = np.flatnonzero(toolpath.exact[k] & ~_of_a_corner(toolpath, chunk.position, k))
+        first, k, last = (_segment(passed, chunk.t + by * chunk.dt, len(toolpath)) for by in (-1.0, 0.0, 1.0))
+        exact = free[last + 1] == free[first]
+        inside = np.flatnonzero(exact & ~_of_a_corner(toolpath, chunk.position, k))
         if not len(inside):
             continue
-        near = [_segment(passed, chunk.t[inside] + by * chunk.dt, len(toolpath)) for by in (-1.0, 1.0)]
-        off = _least_distance(toolpath, chunk.position[inside], near[0] - 1, near[1] + 1)
+        off = _least_distance(toolpath, chunk.position[inside], first[inside] - 1, last[inside] + 1)
         at = int(off.argmax())
         if off[at] > worst:
             worst, when, line = float(off[at]), float(chunk.t[inside[at]]), int(toolpath.line[k[inside[at]]])

@@ -89,3 +89,21 @@ def test_a_sample_beyond_pieces_shorter_than_a_period_is_on_the_path() -> None:
     made = planner.plan(planner.read_program(text=text, machine=machine), machine, method="second-order")
     assert made.verdict is not None
     assert made.verdict.passed, made.verdict.faults
+
+
+def test_a_sample_just_before_the_stop_where_g61_begins_may_be_of_the_block_before() -> None:
+    """Found by the campaign: the block before it, a tangent arc under G64, has used some of its tolerance."""
+    limits = {
+        "x": (460.9802366380376, 3995.911078937642),
+        "y": (335.91758470765325, 9095.049377635476),
+        "z": (600.0, 1e4),
+    }
+    axes = {letter: Axis(velocity=v, acceleration=a, jerk=3e7) for letter, (v, a) in limits.items()}
+    machine = Machine(name="quick", dt=0.002, tolerance=0.013642721725888783, feed_default=10.0, axes=axes)
+    text = (
+        "G21 G17 G64 F2037.360350294874\nG5 X-0.0268 Y-0.0919 I-0.000298 J0.065761 P-0.052556 Q0.120002\nG61\n"
+        "G3 X0.688162 Y-0.305173 R1.998237\nG2 X0.82 Y0.13 R-0.442402\n"
+    )
+    made = planner.plan(planner.read_program(text=text, machine=machine), machine, method="second-order")
+    assert made.verdict is not None
+    assert made.verdict.passed, made.verdict.faults

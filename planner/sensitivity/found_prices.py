@@ -20,6 +20,7 @@ twice as far below it: accelerations behind it hold the motion back, too. Where 
 from __future__ import annotations
 
 import dataclasses
+from math import fsum  # `sum` rounds otherwise from Python 3.12 on
 from typing import NamedTuple
 
 import numpy as np
@@ -147,7 +148,7 @@ def found_prices(
     more[TOLERANCE] = Priced(TOLERANCE, tolerance * present, 1.0 + MORE_TOLERANCE / present)
     # Slower by 1.1, a motion with 1.1 of one limit keeps all the old ones.
     most = cycle_time * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-    at_feed = sum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)
+    at_feed = fsum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)
     ranges = {
         name: priced.saving(at_feed if name == FEED.name else np.inf).widened(UNREST * cycle_time)
         for name, priced in more.items()
@@ -171,12 +172,12 @@ def _of_limits(
     toolpath: Toolpath, machine: Machine, runs: list[RunPrices]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """The limits of the axes by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
-    limit, slope = {}, {FEED.name: sum(float(run.of_feed().sum()) for run in runs)}
+    limit, slope = {}, {FEED.name: fsum(float(run.of_feed().sum()) for run in runs)}
     for quantity, kind in enumerate(QUANTITIES):
         values = machine.limits(kind.name, toolpath.axes)  # type: ignore[arg-type]
         for k, axis in enumerate(toolpath.axes):
             name = kind.called(axis)
-            limit[name], slope[name] = float(values[k]), sum(run.of_axis(quantity, k) for run in runs)
+            limit[name], slope[name] = float(values[k]), fsum(run.of_axis(quantity, k) for run in runs)
             if kind is ACCELERATION:
                 slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name)(STEP))
     return limit, slope

@@ -100,3 +100,16 @@ def test_a_peak_between_the_places_looked_at_is_made_good():
     text = "G21 G17 G90 G94 F1183.5\nG64 P0.0149\nG2 X-0.0274 Y0.0947 R0.393019\nG1 X0.0146 Y-0.0506\nM2\n"
     made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
     assert made.verdict.passed, made.verdict.faults
+
+
+def test_the_normal_acceleration_is_kept_too():
+    """Found by the campaign of random jobs: it was not looked at, and exceeded its limit up to 5 times."""
+    limits = {"x": (655.0, 4268.0, 2.5e6), "y": (1443.0, 3696.0, 1.6e6), "z": (600.0, 4000.0, 1e6)}
+    axes = {letter: Axis(velocity=v, acceleration=a, jerk=j) for letter, (v, a, j) in limits.items()}
+    machine = Machine(
+        name="round", dt=0.002, tolerance=0.0097, feed_default=10.0, axes=axes, modes=(Mode(frequency=9.0),), normal_acceleration=940.0
+    )  # fmt: skip
+    text = "G21 G91 F6899\nG1 X0.3525\nG1 Y-4.2252\nG1 X0.4085\nG1 X0.3372 Y-0.1308\nG1 X3.8\nM2\n"
+    made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
+    assert made.verdict.passed, made.verdict.faults
+    assert made.verdict.limits["normal_acceleration"].ratio > 0.5

@@ -35,7 +35,7 @@ class Method(ABC):
     ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
               `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
     instead : methods that are tried as well if the chords between samples need some of the tolerance, because another one may then be
-              faster
+              faster, and where the verdict fails
     """
 
     instead: Sequence[Method] = ()
@@ -124,12 +124,12 @@ class Method(ABC):
             )
             job = dataclasses.replace(given, toolpath=planned, judged=(machine, programmed), noted=[])
             made = self.plan_job(job)
-        if job is given:
+        fault = made.verdict.faults[0] if made.verdict is not None and made.verdict.faults else ""
+        if job is not given:  # what less tolerance costs is not in the problem's prices
+            said = _said(made, programmed, planned)
+            made = dataclasses.replace(made, prices=None, pricing=None, notes=(*made.notes, said))
+        elif not fault:
             return made
-        # what less tolerance costs is not in the problem's prices
-        made = dataclasses.replace(
-            made, prices=None, pricing=None, notes=(*made.notes, _said(made, programmed, planned))
-        )
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
             rival = other.plan_within_periods(given.afresh(), _time(made))
             wins = faster(made, rival) is rival
@@ -147,7 +147,10 @@ class Method(ABC):
                     if rival.method == made.method
                     else f"method {rival.method} loses"
                 )
-                said = f"{what} less to the period; {rival.sentence}"
+                why = f"{what} less to the period"
+                if fault:
+                    why = f"another motion failed: {fault}"
+                said = f"{why}; {rival.sentence}"
                 made = dataclasses.replace(rival, method=made.method, corner=made.corner, sentence=said)
         return made
 

@@ -5,8 +5,8 @@
 Needs LinuxCNC (Debian's package linuxcnc-uspace) and FOLDER, a copy of ../shared/peers that an ordinary user may read: its
 `linuxcnc_run.py` is the user interface that starts the program. LinuxCNC runs as a simulation without hardware, as the user `lcnc`
 (it refuses root), with trivial kinematics and one joint per axis, the velocity and the acceleration of mill-xyzabc.toml, and G64 with
-the tolerance of that file and Q0. It knows no limit of the jerk. Only the first `lines` of each program run, so that one takes a minute
-or less, the same for all. M428 and M429 are taken out for LinuxCNC:
+the tolerance of that file and Q0. It knows no limit of the jerk. Only the first `lines` of each program run, so that one takes a few minutes
+at most, the same for all. M428 and M429 are taken out for LinuxCNC:
 every axis is a joint, as in the plans.
 
 LinuxCNC's time is the number of servo periods in which a joint moves, so that neither tool changes nor a starved queue counts.
@@ -53,6 +53,7 @@ PARTS = (
     Part("Sienci-Labs__gsender__FourAxisSurface_finishPass.nc", 40),
     Part("Sienci-Labs__gsender__4006.nc", 3500),
     Part("LinuxCNC__linuxcnc__impeller-7bl-xyzac.ngc", 200),
+    Part("Sienci-Labs__gsender__Skull_Finishing.gcode", 80),
 )
 
 

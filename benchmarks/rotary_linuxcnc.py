@@ -5,9 +5,8 @@
 Needs LinuxCNC (Debian's package linuxcnc-uspace) and FOLDER, a copy of ../shared/peers that an ordinary user may read: its
 `linuxcnc_run.py` is the user interface that starts the program. LinuxCNC runs as a simulation without hardware, as the user `lcnc`
 (it refuses root), with trivial kinematics and one joint per axis, the velocity and the acceleration of mill-xyzabc.toml, and G64 with
-the tolerance of that file and Q0. It knows no limit of the jerk. Only the first `lines` of each program run, so that one takes a few minutes
-at most, the same for all. M428 and M429 are taken out for LinuxCNC:
-every axis is a joint, as in the plans.
+the tolerance of that file and Q0. It knows no limit of the jerk. Only the first `lines` of each program run, so that one takes some
+minutes at most, the same for all. M428 and M429 are taken out for LinuxCNC: every axis is a joint, as in the plans.
 
 LinuxCNC's time is the number of servo periods in which a joint moves, so that neither tool changes nor a starved queue counts.
 """

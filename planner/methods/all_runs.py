@@ -3,6 +3,7 @@ then short ones side by side. What is found does not depend on the number of thr
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import partial
 
@@ -23,17 +24,18 @@ def searched_runs(
     divide : divide windows that fail, and keep the guess where nothing faster is found (tube/own.py)
     """
     size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
-    found: dict[int, FoundRun] = {}
-    stopped: list[int] = []  # at runs that are not whole
+    found: list[FoundRun | None] = [None for _ in runs]
+    stopped = threading.Event()  # at a run that is not whole
 
     def done() -> int:
-        return sum(size[k] for k in found)
+        return sum(steps for steps, of_run in zip(size, found, strict=True) if of_run is not None)
 
     def one(k: int, tell: Callable[[float], None]) -> None:
-        if not stopped:
-            found[k] = search(k, runs[k], [start], solver_of(dial, tell, divide=divide))
-            if not (divide or found[k].whole):
-                stopped.append(k)
+        if stopped.is_set():
+            return
+        found[k] = of_run = search(k, runs[k], [start], solver_of(dial, tell, divide=divide))
+        if not (divide or of_run.whole):
+            stopped.set()
 
     def share(before: int, of_run: int, part: float) -> None:
         report((before + part * of_run) / sum(size))
@@ -44,8 +46,8 @@ def searched_runs(
     short = [k for k in range(len(runs)) if size[k] <= LONG]
     work = [partial(one, k, lambda _: None) for k in short]
     if sum(size[k] for k in short) > LONG:
-        side_by_side(work, lambda: stopped.append(-1), lambda: share(done(), 0, 0.0))
+        side_by_side(work, stopped.set, lambda: share(done(), 0, 0.0))
     else:
         for task in work:
             task()
-    return None if stopped else [found[k] for k in range(len(runs))]
+    return None if stopped.is_set() else [of_run for of_run in found if of_run is not None]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planner
+from benchmarks import problems
 from planner.delivery.periods import LEFT_MIN, with_less_inside
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
@@ -52,13 +53,8 @@ def test_chords_that_eq_18_bounds_above_what_any_phase_shows_get_less_of_the_tol
     0.99."""
     limits = {"x": 47.5924452912681, "y": 54.8500725553492, "z": 45.18939689995349}
     axes = {letter: Axis(velocity=v, acceleration=1e5, jerk=3e7) for letter, v in limits.items()}
-    machine = Machine(
-        name="quick",
-        dt=0.002,
-        tolerance=0.005811050439652194,
-        feed_default=10.0,
-        axes=axes,
-        feed_max=178.06309257869185,
+    machine = problems.machine(
+        dt=0.002, tolerance=0.005811050439652194, axes=axes, feed_max=178.06309257869185
     )
     points = (
         "X0.10 Y0.16 Z0.02", "X0.18 Y0.29 Z0.03", "X0.24 Y0.40 Z0.02", "X0.26 Y0.47 Z0.00", "X0.26 Y0.49 Z-0.02", "X0.22 Y0.46 Z-0.03",

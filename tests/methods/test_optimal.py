@@ -18,7 +18,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.job.job import Job
 from planner.job.stages import Stages
 from planner.job.trace import Trace
-from planner.machine import Axis, Fir, Machine
+from planner.machine import Fir
 from planner.methods.optimal import SIGMA2, OptimalMethod
 from planner.nc.reader import parse_program
 from planner.optimal.effort import EFFORTS, Search
@@ -156,13 +156,12 @@ def test_large_motions_are_searched_where_their_steps_are_no_finer_than_what_is_
 def test_where_its_own_motion_fails_another_method_is_delivered():
     """Found by the campaign of random jobs: behind filters a corner beside a circle smaller than the widened tolerance was taken for
     the place where the circle ends, and the motion failed its verdict."""
-    axes = dict.fromkeys("xyz", Axis(velocity=4000.0, acceleration=1e5, jerk=3e7))
-    machine = Machine(
-        name="quick",
-        dt=0.002,
+    machine = problems.machine(
+        velocity=4000.0,
+        acceleration=1e5,
+        jerk=3e7,
         tolerance=0.01,
-        feed_default=10.0,
-        axes=axes,
+        dt=0.002,
         fir=Fir(time_constants=(0.0018818757349053188, 0.015573425350580655)),
     )
     text = (

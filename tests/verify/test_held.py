@@ -7,9 +7,10 @@ import pytest
 from judging import M, fault, judge
 from motions import along, rest_to_rest
 
+from benchmarks import problems
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.run_in import run_in
-from planner.machine import Axis, Fir, Machine
+from planner.machine import Fir
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
 from planner.verify.held import room_of
@@ -88,13 +89,12 @@ def test_the_verifier_finds_the_same_run_in_as_the_planner() -> None:
 @pytest.mark.parametrize("method", ["kinematic", "bezier", "fir", "stop", "optimal"])
 def test_before_filters_a_thread_is_run_into_as_fast_as_the_machine_can(method):
     """Found by the campaign of random jobs: two methods accelerated only as much as filters round a full stop within the tolerance."""
-    axes = dict.fromkeys("xyz", Axis(velocity=600.0, acceleration=6e4, jerk=2e7))
-    machine = Machine(
-        name="lathe",
-        dt=0.002,
+    machine = problems.machine(
+        velocity=600.0,
+        acceleration=6e4,
+        jerk=2e7,
         tolerance=0.0034,
-        feed_default=10.0,
-        axes=axes,
+        dt=0.002,
         fir=Fir(time_constants=(0.011,)),
     )
     text = "G21 G18 S8000 M3\nG0 X0 Z5\nG33 Z-30 K1.5\nG0 X5\nG0 Z5\nM2\n"

@@ -6,7 +6,8 @@ eps used by the rounding and c X by chords and filters (corners/allocation.py),
 
     X = min(A, (eps - eps_ap)/c)                                                                     eq. (18), (20)
 
-What planners know of this limit is here; the judge has its own of it (verify/limits.py).
+Between grid points a motion may exceed it by as little as any limit; `ratios` says where (optimal/tighten.py). What planners know of
+this limit is here; the judge has its own of it (verify/limits.py).
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.limit import Cap, Limit, over
-from planner.machine import Machine
+from planner.machine import LINEAR_AXES, Machine
 
 if TYPE_CHECKING:
     from planner.constraints.on_grid import Side
+    from planner.motion.trajectory import Trajectory
 
 NAME = "normal_acceleration"
+ORDER = 2  # slower by lam, it is less by lam^2
+REST = 1e-6  # [mm/s] below this, the direction of a velocity is rounding
 
 
 def largest(machine: Machine) -> float:
@@ -39,11 +43,40 @@ def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:
 class NormalAcceleration(Limit):
     """kappa x <= A, on machines that name A."""
 
-    name, unit, order = NAME, "mm/s2", 2
+    name, unit, order = NAME, "mm/s2", ORDER
 
     def on_side(self, side: Side, machine: Machine) -> Iterator[Cap]:
         if machine.normal_acceleration is not None:
             yield Cap(self.name, feed_sq_within(side.kappa, machine.normal_acceleration))
+
+
+def ratios(machine: Machine, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """The limit's order and the motion's ratio to it at its T samples (T,), 0 at rest; nothing on machines that name none."""
+    if machine.normal_acceleration is None:
+        return
+    v, a = _linear(motion)
+    square, along = np.sum(v * v, axis=1), np.sum(v * a, axis=1)
+    moving = square > REST**2
+    share = np.divide(along, square, out=np.zeros(len(v)), where=moving)
+    across = np.where(moving, np.linalg.norm(a - share[:, None] * v, axis=1), 0.0)
+    yield ORDER, across / machine.normal_acceleration
+
+
+def slowest(motion: Trajectory) -> FloatArray:
+    """(n,) times between samples at which the motion is slowest, as far as its acceleration is constant [s]: there it turns most
+    quickly, and its normal acceleration can have peaks that are over before the next sample."""
+    v, a = _linear(motion)
+    square = np.sum(a * a, axis=1)
+    step = np.divide(-np.sum(v * a, axis=1), square, out=np.full(len(v), np.inf), where=square > 0.0)
+    before, after = np.diff(motion.t, prepend=motion.t[0]), np.diff(motion.t, append=motion.t[-1])
+    inside = (step > -before) & (step < after) & (step != 0.0)
+    return motion.t[inside] + step[inside]
+
+
+def _linear(motion: Trajectory) -> tuple[FloatArray, FloatArray]:
+    """(T, n) velocities and accelerations of the linear axes x, y and z."""
+    of = np.isin(motion.axes, LINEAR_AXES)
+    return motion.velocity[:, of], motion.acceleration[:, of]
 
 
 def of_axes(limits: FloatArray, u1: FloatArray, u2: FloatArray) -> FloatArray:

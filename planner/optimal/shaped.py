@@ -25,22 +25,21 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
-from planner.constraints.own import ratios
+from planner.constraints.normal_limit import slowest
 from planner.delivery.filters import Behind
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job
 from planner.job.plan import Plan
-from planner.machine import LINEAR_AXES, Machine
+from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion, Shaper, shaper_of
 from planner.motion.timing import Motion, in_chunks, inside_pieces
-from planner.motion.trajectory import Trajectory
 from planner.optimal.loop import Settings, judged, time_optimal
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import solve_again
 from planner.optimal.result import plan_of_solution
-from planner.optimal.tighten import fastest_inside, tightened
+from planner.optimal.tighten import beside_axes, fastest_inside, tightened
 
 # Corners that turn by more than the first of these are stops of p [rad], and p is planned with so many times the accelerations and
 # jerks [-].
@@ -54,7 +53,6 @@ ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 EXCESS, SPARE = 2e-7, 1e-5
 # What the verdict may see more of a limit than that, between the places where D was looked at [-]: 9e-3 of a jerk on a random job.
 SEEN_MOST = 0.05
-REST = 1e-6  # [mm/s] below this, the direction of a velocity is rounding
 # Of the tolerance, what looking at other times may find more [-].
 SPARE_ERROR = 2e-3
 # What path and samples leave of the tolerance counts as this share at least [-]: in one step the speed falls by at most
@@ -142,7 +140,6 @@ class _Settling:
         }
         if self.order.jerk_limited:
             self.limits["jerk"] = job.machine.limits("jerk", job.toolpath.axes)
-        self.normal = machine.normal_acceleration or np.inf
         self.feed = np.full(int(job.toolpath.block[-1]) + 1, np.inf)
         self.feed[job.toolpath.block] = job.toolpath.feed
 
@@ -186,12 +183,15 @@ class _Settling:
         factor = np.ones(len(motion.law.t))
         peaks = np.add.outer(fastest_inside(motion.law), self.shaper.delay)
         times = np.append(inside_pieces(delivered)[1], peaks)
-        for chunk in in_chunks(delivered, self.job.machine.dt, times[times < delivered.end]):
+        times = times[times < delivered.end]
+        dt = self.job.machine.dt
+        if self.job.machine.normal_acceleration is not None:
+            times = np.concatenate([times, *(slowest(chunk) for chunk in in_chunks(delivered, dt, times))])
+        for chunk in in_chunks(delivered, dt, times):
             worst = np.maximum(1.0, chunk.feed / self.feed[chunk.block])
             for order, (name, limit) in enumerate(self.limits.items(), start=1):
                 worst = np.maximum(worst, (np.abs(getattr(chunk, name)) / limit).max(axis=1) ** (1.0 / order))
-            worst = np.maximum(worst, np.sqrt(_across(chunk) / self.normal))
-            for order, ratio in ratios(self.job.machine.own, chunk):
+            for order, ratio in beside_axes(self.job.machine, chunk):
                 if order <= len(self.limits):
                     worst = np.maximum(worst, ratio ** (1.0 / order))
             over = worst > 1.0 + EXCESS
@@ -239,16 +239,6 @@ class _Settling:
     def _seen(self, motion: Motion, times: FloatArray) -> FloatArray:
         place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
         return motion.at(place, self.job.machine.dt).position[of].reshape(*times.shape, -1)
-
-
-def _across(chunk: Trajectory) -> FloatArray:
-    """(n,) normal acceleration of x, y and z at the samples of a motion [mm/s2]; 0 at rest."""
-    of = np.isin(chunk.axes, LINEAR_AXES)
-    v, a = chunk.velocity[:, of], chunk.acceleration[:, of]
-    square, along = np.sum(v * v, axis=1), np.sum(v * a, axis=1)
-    moving = square > REST**2
-    share = np.divide(along, square, out=np.zeros(len(v)), where=moving)
-    return np.where(moving, np.linalg.norm(a - share[:, None] * v, axis=1), 0.0)
 
 
 def _miss(into: FloatArray, out: FloatArray, rest: FloatArray, shaper: Shaper) -> FloatArray:

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Iterator
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.threads import side_by_side
+from planner.constraints import normal_limit, own
 from planner.constraints.limits import LIMITS
-from planner.constraints.own import ratios
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import runs_of, slower_runs
 from planner.geometry.toolpath import Toolpath
@@ -26,6 +27,7 @@ from planner.job.trace import Tell, tell_nobody
 from planner.machine import Machine
 from planner.motion.time_law import TimeLaw
 from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
+from planner.motion.trajectory import Trajectory
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.verify import Verdict
@@ -67,15 +69,15 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
 
     def look(first: int) -> None:
         part = slice(first, first + CHUNK // len(WATCHED))
-        own, times = pieces[part], inside[part]
+        shown, times = pieces[part], inside[part]
         seen = motion.at(times.ravel(), machine.dt)
-        worst = np.empty(len(own))
+        worst = np.empty(len(shown))
         motions = (seen.velocity, seen.acceleration, seen.jerk)
-        _worst(seen.feed / programmed[seen.block], motions, limits, smooth[own], worst)
-        for order, ratio in ratios(machine.own, seen):
-            most = _with_peaks(ratio.reshape(times.shape), smooth[own])
+        _worst(seen.feed / programmed[seen.block], motions, limits, smooth[shown], worst)
+        for order, ratio in beside_axes(machine, seen):
+            most = _with_peaks(ratio.reshape(times.shape), smooth[shown])
             worst = np.maximum(worst, most ** (1.0 / order))
-        factor[own] = worst
+        factor[shown] = worst
 
     tasks = [functools.partial(look, first) for first in range(0, len(pieces), CHUNK // len(WATCHED))]
     if len(tasks) > 1:
@@ -88,11 +90,17 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
-        for order, ratio in ratios(machine.own, chunk):
+        for order, ratio in beside_axes(machine, chunk):
             worst = np.maximum(worst, ratio ** (1.0 / order))
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor
+
+
+def beside_axes(machine: Machine, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """The order and the ratios (T,) of limits that are no axis' own."""
+    yield from normal_limit.ratios(machine, motion)
+    yield from own.ratios(machine.own, motion)
 
 
 def _on_one_interval(motion: Motion) -> Array:

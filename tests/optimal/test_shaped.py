@@ -113,3 +113,24 @@ def test_the_normal_acceleration_is_kept_too():
     made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
     assert made.verdict.passed, made.verdict.faults
     assert made.verdict.limits["normal_acceleration"].ratio > 0.5
+
+
+def test_a_narrow_peak_of_the_normal_acceleration_where_the_motion_nearly_turns_back():
+    """Found by the campaign of random jobs: at 0.7 mm/s it was 1.05 times the limit for less than the time between two looks."""
+    limits = {
+        "x": (1215.3, 46512.0, 5100898.0),
+        "y": (1082.7, 1e5, 11121701.0),
+        "z": (1047.2, 46766.0, 3787499.0),
+    }
+    axes = {letter: Axis(velocity=v, acceleration=a, jerk=j) for letter, (v, a, j) in limits.items()}
+    machine = Machine(
+        name="turning", dt=0.002, tolerance=0.07050782731621949, feed_default=10.0, axes=axes, normal_acceleration=8058.577,
+        modes=(Mode(frequency=43.29012462566537, damping=0.14096579224877254),),
+    )  # fmt: skip
+    text = (
+        "G21 G17 G90 G94 F1052.2118\nG1 X0.186 Y0.391\nX-0.873 Y0.559\nX-1.743 Y-0.851\nG2 X-0.905 Y-1.267 I-0.36973886 J-1.79685376\n"
+        "G1 X-1.499 Y-0.022\nX-1.264 Y-0.682\nX-1.503 Y-2.232\nM2\n"
+    )
+    made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
+    assert made.verdict.passed, made.verdict.faults
+    assert made.verdict.limits["normal_acceleration"].ratio > 0.5

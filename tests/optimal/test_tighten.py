@@ -16,8 +16,11 @@ from planner.corners.smooth import round_corners
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import ratios_by_limit
 from planner.geometry.build import toolpath_from_program
+from planner.machine import Axis, Machine
+from planner.methods.registry import plan
 from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion, sample_motion
+from planner.nc.reader import parse_program
 from planner.optimal import tighten
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import ThirdOrder
@@ -158,6 +161,32 @@ def test_a_joint_that_is_an_axis_has_its_excess(coarse):
     of_joint = excess(motion, toolpath, without.with_own((AlongX(),)))
     assert of_axis.max() > 1.0 + 1e-3  # else this test shows nothing
     np.testing.assert_allclose(of_joint, of_axis, rtol=1e-9)
+
+
+def test_the_normal_acceleration_between_grid_points_is_an_excess(coarse):
+    _, motion, toolpath, _ = coarse
+    seen = motion.at(np.linspace(0.0, motion.end, 20_001), MACHINE.dt)
+    speed = np.linalg.norm(seen.velocity, axis=1)
+    moving = speed > 1.0  # mm/s
+    across = np.linalg.norm(np.cross(seen.velocity, seen.acceleration)[moving], axis=1) / speed[moving]
+    limit = 0.5 * across.max()
+    of_axes = excess(motion, toolpath, MACHINE)
+    narrow = excess(motion, toolpath, MACHINE.model_copy(update={"normal_acceleration": limit}))
+    assert (narrow >= of_axes).all()
+    assert narrow.max() == pytest.approx(2.0**0.5, rel=2e-3)
+
+
+def test_a_path_of_two_small_arcs_keeps_its_normal_acceleration():
+    """Found by the campaign of random jobs: between grid points it was 1.006 times the limit."""
+    limits = {"x": (71.5, 1309.3, 79475.0), "y": (82.2, 710.4, 22477.0), "z": (39.7, 1334.0, 42479.0)}
+    axes = {letter: Axis(velocity=v, acceleration=a, jerk=j) for letter, (v, a, j) in limits.items()}
+    machine = Machine(
+        name="arcs", dt=0.002, tolerance=0.0772, feed_default=10.0, axes=axes, normal_acceleration=143.83
+    )
+    text = "G21 G17 G90 G94 F8443.5\nG61.1\nG3 X0.005 Y-0.001 R0.014493\nG3 X0.4749 Y-0.0707 R0.634975\nM2\n"
+    made = plan(parse_program(text, machine), machine, effort="quick", geometry="spline")
+    assert made.verdict.passed, made.verdict.faults
+    assert made.verdict.limits["normal_acceleration"].ratio > 0.99
 
 
 def test_long_jobs_are_tightened_while_it_pays_and_slowed_for_what_the_verifier_may_find(coarse, monkeypatch):

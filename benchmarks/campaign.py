@@ -6,8 +6,8 @@ A job follows from its seed (campaign_jobs.py): program, machine, tolerance, per
 verifier and by another judge that shares no code with the package (campaign_judge.py); every tenth job is planned once more,
 changed by a law (campaign_laws.py). Each job has C processor seconds in a child process, which is ended if they do not suffice.
 
-Every job is a row of results/campaign.jsonl at once; jobs that are there are not planned again, unless asked for with --again.
-The summary of all rows goes to results/campaign.json and .md.
+Every job is a row of results/campaign.jsonl at once, and counted in results/campaign.json at the end (campaign_tally.py), with a
+summary in campaign.md. Jobs that are in one of them are not planned again; --again plans what is not as it should be.
 """
 
 from __future__ import annotations
@@ -31,6 +31,17 @@ from benchmarks.campaign_jobs import Job, job
 from benchmarks.campaign_judge import Motion, faults
 from benchmarks.campaign_laws import broken, changed
 from benchmarks.campaign_table import write_summary
+from benchmarks.campaign_tally import (
+    CRASH,
+    DOCUMENTED,
+    FAILED,
+    PASSED,
+    REFUSED,
+    TOO_LONG,
+    UNSOLVED,
+    Tally,
+    wrongs,
+)
 from benchmarks.record import RESULTS, provenance
 from planner.base.errors import InputError
 from planner.base.threads import use_threads
@@ -40,19 +51,10 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.methods.registry import plan
 from planner.nc.program import Kind, Program
 
-KEPT = RESULTS / "campaign.jsonl"
+KEPT, SUMMARY = RESULTS / "campaign.jsonl", RESULTS / "campaign.json"
 LIMIT = 10.0  # of a job, its law included [CPU s]
 WALL = 10.0  # times that, until a job is ended that takes no processor time
 LAW_EVERY = 10  # jobs
-PASSED, FAILED, DOCUMENTED, UNSOLVED, REFUSED, CRASH, HANG = (
-    "passed",
-    "failed",
-    "fails as documented",
-    "not solved",
-    "refused",
-    "crash",
-    "too long",
-)
 NO_JERK_LIMIT = ("second-order",)
 Row = dict[str, Any]
 
@@ -263,7 +265,7 @@ class Worker:
             about = _about(job(self.seed))
         except Exception:  # what cannot be drawn is named by its seed
             about = {"seed": self.seed}
-        return about | {"outcome": HANG, "said": f"more than {limit:g} CPU s", "cpu": limit}
+        return about | {"outcome": TOO_LONG, "said": f"more than {limit:g} CPU s", "cpu": limit}
 
 
 def _serve(ends: Connection) -> None:
@@ -316,30 +318,21 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--limit", type=float, default=LIMIT, help="CPU s of a job")
     parser.add_argument("--file", type=Path, default=KEPT)
     options = parser.parse_args(argv)
-    rows = kept_rows(options.file)
-    seeds = [seed for seed in range(options.seed, options.seed + options.count) if seed not in rows]
+    tally = Tally.read(SUMMARY) if options.file == KEPT else Tally()
+    tally.add(kept_rows(options.file).values())
+    seeds = [seed for seed in range(options.seed, options.seed + options.count) if seed not in tally]
     if options.again is not None:
-        seeds = options.again or [seed for seed, row in rows.items() if is_wrong(row)]
+        seeds = options.again or list(tally.wrong)
     commit = provenance()["commit"]
     options.file.parent.mkdir(exist_ok=True)
     with options.file.open("a", encoding="utf-8") as file:
         for row in rows_of(seeds, options.processes, options.seconds, options.limit):
-            rows[row["seed"]] = row | {"commit": commit}
-            file.write(json.dumps(rows[row["seed"]]) + "\n")
+            made = row | {"commit": commit}
+            tally.add([made])
+            file.write(json.dumps(made) + "\n")
             file.flush()
-            if is_wrong(row):
+            if wrongs(row):
                 print(json.dumps(row), flush=True)
     if options.file == KEPT:
-        write_summary([rows[seed] for seed in sorted(rows)])
+        write_summary(tally)
     return 0
-
-
-def is_wrong(row: Row) -> bool:
-    """True for what should not be: all but passed by both judges, refused or not solved with a sentence, with its law kept."""
-    if row["outcome"] in (FAILED, CRASH, HANG) or (
-        not row.get("said") and row["outcome"] in (REFUSED, UNSOLVED)
-    ):
-        return True
-    if row["outcome"] == DOCUMENTED:
-        return False
-    return bool(row.get("second") or row.get("law_second") or row.get("law_broken") or row.get("law_said"))

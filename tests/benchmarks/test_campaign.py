@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.campaign import blocks_of, is_wrong, kept_rows, motion_of, outcome, rows_of
+from benchmarks.campaign import blocks_of, kept_rows, motion_of, outcome, rows_of
 from benchmarks.campaign_course import course
 from benchmarks.campaign_jobs import job
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
 from benchmarks.campaign_laws import ALLOWED, mirrored, reversed_program, scaled, scaled_machine, split
+from benchmarks.campaign_tally import LEAST, Tally, wrongs
 from planner.job.plan import Plan
 from planner.machine import Axis, Machine
 from planner.methods.registry import plan
@@ -185,7 +186,7 @@ def test_a_line_as_two_is_the_same_path(seed: int) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 9, 11, 15, 17, 20])
 def test_jobs_of_the_campaign_are_as_they_should_be(seed: int) -> None:
     row = outcome(seed)
-    assert not is_wrong(row), row
+    assert not wrongs(row), row
 
 
 def test_a_run_keeps_its_rows_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -194,10 +195,37 @@ def test_a_run_keeps_its_rows_and_goes_on(tmp_path: Path, capsys: pytest.Capture
         json.dumps({"seed": 20, "outcome": "kept"}) + "\n" + '{"seed": 21, "outc', encoding="utf-8"
     )
     assert kept_rows(file) == {20: {"seed": 20, "outcome": "kept"}}
-    file.write_text(json.dumps({"seed": 20, "outcome": "kept"}) + "\n", encoding="utf-8")
+    file.write_text(json.dumps({"seed": 20, "outcome": "passed"}) + "\n", encoding="utf-8")
     assert main(["campaign", "--seed", "20", "--count", "1", "--file", str(file)]) == 0
-    assert kept_rows(file)[20]["outcome"] == "kept"
+    assert kept_rows(file)[20]["outcome"] == "passed"
     assert capsys.readouterr().out == ""
+
+
+ROWS = (
+    {"seed": 0, "source": "dense", "way": "stop", "outcome": "passed", "cpu": 0.02, "commit": "a", "law": "split", "law_broken": 0.0},
+    {"seed": 1, "source": "dense", "way": "stop", "outcome": "refused", "said": "x:3: at 7.5", "cpu": 0.0, "commit": "a"},
+    {"seed": 2, "source": "lathe", "way": "fir", "outcome": "too long", "said": "more", "cpu": 3.0, "commit": "a"},
+    {"seed": 4, "source": "lathe", "way": "fir", "outcome": "passed", "cpu": 0.5, "commit": "b", "law": "split", "law_broken": 0.1},
+)  # fmt: skip
+
+
+def test_a_tally_counts_what_is_right_keeps_what_is_not_and_is_read_as_it_was(tmp_path: Path) -> None:
+    tally = Tally()
+    tally.add(ROWS)
+    assert len(tally) == 4
+    assert list(tally.wrong) == [2, 4]
+    assert 3 not in tally
+    assert tally.outcomes() == {"passed": 2, "refused": 1, "too long": 1}
+    assert tally.said == {"x:N: at N": 1}
+    assert tally.seconds(1.0) == pytest.approx(3.0, rel=0.2)
+    assert tally.seconds(0.25) == pytest.approx(LEAST, rel=0.2)
+    file = tmp_path / "campaign.json"
+    file.write_text(json.dumps(tally.data()), encoding="utf-8")
+    assert Tally.read(file) == tally
+    tally.add([dict(ROWS[2], outcome="passed", said=""), dict(ROWS[0], outcome="crash")])
+    assert list(tally.wrong) == [4]
+    assert tally.outcomes() == {"passed": 3, "refused": 1}
+    assert tally.data()["seeds"] == [(0, 2)]
 
 
 def test_the_same_number_makes_the_same_job() -> None:

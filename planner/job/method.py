@@ -11,6 +11,7 @@ import numpy as np
 
 from planner.constraints.extruder import with_extruder_limit
 from planner.delivery import periods
+from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job
@@ -21,12 +22,14 @@ from planner.machine import Machine
 from planner.motion.timing import require_samples
 from planner.nc.program import Program
 from planner.verify import Verdict
+from planner.verify.held import FAULT
 
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
 INSTEAD_POINTS = 50_000
+IN_STEP = "plan threads by method optimal, without --shaped"
 
 
 class Method(ABC):
@@ -67,6 +70,10 @@ class Method(ABC):
         require_samples(at_feed, machine.dt)
         stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
         made = self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+        if not self.keeps_step and (lost := _out_of_step(made)):
+            return _not_delivered(
+                made, f"{lost}: its filters or its shaper reach the feed behind the run-in; {IN_STEP}"
+            )
         if made.pricing is None:
             return made
         with stages.stage("report"):
@@ -93,6 +100,12 @@ class Method(ABC):
     @property
     def keeps_tolerance(self) -> bool:
         """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
+        return True
+
+    @property
+    def keeps_step(self) -> bool:
+        """Whether the method reaches the feed of a thread within the run-in that the program was checked for. If not, a thread that it
+        cuts out of step with the spindle is not delivered: it is no thread."""
         return True
 
     def plan_within_periods(self, job: Job, within: float = np.inf) -> Plan:
@@ -166,6 +179,19 @@ def faster(plan: Plan, other: Plan) -> Plan:
     if plan.verdict.passed != other.verdict.passed:
         return plan if plan.verdict.passed else other
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _out_of_step(plan: Plan) -> str:
+    """The verdict's sentence on the thread that is most out of step with the spindle; empty where none is."""
+    faults = plan.verdict.faults if plan.verdict is not None else ()
+    return next((fault for fault in faults if fault.startswith(FAULT)), "")
+
+
+def _not_delivered(plan: Plan, why: str) -> Plan:
+    """The plan without its motion."""
+    return dataclasses.replace(
+        plan, status=Status.INFEASIBLE, sentence=why, trajectory=None, verdict=None, rounded=None, grid=None, prices=None, pricing=None
+    )  # fmt: skip
 
 
 def _time(plan: Plan) -> float:

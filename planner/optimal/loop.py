@@ -47,10 +47,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, NORMAL, QUICK, SPLINE
 from planner.base.threads import beside, threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
+from planner.feedrate.solution import Status
 from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
 from planner.job.records import Tables
@@ -139,9 +141,19 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
 
 def plan_on_path(job: Job, settings: Settings) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered."""
-    found, made, prices, pricing = [time_optimal(job, settings)], None, None, None
+    try:
+        return _plan_of(job, settings, [time_optimal(job, settings)])
+    except NotSolvedError as fault:  # no grid follows the path
+        return job.plan(
+            None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
+        )  # fmt: skip
+
+
+def _plan_of(job: Job, settings: Settings, found: list[OnPath]) -> Plan:
+    """The plan of the one motion found, with its limits kept at grid points; the list is emptied, to let go of it."""
+    made = prices = pricing = None
     if found[0].solution.solved:
-        with job.stage("solve"):  # which lets go of what is found: a third of a kilobyte a point
+        with job.stage("solve"):  # a third of a kilobyte a point is let go of
             best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job)
@@ -228,7 +240,10 @@ def first_motion(job: Job, settings: Settings) -> FirstMotion:
         return FirstMotion(None, too_large=True)
     if not whole:
         return FirstMotion(None)
-    planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
+    try:
+        planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
+    except NotSolvedError:  # no grid follows the splines
+        return FirstMotion(None)
     return FirstMotion(planned if planned.solution.solved else None)
 
 

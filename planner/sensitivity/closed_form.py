@@ -19,6 +19,8 @@ from planner.feedrate.solution import FeedrateSolution, active_names, constraint
 from planner.job.records import CornerTable
 from planner.path.samples import PathSamples
 
+STRAIGHT = 1e-9  # [1/mm] a curvature below this is none: a radius of a thousand kilometres
+
 
 def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> CornerTable:
     """The planned speeds at all rounded corners, beside the closed form. Raises NotSolvedError if there is no solution."""
@@ -37,14 +39,17 @@ def corner_apexes(samples: PathSamples) -> Array:
 
 
 def corners_at(samples: PathSamples, apex: Array, feed: FloatArray, limited_by: Array) -> CornerTable:
-    """The table of the corners with their apexes at given grid points.
+    """The table of the corners with their apexes at given grid points; without those that are straight at the apex, as a blend between
+    arcs that turn to different sides can be: eq. (19) is no bound there.
 
     apex       : (C,) indices of grid points
     feed       : (C,) planned speed there [mm/s]
     limited_by : (C,) name of the constraint that is closest to its limit there
     """
-    path, joint = samples.path, ~samples.element[apex]
     kappa = np.linalg.norm(samples.d2_right[apex], axis=1)
+    bent = kappa > STRAIGHT
+    apex, feed, limited_by, kappa = apex[bent], feed[bent], limited_by[bent], kappa[bent]
+    path, joint = samples.path, ~samples.element[apex]
     return CornerTable(
         line=path.toolpath.line[path.legs.first[joint] - 1],
         theta=path.theta[joint],

@@ -23,6 +23,7 @@ from planner.motion.trajectory import Trajectory
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 
+FAULT = "thread"  # what its faults begin with
 MORE = 0.02  # of d, by which a plan on a grid may take longer [-]
 
 
@@ -38,11 +39,11 @@ def held_faults(
     worst = np.argsort(-off / allowed)
     bad = worst[off[worst] > allowed[worst] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING]
     said = [
-        f"thread: {off[k]:.6g} mm out of step with the spindle, {allowed[k]:.6g} mm allowed, at the feed "
+        f"{FAULT}: {off[k]:.6g} mm out of step with the spindle, {allowed[k]:.6g} mm allowed, at the feed "
         f"{toolpath.feed[held[k]]:.6g} mm/s, line {toolpath.line[held[k]]}"
         for k in bad[:FAULTS_OF_A_KIND]
     ]
-    return said + ([f"thread: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])
+    return said + ([f"{FAULT}: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])
 
 
 def room_of(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:

@@ -182,8 +182,12 @@ def test_a_line_as_two_is_the_same_path(seed: int) -> None:
     assert found.cycle_time <= planned("second-order").cycle_time * (1 + ALLOWED)
 
 
+# A closed form that was infinite; a path no grid follows; a thread out of step; shaped motions that slowing down made less gentle.
+FOUND = (8638, 16806, 19282, 20618, 21957)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 9, 11, 15, 17, 20])
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 9, 11, 15, 17, 20, *FOUND])
 def test_jobs_of_the_campaign_are_as_they_should_be(seed: int) -> None:
     row = outcome(seed)
     assert not wrongs(row), row

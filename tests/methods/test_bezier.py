@@ -202,3 +202,12 @@ def test_it_has_a_name_and_reports_its_corners():
     made = plan(TEN_TIMES, paper_machine(), method="bezier")
     assert (made.method, made.corner, made.solver) == ("bezier", "bezier", "look-ahead")
     assert made.sentence.startswith(f"{len(made.rounded)} corners are run through")
+
+
+def test_a_blend_that_is_straight_at_its_apex_has_no_closed_form():
+    """Found by the campaign of random jobs: between equal arcs that turn to different sides the closed form was infinite."""
+    machine = problems.machine(velocity=4000.0, acceleration=1e5, jerk=3e7, dt=0.002, tolerance=0.7)
+    text = "G21 G91 F46480\nG0 X1 Y2 Z3\nG3 X10 I5\nG2 X5 Y5 I5\nG1 Y5\nX5\nM2\n"
+    made = plan(parse_program(text, machine), machine, method="bezier")
+    assert made.verdict.passed
+    assert (made.rounded.feed_closed_form < 1e6).all()

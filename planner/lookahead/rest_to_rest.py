@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints import normal_limit
 from planner.corners.allocation import error_rate
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
+GOLDEN = float((np.sqrt(5.0) - 1.0) / 2.0)
+SECTIONS = 26  # which leave 4e-6 of the range of log v, and no more of the time
 AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
 
 
@@ -18,9 +21,10 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
 
     On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest axis limit must hold
     for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with
-    kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a/sqrt2 <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
+    kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
     (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve
-    kappa changes, and a bound of |r'''| takes the place of kappa^2.
+    kappa changes, and a bound of |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
+    takes least time from rest to rest: no limit that gets larger makes it longer.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
@@ -41,9 +45,37 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
             np.full(len(kappa), v_all),
             np.sqrt(across / kappa),
             np.cbrt(half * j_all / (2 * twist)),
-            j_all / (3 * kappa * a_all),
+            toolpath.feed[curved],
         ],
         axis=0,
     )
     a[curved], j[curved] = half * a_all, half * j_all / 2
+    product = np.full(len(v), np.inf)  # bound of v a_s [mm2/s3]
+    product[curved] = half * j_all / (3 * kappa)
+    bound = np.flatnonzero(v * a > product)
+    v[bound], a[bound] = _fastest(toolpath.length[bound], v[bound], a[bound], j[bound], product[bound])
     return np.minimum(v, toolpath.feed), a, j
+
+
+def _fastest(
+    length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray, product: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """v and a (n,) of the shortest moves from rest to rest with v a <= product, below the given v and a; by golden sections of log v,
+    from the v that leaves a as it is to the one that is given."""
+    low, high = np.log(product / a), np.log(v)
+
+    def time(at: FloatArray) -> FloatArray:
+        speed = np.exp(at)
+        return rest_to_rest_times(length, speed, product / speed, j)
+
+    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    times = [time(at) for at in inner]
+    for _ in range(SECTIONS):
+        left = times[0] < times[1]
+        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
+        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        of_new = time(new)
+        inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
+        times = [np.where(left, of_new, times[1]), np.where(left, times[0], of_new)]
+    speed = np.exp(np.where(times[0] < times[1], inner[0], inner[1]))
+    return speed, product / speed

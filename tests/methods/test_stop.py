@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from benchmarks import problems
 from planner.base.point_to_point import rest_to_rest_times
@@ -69,3 +71,25 @@ def test_jerk_limits_on_arcs_are_safe_for_every_direction():
     kappa = path.curvature
     assert (np.hypot(kappa * v**2, a) <= 2000 * (1 + 1e-12)).all()
     assert (np.hypot(kappa**2 * v**3 + j, 3 * kappa * v * a) <= 2e5 * (1 + 1e-12)).all()
+
+
+@given(
+    radius=st.floats(0.02, 50.0), sweep=st.floats(0.1, 12.0), velocity=st.floats(10.0, 1000.0), acceleration=st.floats(100.0, 1e5),
+    jerk=st.floats(1e4, 1e7), looser=st.sampled_from(["velocity", "acceleration", "jerk"]), by=st.floats(1.01, 3.0),
+)  # fmt: skip
+def test_looser_limits_never_make_an_arc_take_longer(radius, sweep, velocity, acceleration, jerk, looser, by):
+    """Found by the campaign of random jobs: with 1.6 times the acceleration a job took 1.5 times as long."""
+    limits = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    turns, last = int(sweep // (2 * np.pi)) + 1, radius * np.exp(1j * (sweep % (2 * np.pi)))
+    text = f"G21 G17 G90 F1000000\nG1 X{radius:.9f}\nG3 X{last.real:.9f} Y{last.imag:.9f} I{-radius:.9f} J0 P{turns}\n"
+    times = []
+    for more in (1.0, by):
+        machine = problems.machine(**(limits | {looser: limits[looser] * more}))
+        path = toolpath_from_program(parse_program(text), machine)
+        v, a, j = (limit[-1] for limit in block_limits(path, machine))
+        smallest, kappa = acceleration * (more if looser == "acceleration" else 1.0), path.curvature[-1]
+        assert np.hypot(kappa * v**2, a) <= smallest * (1 + 1e-9)
+        largest = jerk * (more if looser == "jerk" else 1.0)
+        assert np.hypot(kappa**2 * v**3 + j, 3 * kappa * v * a) <= largest * (1 + 1e-9)
+        times.append(rest_to_rest_times(path.length[-1:], *(np.array([x]) for x in (v, a, j)))[0])
+    assert times[1] <= times[0] * (1 + 1e-5)

@@ -211,8 +211,9 @@ def _inside(made: Plan) -> bool:
 def _worst(verdict: Verdict) -> tuple[int, float] | None:
     """Where chords are most off in the judge's eyes: the NC line, and how far off as a share of the tolerance; None where they keep
     it. Eq. (18) bounds them by the curvature at the vertex, which can be more than any phase of the samples shows."""
-    if verdict.contour.broken:
-        return verdict.contour.line, verdict.contour.ratio
+    for check in (verdict.contour, verdict.vertex):
+        if check.broken:
+            return check.line, check.ratio
     corners = verdict.corners
     if not corners.overdrawn.any():
         return None

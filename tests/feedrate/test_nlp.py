@@ -9,10 +9,12 @@ import pytest
 from whole_plans import smooth_path
 
 from benchmarks import problems
+from benchmarks.jerk_campaign import small_problem
 from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
+from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import Status, active_names, constraint_ratios
@@ -209,6 +211,14 @@ def test_a_start_in_motion_is_kept():
     solution = JerkLimitedNLP().solve(problem).require()
     assert solution.feed_sq[0] == 400.0
     assert solution.cycle_time < JerkLimitedNLP().solve(line(3.0)).cycle_time
+
+
+def test_a_guess_that_rests_at_both_ends_of_an_interval_is_no_hindrance():
+    """The last interval of this problem is 1e-8 mm; the second-order optimum, the guess, stands still at both its ends."""
+    problem = small_problem(8460)
+    assert np.isinf(Reachability().solve(problem).duration[-2])
+    reference = JerkLimitedNLP().solve(problem).require()
+    assert JerkLimited().solve(problem).cycle_time == pytest.approx(reference.cycle_time, rel=1e-4)
 
 
 def test_two_intervals_cannot_go_from_rest_to_rest():

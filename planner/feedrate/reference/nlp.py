@@ -152,6 +152,8 @@ def _solve_piece(
 
     # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
     h_guess = guess.duration[here][:-1] / SLOWER
+    lasts = np.isfinite(h_guess)  # not where the guess stands still at both ends of a tiny interval
+    h_guess = np.where(lasts, h_guess, h_guess[lasts].mean())
     length, second = ds.mean(), h_guess.mean()
     speed, acc, jerk = length / second, length / second**2, length / second**3
 

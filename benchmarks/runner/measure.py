@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks import problems
 from benchmarks.runner import nasty
-from benchmarks.runner.peers import Judged, NotApplicable, NotHere
+from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from benchmarks.runner.rows import (
     ERROR,
     FAILED,
@@ -175,7 +175,8 @@ def _of_made(found: Made, blank: Row) -> Row:
     if isinstance(found, Plan):
         return _of_plan(found, blank)
     if isinstance(found, Judged):
-        return _judged(found.verdict, dataclasses.replace(blank, status=SOLVED, cycle_s=found.cycle_s))
+        row = dataclasses.replace(blank, status=SOLVED, cycle_s=found.cycle_s, free=found.free)
+        return _judged(found.verdict, row)
     return dataclasses.replace(blank, status=SOLVED, cycle_s=found, message="a time only, no motion to judge")
 
 

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
 
 import planner
+from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.control_files import models
@@ -32,19 +32,10 @@ from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Kind, Program
-from planner.verify import Verdict
 
 CHORDS = (
     0.1  # of the tolerance: how far the chords of arcs may be from them where a model takes lines only [-]
 )
-
-
-class NotApplicable(Exception):
-    """A way that cannot plan this job, and why."""
-
-
-class NotHere(Exception):
-    """A way whose package is not installed here."""
 
 
 def toppra(program: Program, machine: Machine, tolerance: float | None) -> Plan:
@@ -75,14 +66,6 @@ def tube_by(solver: str) -> Callable[[Program, Machine, float | None], Plan]:
         return planner.plan(program, machine, tolerance=tolerance, method="tube", solver=solver)
 
     return planned
-
-
-@dataclass(frozen=True, kw_only=True)
-class Judged:
-    """A motion that others made: the verdict on it and its duration [s]."""
-
-    verdict: Verdict
-    cycle_s: float
 
 
 def ruckig(program: Program, machine: Machine, tolerance: float | None) -> Judged:

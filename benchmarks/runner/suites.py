@@ -103,11 +103,12 @@ SMALL = (
     "sequential-convex",
     "copp",
     "ruckig",
+    "linuxcnc",
     "ipopt",
     *MODELS,
 )
-USUAL = (*QUICK_WAYS, "toppra", "copp", "ruckig", *MODELS)
-LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "kinematic", "stop", *MODELS)
+USUAL = (*QUICK_WAYS, "toppra", "copp", "ruckig", "linuxcnc", *MODELS)
+LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "linuxcnc", "kinematic", "stop", *MODELS)
 
 
 def made(make: Callable[[], Program]) -> Callable[[Machine], Program]:

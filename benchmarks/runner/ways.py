@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import planner
-from benchmarks.runner import peers
+from benchmarks.runner import linuxcnc, peers
+from benchmarks.runner.judged import Judged
 from benchmarks.runner.rows import METHOD, MODEL, PEER
 from planner.base.errors import InputError
 from planner.base.names import EFFORTS, METHODS, SMOOTHINGS, known_name, users_of
@@ -19,7 +20,7 @@ from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.nc.program import Program
 
-Made = Plan | peers.Judged | float  # a plan, another one's motion, or a predicted time [s]
+Made = Plan | Judged | float  # a plan, another one's motion, or a predicted time [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +41,7 @@ PEERS: dict[str, Callable[[Program, Machine, float | None], Made]] = {
     "sequential-convex": peers.sequential_convex,
     "copp": peers.copp,
     "ruckig": peers.ruckig,
+    "linuxcnc": linuxcnc.linuxcnc,
     "ipopt": peers.tube_by("ipopt"),
     "fatrop": peers.tube_by("fatrop"),
 }

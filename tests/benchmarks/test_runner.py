@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import problems
 from benchmarks.__main__ import main
-from benchmarks.runner import peers
+from benchmarks.runner.judged import NotApplicable, NotHere
 from benchmarks.runner.measure import Calibration, Protocol, measured, outcome
 from benchmarks.runner.rows import ERROR, NOT_APPLICABLE, OVER_LIMIT, SKIPPED, SOLVED, Row, read
 from benchmarks.runner.run import Request, Worker
@@ -76,8 +76,8 @@ def failing(fault: BaseException) -> Way:
     ("fault", "status", "message"),
     [
         (InputError("line 3: no such word"), NOT_APPLICABLE, "line 3: no such word"),
-        (peers.NotApplicable("lines only"), NOT_APPLICABLE, "lines only"),
-        (peers.NotHere("no package"), SKIPPED, "no package"),
+        (NotApplicable("lines only"), NOT_APPLICABLE, "lines only"),
+        (NotHere("no package"), SKIPPED, "no package"),
         (ZeroDivisionError("by\nzero"), ERROR, "ZeroDivisionError: by zero"),
     ],
 )

@@ -12,7 +12,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
 GOLDEN = float((np.sqrt(5.0) - 1.0) / 2.0)
-SECTIONS = 26  # which leave 4e-6 of the range of log v, and no more of the time
+GOLDEN_STEPS = 26  # which leave 4e-6 of the range of log v, and no more of the time
 AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
 
 
@@ -70,7 +70,7 @@ def _fastest(
 
     inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
     times = [time(at) for at in inner]
-    for _ in range(SECTIONS):
+    for _ in range(GOLDEN_STEPS):
         left = times[0] < times[1]
         low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
         new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))

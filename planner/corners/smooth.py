@@ -143,7 +143,10 @@ class SmoothPath:
         stop = np.flatnonzero(self.joint == Joint.STOP)
         legs = np.repeat(pieces, np.diff(stop))
         joints = np.append(True, legs)  # with the joint behind each leg
-        toolpath = self.toolpath.part(np.repeat(legs, np.diff(self.legs.first)))
+        parted = self.toolpath.with_joints(
+            self.legs.first[stop], Joint.STOP
+        )  # the path may stop where the program does not
+        toolpath = parted.part(np.repeat(legs, np.diff(self.legs.first)))
         columns = {name: getattr(self, name)[joints] for name in ("joint", "d", "params", "scale")}
         columns |= {name: getattr(self, name)[joints] for name in ("tol", "tol_ap", "normal_max")}
         return dataclasses.replace(self, toolpath=toolpath, legs=legs_of(toolpath), **columns)

@@ -9,9 +9,14 @@ where the sample is perpendicular to the arc,
 or from its ends; on a spline of the program the same, from the nearest of `STARTS` places (curves.py). Between samples the tolerance
 counts (contour.py), and within a period of a block under G64, and on the half of a block beside one, where the corner between them may
 be rounded.
+
+Where the tolerance is larger than what the path does between two joints, such as a whole circle, the times of the joints say little.
+A sample that is off is therefore looked for once more, at the nearest of the pieces that it can belong to by the order of the path.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +25,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verify.curves import curve_points
 from planner.verify.findings import Look
+from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
 from planner.verify.pieces import PLACE_ROUNDING, ProgramPieces
 
 STARTS = 17  # places on a curve
@@ -36,22 +42,64 @@ def exact_faults(
     """
     if not toolpath.exact.any():
         return []
+    allowed = PLACE_ROUNDING + float(np.linalg.norm(rounding))
+    worst = _worst(trajectory, looks, toolpath, pieces, None)
+    if worst.apart > allowed:
+        worst = _worst(trajectory, looks, toolpath, pieces, new_match(pieces))
+    if worst.apart <= allowed:
+        return []
+    where = f"{worst.apart:.6g} mm off at t = {worst.time:.6g} s, line {worst.line}"
+    return [f"exact path: {where}: G61 asks for the path itself"]
+
+
+class Worst(NamedTuple):
+    """The sample that is farthest from a path to be followed exactly: its distance [mm], time [s] and line."""
+
+    apart: float = 0.0
+    time: float = 0.0
+    line: int = 0
+
+
+def _worst(
+    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, match: Match | None
+) -> Worst:
+    """The worst sample by the times of the joints; with a match, a new one, the nearest of what it finds possible counts too."""
     passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     free = np.append(0, np.cumsum(~toolpath.exact))  # blocks before that need not be followed exactly
-    worst, when, line = 0.0, 0.0, 0
+    worst = Worst()
+    before: Trajectory | None = None
     for chunk in trajectory.chunks():
+        matched = None if match is None else _matched(pieces, match, before, chunk)
+        before = chunk.rows(np.array([len(chunk) - 1]))
         first, k, last = (_segment(passed, chunk.t + by * chunk.dt, len(toolpath)) for by in (-1.0, 0.0, 1.0))
         exact = free[last + 1] == free[first]
         inside = np.flatnonzero(exact & ~_of_a_corner(toolpath, chunk.position, k))
         if not len(inside):
             continue
-        off = _least_distance(toolpath, chunk.position[inside], first[inside] - 1, last[inside] + 1)
+        q = chunk.position[inside]
+        off = _least_distance(toolpath, q, first[inside] - 1, last[inside] + 1)
+        if matched is not None:
+            off = np.minimum(off, _least_distance(toolpath, q, matched[inside] - 1, matched[inside] + 1))
         at = int(off.argmax())
-        if off[at] > worst:
-            worst, when, line = float(off[at]), float(chunk.t[inside[at]]), int(toolpath.line[k[inside[at]]])
-    if worst <= PLACE_ROUNDING + float(np.linalg.norm(rounding)):
-        return []
-    return [f"exact path: {worst:.6g} mm off at t = {when:.6g} s, line {line}: G61 asks for the path itself"]
+        if off[at] > worst.apart:
+            worst = Worst(float(off[at]), float(chunk.t[inside[at]]), int(toolpath.line[k[inside[at]]]))
+    return worst
+
+
+def _matched(pieces: ProgramPieces, match: Match, before: Trajectory | None, chunk: Trajectory) -> Array:
+    """(T,) the segment of each sample: of the pieces it can belong to by the order of the path, the nearest.
+
+    before : the last sample of the chunk before; None for the first chunk
+    """
+    t, position, skip = chunk.t, chunk.position, 0
+    if before is not None:
+        t, position, skip = np.append(before.t, t), np.vstack([before.position, position]), 1
+    axes = position.shape[1]
+    place = Located(np.zeros(len(t), dtype=np.int64), np.zeros(len(t)))
+    anywhere = AtStop(np.full(axes, np.inf), np.zeros(axes))  # stops are judged elsewhere
+    match_samples(pieces, match, t, position, skip, False, anywhere, place)
+    segment: Array = pieces.piece["segment"][place.piece[skip:]]
+    return segment
 
 
 def _segment(passed: FloatArray, t: FloatArray, count: int) -> Array:

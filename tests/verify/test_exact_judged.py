@@ -107,3 +107,26 @@ def test_a_sample_just_before_the_stop_where_g61_begins_may_be_of_the_block_befo
     made = planner.plan(planner.read_program(text=text, machine=machine), machine, method="second-order")
     assert made.verdict is not None
     assert made.verdict.passed, made.verdict.faults
+
+
+@pytest.mark.parametrize(
+    "text", ["G3 X0 Y0 I0.14795 J-0.02212 P2\nG5 X0.005 Y-0.011 I0.001493 J0.004828 P0.001836 Q-0.00439\n"]
+)
+def test_within_the_tolerance_of_a_whole_circle_the_order_says_where_a_sample_is(text: str) -> None:
+    """Found by the campaign: a tolerance larger than the circle, whose end is passed at its start as well."""
+    axes = {letter: Axis(velocity=4000, acceleration=1e5, jerk=3e7) for letter in "xyz"}
+    machine = Machine(name="quick", dt=0.002, tolerance=0.323, feed_max=921.9, feed_default=10.0, axes=axes)
+    program = planner.read_program(text=f"G61 F1236\n{text}", machine=machine)
+    made = planner.plan(program, machine, method="second-order")
+    assert made.verdict is not None
+    assert made.verdict.passed, made.verdict.faults
+    assert made.trajectory is not None
+    beside = made.trajectory.position.copy()
+    beside[len(beside) // 2] += [0.0, 0.0, 5e-5]
+    found = verify(
+        dataclasses.replace(made.trajectory, position=beside),
+        toolpath_from_program(program, machine),
+        machine,
+        not_limited=("acceleration", "jerk", "velocity"),
+    )
+    assert any(fault.startswith("exact path: 5e-05 mm off") for fault in found.faults)

@@ -28,8 +28,9 @@ from planner.lookahead.arc_pieces import spline_at_rest
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import ENTRY, PHASES, ZERO, corner_at, leg_end, leg_phases, phase_times_of
 
-# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius.
-ARC_PIECE = 0.01
+# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius; and by less
+# where that is more than ARC_MISS [mm], a tenth of the least digit that programs carry.
+ARC_PIECE, ARC_MISS = 0.01, 1e-7
 # Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this
 # fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets
 # in, and 2 kappa a^2 where the acceleration is constant.
@@ -38,6 +39,8 @@ ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
 SHORTEST = 1e-16
 # Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
 ARC_SHORTEST = 2e-5
+# With fewer pieces in a phase than this, all of them are next to that short.
+BESIDE_A_STEP = 4
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
 
@@ -193,9 +196,11 @@ def _emit(ways, legs, dwell, rows):
 
 @njit(cache=True, error_model="numpy")
 def _emit_arc(n, k, leg, phases, state, rows):
-    """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their neighbour."""
+    """The phases on an arc in pieces that turn little. A phase shorter than `ARC_SHORTEST` joins a piece of that length beside it: there
+    the acceleration steps, of which a long piece would make a deviation from the arc."""
     two = state[1]
     pending, began = 0.0, two[0]
+    turn = min(ARC_PIECE, (ARC_MISS * leg.turning * 384.0 / 5.0) ** 0.25)
     for f in range(PHASES):
         phase, jerk = phases[0, f], phases[1, f]
         two[3] = jerk
@@ -203,13 +208,19 @@ def _emit_arc(n, k, leg, phases, state, rows):
             _advance(state, phase)
             pending += phase
             continue
-        moved = phase * (two[1] + phase * (0.5 * two[2] + phase * two[3] / 6.0))
+        fastest = max(two[1], two[1] + phase * (two[2] + 0.5 * phase * jerk))
         accuracy = max(np.sqrt(abs(jerk) / (3.0 * leg.v)), abs(two[2]) / (2.45 * leg.v))
         accuracy /= np.sqrt(ARC_ACCURACY)
-        pieces = max(ARC_PIECES_MIN, 1 + int(max(leg.turning * moved / ARC_PIECE, phase * accuracy)))
+        pieces = max(ARC_PIECES_MIN, 1 + int(phase * max(leg.turning * fastest / turn, accuracy)))
         pieces = min(pieces, int(phase / ARC_SHORTEST))
-        for _ in range(pieces):
-            n = _put(n, phase / pieces, k, k, state, rows)
+        head = ARC_SHORTEST if pending > 0.0 and pieces > BESIDE_A_STEP else 0.0
+        step_behind = f + 1 < PHASES and 0.0 < phases[0, f + 1] < ARC_SHORTEST
+        tail = ARC_SHORTEST if step_behind and pieces > BESIDE_A_STEP else 0.0
+        for i in range(-1, pieces + 1):
+            duration = head if i < 0 else (tail if i == pieces else (phase - head - tail) / pieces)
+            if duration == 0.0:
+                continue
+            n = _put(n, duration, k, k, state, rows)
             if pending > 0.0 and n <= len(rows.duration):
                 rows.duration[n - 1] += pending
                 rows.after[n - 1, 0] = began

@@ -24,7 +24,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verify.curves import curve_points
-from planner.verify.findings import Look
+from planner.verify.findings import Look, joint_times
 from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
 from planner.verify.pieces import PLACE_ROUNDING, ProgramPieces
 
@@ -64,7 +64,7 @@ def _worst(
     trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, match: Match | None
 ) -> Worst:
     """The worst sample by the times of the joints; with a match, a new one, the nearest of what it finds possible counts too."""
-    passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    passed = joint_times(looks[0], pieces)
     free = np.append(0, np.cumsum(~toolpath.exact))  # blocks before that need not be followed exactly
     worst = Worst()
     before: Trajectory | None = None

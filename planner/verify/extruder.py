@@ -22,7 +22,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
-from planner.verify.findings import FAULTS_OF_A_KIND, Look
+from planner.verify.findings import FAULTS_OF_A_KIND, Look, joint_times
 from planner.verify.given import Given
 from planner.verify.limits import FEED_AT_REST, ROUNDING_ULPS
 from planner.verify.pieces import RATIO_ROUNDING, ProgramPieces
@@ -72,7 +72,7 @@ def extruder_seen(
     """What the extruder of a delivered motion did; nothing where the program has none."""
     if toolpath.extrusion is None:
         return ExtruderSeen()
-    passed = looks[0].seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    passed = joint_times(looks[0], pieces)
     watch = _Watch(toolpath, passed, given)
     for chunk in trajectory.chunks():
         if not len(chunk.extruder):

@@ -37,6 +37,13 @@ class Look:
         return ", ".join(part for part in (text, self.note) if part)
 
 
+def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
+    """When the motion passes each joint of the program [s], in order: a place that it passes several times within the tolerance is
+    passed no earlier than the joint before."""
+    near: FloatArray = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    return np.maximum.accumulate(near)
+
+
 def measured(looks: list[Look], group: int) -> FloatArray:
     """Largest ratio per axis (A,) of a group of rows, over all readings."""
     axes = looks[0].seen.at.shape[1]

@@ -20,7 +20,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
-from planner.verify.findings import FAULTS_OF_A_KIND, Look
+from planner.verify.findings import FAULTS_OF_A_KIND, Look, joint_times
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 
 FAULT = "thread"  # what its faults begin with
@@ -65,7 +65,7 @@ def _out_of_step(
     room: FloatArray,
 ) -> FloatArray:
     """(H,) largest |s - F t - c| of the moves `held` (H,) [mm]; 0 where there are no samples between run-in and run-out."""
-    passed = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    passed = joint_times(look, pieces)
     begin, end = passed[held], passed[held + 1]
     length, feed, start = toolpath.length[held], toolpath.feed[held], toolpath.start[held]
     direction = (toolpath.end[held] - start) / length[:, None]

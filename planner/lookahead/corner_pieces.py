@@ -39,8 +39,9 @@ ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
 SHORTEST = 1e-16
 # Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
 ARC_SHORTEST = 2e-5
-# With fewer pieces in a phase than this, all of them are next to that short.
-BESIDE_A_STEP = 4
+# Shortest time in which the acceleration on an arc comes to its limit, in pieces that short: over a step of the acceleration a spline
+# with long pieces leaves the arc, by a h^2/48 or so.
+ARC_RAMP = 5 * ARC_SHORTEST
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
 
@@ -196,8 +197,7 @@ def _emit(ways, legs, dwell, rows):
 
 @njit(cache=True, error_model="numpy")
 def _emit_arc(n, k, leg, phases, state, rows):
-    """The phases on an arc in pieces that turn little. A phase shorter than `ARC_SHORTEST` joins a piece of that length beside it: there
-    the acceleration steps, of which a long piece would make a deviation from the arc."""
+    """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their neighbour."""
     two = state[1]
     pending, began = 0.0, two[0]
     turn = min(ARC_PIECE, (ARC_MISS * leg.turning * 384.0 / 5.0) ** 0.25)
@@ -213,14 +213,8 @@ def _emit_arc(n, k, leg, phases, state, rows):
         accuracy /= np.sqrt(ARC_ACCURACY)
         pieces = max(ARC_PIECES_MIN, 1 + int(phase * max(leg.turning * fastest / turn, accuracy)))
         pieces = min(pieces, int(phase / ARC_SHORTEST))
-        head = ARC_SHORTEST if pending > 0.0 and pieces > BESIDE_A_STEP else 0.0
-        step_behind = f + 1 < PHASES and 0.0 < phases[0, f + 1] < ARC_SHORTEST
-        tail = ARC_SHORTEST if step_behind and pieces > BESIDE_A_STEP else 0.0
-        for i in range(-1, pieces + 1):
-            duration = head if i < 0 else (tail if i == pieces else (phase - head - tail) / pieces)
-            if duration == 0.0:
-                continue
-            n = _put(n, duration, k, k, state, rows)
+        for _ in range(pieces):
+            n = _put(n, phase / pieces, k, k, state, rows)
             if pending > 0.0 and n <= len(rows.duration):
                 rows.duration[n - 1] += pending
                 rows.after[n - 1, 0] = began

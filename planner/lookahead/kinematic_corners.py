@@ -22,6 +22,7 @@ from planner.corners.sharing import share_legs
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.lookahead.corner_pieces import ARC_RAMP
 from planner.lookahead.look_ahead import capped, needed
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
@@ -48,6 +49,7 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     )
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
+    j = np.where(turning > 0.0, np.minimum(j, a / ARC_RAMP), j)
     return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
 
 

@@ -18,6 +18,7 @@ down and lengthened until nothing is left. Behind the last run nothing is added:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,11 +29,11 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.timing import MotionInTime
 from planner.verify.filtered import look_behind, motion_asked
-from planner.verify.pieces import program_pieces, widened
+from planner.verify.pieces import ProgramPieces, program_pieces, widened
 
 # Of the tolerance, what measuring at other times may find more [-].
 SPARE = 2e-3
-# The motion is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
+# A motion that leaves the tolerance is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
 WIDER = 16.0
 # The kernel is taken in so many steps where rests are sought [-]; a rest is found to 2^-HALVINGS of Td.
 STEPS, HALVINGS = 128, 10
@@ -71,6 +72,13 @@ class Violations:
         return room / (self.ratio - (1.0 - SPARE) + room)
 
 
+class _Measured(NamedTuple):
+    """Whether a motion leaves the tolerance, and what `Behind.errors` returns of it."""
+
+    over: bool
+    columns: tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]
+
+
 class Behind:
     """Measures motions along one path of N pieces behind the filters of one machine."""
 
@@ -93,24 +101,37 @@ class Behind:
         filters : lengths of the moving averages [s]; none for the motion itself
 
         Returns times [s], ratios [-] and pieces where the ratio of the contour is large, (n,) each, and the ratio and time of every
-        vertex, (N+1,) each.
+        vertex, (N+1,) each: as the verifier sees them where it finds a vertex or a place off, as far as wider budgets measure them.
         """
+        seen = self._measured(motion, filters, self.pieces, 1.0)
+        if not seen.over:
+            return seen.columns
+        wide = self._measured(motion, filters, self._wide, WIDER)
+        return (
+            wide.columns if wide.over else seen.columns
+        )  # within wider budgets another way along the path may fit
+
+    def _measured(
+        self, motion: MotionInTime, filters: tuple[float, ...], pieces: ProgramPieces, wider: float
+    ) -> _Measured:
+        """The errors of the motion matched with budgets `wider` times as large."""
         kept: list[tuple[FloatArray, FloatArray, Array]] = []
         worst = np.zeros(len(self.pieces.piece))
 
         def each(t: FloatArray, ratio: FloatArray, piece: Array) -> None:
-            ratio = ratio * WIDER
+            ratio = ratio * wider
             np.maximum.at(worst, piece, ratio)
             over = ratio > 1.0 - SPARE
             kept.append((t[over], ratio[over], piece[over]))
 
         at = motion_asked(motion, self.machine.dt)
-        look = look_behind(at, motion.end, filters, self.machine.dt, self._wide, each)
+        look = look_behind(at, motion.end, filters, self.machine.dt, pieces, each)
         near = look.seen.match.passed["near"] / self.pieces.joint["budget"]
-        near[np.isinf(near)] = 2.0 * WIDER
+        near[np.isinf(near)] = 2.0 * wider
         t, ratio, piece = (np.concatenate(column) for column in zip(*kept, strict=True))
         self._worst = worst
-        return t, ratio, piece, near, look.seen.match.passed["near_time"]
+        over = bool(len(t)) or bool((near > 1.0 - SPARE).any())
+        return _Measured(over, (t, ratio, piece, near, look.seen.match.passed["near_time"]))
 
     def path_shares(self, motion: Timed) -> tuple[FloatArray, FloatArray]:
         """Ratios of the path itself, without filters: the largest on each piece (N,), and at the vertices (N+1,) [-]."""

@@ -38,7 +38,7 @@ class Look:
 
 
 def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
-    """When the motion passes each joint of the program [s], in order: a place that it passes several times within the tolerance is
+    """(M+1,) times at which the motion passes the joints of M segments [s], in order: a place that it passes several times within the tolerance is
     passed no earlier than the joint before."""
     near: FloatArray = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)

@@ -38,8 +38,8 @@ class Look:
 
 
 def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
-    """(M+1,) times at which the motion passes the joints of M segments [s], in order: a place that it comes by several times is passed no
-    earlier than the joint before."""
+    """(M+1,) times at which the motion passes the joints of M segments [s], in order: a place that it comes by several times is passed
+    no earlier than the joint before."""
     near: FloatArray = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)
 

@@ -60,19 +60,29 @@ Row = dict[str, Any]
 
 
 def outcome(seed: int) -> Row:
-    """The row of a job. Nothing that planning raises is raised here."""
+    """The row of the job of a seed. Nothing that drawing and planning raise is raised here."""
     began = time.process_time()
-    made: Job | None = None
     try:
-        made = job(seed)
-        row = _about(made) | _planned(made)
-    except InputError as fault:  # while the job was drawn
-        row = {"seed": seed, "outcome": CRASH, "said": f"the draw: {fault}"}
+        row = row_of(job(seed))
     except Exception as fault:
-        at = traceback.extract_tb(fault.__traceback__)[-1]
-        said = f"{type(fault).__name__}: {fault} ({Path(at.filename).name}:{at.lineno})"
-        row = ({"seed": seed} if made is None else _about(made)) | {"outcome": CRASH, "said": said}
+        row = {"seed": seed} | _crash(fault)
     return row | {"cpu": round(time.process_time() - began, 3)}
+
+
+def row_of(made: Job) -> Row:
+    """The row of a job. Nothing that planning raises is raised here."""
+    try:
+        return _about(made) | _planned(made)
+    except Exception as fault:
+        return _about(made) | _crash(fault)
+
+
+def _crash(fault: Exception) -> Row:
+    at = traceback.extract_tb(fault.__traceback__)[-1]
+    return {
+        "outcome": CRASH,
+        "said": f"{type(fault).__name__}: {fault} ({Path(at.filename).name}:{at.lineno})",
+    }
 
 
 def _about(made: Job) -> Row:
@@ -317,7 +327,11 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin no job after so many")
     parser.add_argument("--limit", type=float, default=LIMIT, help="CPU s of a job")
     parser.add_argument("--file", type=Path, default=KEPT)
+    parser.add_argument("--show", type=int, metavar="SEED", help="print this job as JSON, and do no more")
     options = parser.parse_args(argv)
+    if options.show is not None:
+        print(json.dumps(job(options.show).data(), indent=1))
+        return 0
     tally = Tally.read(SUMMARY) if options.file == KEPT else Tally()
     tally.add(kept_rows(options.file).values())
     seeds = [seed for seed in range(options.seed, options.seed + options.count) if seed not in tally]

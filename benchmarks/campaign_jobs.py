@@ -36,24 +36,25 @@ SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (
     4.0,
     30,
 )  # of a usual job, the blocks on the mean above 2, and one in so many is larger
-# Of jobs with more axes or blocks than these only a share is planned with effort normal, which takes tens of seconds.
-AXES_OF_NORMAL, BLOCKS_OF_NORMAL, SHARE_OF_NORMAL = 4, 8, 0.1
+# Of jobs with more axes or blocks than these only a share is planned in the ways that take tens of seconds for them.
+AXES_OF_SLOW, BLOCKS_OF_SLOW, SHARE_OF_SLOW = 4, 8, 0.1
 SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines that have none [-]
 PERIOD_MAX = 0.002  # [s]
 DWELL_MAX = 0.05  # [s]
-DRAWS = 60  # of a program until one has few blocks and moves
+DRAWS = 60  # of a program until one has few blocks and moves; the least one counts where none has
 VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
 PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
+QUICK: dict[str, Any] = {"effort": "quick"}
 # Methods with their settings, and how often each is drawn.
 METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (
-    (36, "optimal", {"effort": "quick"}),
+    (36, "optimal", QUICK),
     (4, "optimal", {}),
     (3, "optimal", {"corner": "bezier"}),
     (3, "optimal", {"corner": "fir"}),
     (3, "optimal", {"corner": "kinematic"}),
-    (3, "optimal", {"geometry": "spline", "effort": "quick"}),
-    (3, "optimal", {"effort": "quick", "shaped": True}),
+    (3, "optimal", {"geometry": "spline"} | QUICK),
+    (3, "optimal", QUICK | {"shaped": True}),
     (6, "second-order", {}),
     (2, "second-order", {"corner": "bezier"}),
     (8, "kinematic", {}),
@@ -65,6 +66,7 @@ METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (
     (1, "fir-spline-plain", {}),
     (2, "tube", {}),
 )
+SLOW = (("optimal", {}), ("optimal", QUICK | {"shaped": True}), ("tube", {}))
 SOURCES = {
     "lines and arcs": 18,
     "axes": 14,
@@ -85,6 +87,7 @@ Rng = np.random.Generator
 class Job:
     """What is planned: a program, or the message with which it was refused, on a machine.
 
+    machine   : it is planned on; `drawn`, the one from which it was made quicker for some `samples` (`_short`)
     tolerance : that is given beside program and machine [mm], or None
     """
 
@@ -94,6 +97,8 @@ class Job:
     program: Program | None
     refusal: str
     machine: Machine
+    drawn: Machine
+    samples: int
     method: str
     settings: dict[str, Any] = field(default_factory=dict)
     tolerance: float | None = None
@@ -104,6 +109,24 @@ class Job:
         return "/".join(
             [self.method, *(str(value) if key != "shaped" else key for key, value in self.settings.items())]
         )
+
+    def data(self) -> dict[str, Any]:
+        """As JSON has it, for tests that are to stay when seeds draw other jobs. Programs that have no text are not in it."""
+        keys = ("seed", "source", "method", "settings", "tolerance", "samples")
+        machine = self.drawn.model_dump(mode="json", exclude_defaults=True)
+        return {key: getattr(self, key) for key in keys} | {
+            "machine": machine,
+            "text": self.text.splitlines(),
+        }
+
+
+def job_from(data: dict[str, Any]) -> Job:
+    """The job of `Job.data`."""
+    drawn, text = Machine.model_validate(data["machine"]), "\n".join(data["text"])
+    program, machine = _short(
+        parse_program(text, drawn, source=f"{data['source']} job"), drawn, data["samples"]
+    )
+    return Job(**data | {"text": text, "program": program, "refusal": "", "machine": machine, "drawn": drawn})
 
 
 def job(seed: int) -> Job:
@@ -121,19 +144,19 @@ def _job(seed: int, rng: Rng) -> Job:
     source = names[rng.choice(len(names), p=weights / weights.sum())]
     shares = np.array([share for share, _, _ in METHODS])
     _, method, settings = METHODS[rng.choice(len(METHODS), p=shares / shares.sum())]
-    found: tuple[str, Machine, Program | None, str] | None = None
     large = bool(rng.random() < 1.0 / LARGE)
     most = int(min(2 + rng.exponential(BLOCKS / 3 if large else SMALL_BLOCKS), BLOCKS))  # of most draws
     samples = SAMPLES if large else int(rng.integers(*SMALL_SAMPLES))
-    for draw in range(DRAWS):
-        found = _drawn(source, rng)
-        if found[2] is None or 0 < len(found[2]) <= (most if draw < DRAWS // 2 else BLOCKS):
+    text, machine, program, refusal = _drawn(source, rng)
+    for _ in range(DRAWS - 1):
+        if program is None or 0 < len(program) <= most:
             break
-    assert found is not None
-    text, machine, program, refusal = found
-    wide = program is not None and (len(machine.axes) > AXES_OF_NORMAL or len(program) > BLOCKS_OF_NORMAL)
-    if (method, settings) == ("optimal", {}) and wide and rng.random() > SHARE_OF_NORMAL:
-        settings = {"effort": "quick"}
+        other = _drawn(source, rng)
+        if other[2] is None or len(program) == 0 or 0 < len(other[2]) < len(program):
+            text, machine, program, refusal = other
+    wide = program is not None and (len(machine.axes) > AXES_OF_SLOW or len(program) > BLOCKS_OF_SLOW)
+    if (method, settings) in SLOW and wide and rng.random() > SHARE_OF_SLOW:
+        method, settings = "optimal", QUICK
     if settings.get("shaped"):
         modes = tuple(
             Mode(frequency=float(10 ** rng.uniform(0.7, 2.0)), damping=float(rng.uniform(0, 0.2)))
@@ -143,11 +166,12 @@ def _job(seed: int, rng: Rng) -> Job:
     tolerance = float(10 ** rng.uniform(-3.0, 0.0)) if rng.random() < 0.3 else None
     if program is not None and len(program) > BLOCKS:
         program, refusal = None, f"{len(program)} blocks are too many for this campaign"
+    drawn = machine
     if program is not None:
         program, machine = _short(program, machine, samples)
     return Job(
-        seed=seed, source=source, text=text, program=program, refusal=refusal,
-        machine=machine, method=method, settings=dict(settings), tolerance=tolerance,
+        seed=seed, source=source, text=text, program=program, refusal=refusal, machine=machine, drawn=drawn,
+        samples=samples, method=method, settings=dict(settings), tolerance=tolerance,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ Nothing is imported before Ctrl-C has its handler, so that an interrupt during t
 from __future__ import annotations
 
 import gc
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,20 +19,27 @@ __all__ = ["app", "main"]
 
 # So many new objects before a collection of garbage; Python's 700 means 155 collections, 0.1 s of a plan of ten lines (now 10, 0.04 s).
 OBJECTS = 10_000
+NOT_SOLVED = 3  # exit code, as in commands/terminal.py
 
 
 def main() -> None:
     """Entry point of the command `planner`."""
     from planner.commands.interrupt import end_at_interrupts, no_more_interrupts
+    from planner.commands.memory import is_of_memory
 
     end_at_interrupts()
     gc.set_threshold(OBJECTS)
-    from planner.commands.app import app
-    from planner.commands.terminal import prepare_streams
-
-    prepare_streams()
     try:
+        from planner.commands.app import app
+        from planner.commands.terminal import prepare_streams
+
+        prepare_streams()
         app(prog_name="planner")
+    except Exception as fault:  # of loading it: commands tell of what they raise themselves
+        if not is_of_memory(fault):
+            raise
+        print("not solved: there is too little memory to load planner and its libraries", file=sys.stderr)
+        raise SystemExit(NOT_SOLVED) from None
     finally:
         no_more_interrupts()
 

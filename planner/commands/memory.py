@@ -31,7 +31,9 @@ def is_of_memory(fault: BaseException) -> bool:
         if any(words in str(one).lower() for words in _SAID):
             return True
         one = one.__cause__ or one.__context__
-    return any(isinstance(one, (OSError, ImportError)) for one in seen) and not _room_for_a_library()
+    # Python's own modules end in a SystemError where an allocation in them has failed
+    unclear = any(isinstance(one, (OSError, ImportError, SystemError)) for one in seen)
+    return unclear and not _room_for_a_library()
 
 
 def _room_for_a_library() -> bool:

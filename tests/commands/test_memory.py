@@ -67,6 +67,22 @@ def test_a_command_that_runs_out_of_memory_is_no_bug(tmp_path: Path, monkeypatch
     assert "bug" not in done.output
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space")
+@pytest.mark.parametrize("megabytes", [60, 64, 140, 150])
+def test_libraries_that_do_not_fit_are_no_traceback(megabytes: int) -> None:
+    """Found by benchmarks/faults.py: what planner imports may already be too large."""
+    code = (
+        "import resource\n"
+        f"resource.setrlimit(resource.RLIMIT_AS, ({megabytes} << 20, {megabytes} << 20))\n"
+        "import sys; sys.argv = ['planner', 'info']\n"
+        "from planner.cli import main; main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if not done.stderr.startswith("OpenBLAS error: Memory allocation"):  # OpenBLAS ends the process by itself
+        assert done.stderr == "not solved: there is too little memory to load planner and its libraries\n"
+        assert done.returncode == NOT_SOLVED
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
 def test_a_process_that_is_killed_from_outside_is_no_bug(

@@ -2,12 +2,13 @@
 
     python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C]
 
-A job follows from its seed (campaign_jobs.py): program, machine, tolerance, period, method. Its plan is judged by the planner's
-verifier and by another judge that shares no code with the package (campaign_judge.py); every tenth job is planned once more,
-changed by a law (campaign_laws.py). Each job has C processor seconds in a child process, which is ended if they do not suffice.
+A job follows from its seed (campaign_jobs.py): program, machine, tolerance, period, method. Its plan (campaign_rows.py) is judged by
+the planner's verifier and by another judge that shares no code with the package (campaign_judge.py); every tenth job is planned once
+more, changed by a law (campaign_laws.py). Each job has C processor seconds in a child process, which is ended if they do not suffice.
 
-Every job is a row of results/campaign.jsonl at once, and counted in results/campaign.json at the end (campaign_tally.py), with a
-summary in campaign.md. Jobs that are in one of them are not planned again; --again plans what is not as it should be.
+Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (campaign_tally.py), with
+a summary in campaign.md, and removed. Jobs that are in one of them are not planned again; --again plans what is not as it should be. A
+change of the draws makes other jobs of the seeds: the campaign then begins anew.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ import json
 import multiprocessing
 import os
 import time
-import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -26,203 +26,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.campaign_course import Blocks, course
-from benchmarks.campaign_jobs import Job, job
-from benchmarks.campaign_judge import Motion, faults
-from benchmarks.campaign_laws import broken, changed
+from benchmarks.campaign_jobs import fingerprint, job
+from benchmarks.campaign_rows import Row, about, outcome
 from benchmarks.campaign_table import write_summary
-from benchmarks.campaign_tally import (
-    CRASH,
-    DOCUMENTED,
-    FAILED,
-    PASSED,
-    REFUSED,
-    TOO_LONG,
-    UNSOLVED,
-    Tally,
-    wrongs,
-)
+from benchmarks.campaign_tally import CRASH, TOO_LONG, Tally, wrongs
 from benchmarks.record import RESULTS, provenance
-from planner.base.errors import InputError
 from planner.base.threads import use_threads
-from planner.feedrate.solution import Status
-from planner.job.plan import Plan
-from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
-from planner.methods.registry import plan
-from planner.nc.program import Kind, Program
 
 KEPT, SUMMARY = RESULTS / "campaign.jsonl", RESULTS / "campaign.json"
 LIMIT = 10.0  # of a job, its law included [CPU s]
 WALL = 10.0  # times that, until a job is ended that takes no processor time
-LAW_EVERY = 10  # jobs
-NO_JERK_LIMIT = ("second-order",)
-Row = dict[str, Any]
-
-
-def outcome(seed: int) -> Row:
-    """The row of the job of a seed. Nothing that drawing and planning raise is raised here."""
-    began = time.process_time()
-    try:
-        row = row_of(job(seed))
-    except Exception as fault:
-        row = {"seed": seed} | _crash(fault)
-    return row | {"cpu": round(time.process_time() - began, 3)}
-
-
-def row_of(made: Job) -> Row:
-    """The row of a job. Nothing that planning raises is raised here."""
-    try:
-        return _about(made) | _planned(made)
-    except Exception as fault:
-        return _about(made) | _crash(fault)
-
-
-def _crash(fault: Exception) -> Row:
-    at = traceback.extract_tb(fault.__traceback__)[-1]
-    return {
-        "outcome": CRASH,
-        "said": f"{type(fault).__name__}: {fault} ({Path(at.filename).name}:{at.lineno})",
-    }
-
-
-def _about(made: Job) -> Row:
-    machine = made.machine
-    return {
-        "seed": made.seed,
-        "source": made.source,
-        "way": made.way,
-        "blocks": 0 if made.program is None else len(made.program),
-        "axes": "".join(machine.axes),
-        "dt": float(f"{machine.dt:.4g}"),
-        "tolerance": float(f"{made.tolerance or machine.tolerance:.4g}"),
-        "filters": 0 if machine.fir is None else len(machine.fir.time_constants),
-        "modes": len(machine.modes),
-    }
-
-
-def _planned(made: Job) -> Row:
-    if made.program is None:
-        return {"outcome": REFUSED, "said": made.refusal}
-    try:
-        found = plan(
-            made.program, made.machine, method=made.method, tolerance=made.tolerance, **made.settings
-        )
-    except InputError as fault:
-        return {"outcome": REFUSED, "said": str(fault)}
-    if found.trajectory is None or found.verdict is None:
-        return {"outcome": UNSOLVED, "status": found.status.name, "said": found.sentence}
-    second = second_verdict(found, made.tolerance)
-    row: Row = {
-        "outcome": PASSED if found.verdict.passed else FAILED,
-        "status": found.status.name,
-        "time": found.cycle_time,
-        "samples": len(found.trajectory),
-        "said": found.verdict.faults[0] if found.verdict.faults else "",
-        "second": second,
-    }
-    if not found.verdict.passed and (why := documented(made, found.verdict.faults)):
-        row |= {"outcome": DOCUMENTED, "why": why}
-    return row | (_law(made, found) if made.seed % LAW_EVERY == 0 and found.verdict.passed else {})
-
-
-def documented(made: Job, said: tuple[str, ...]) -> str:
-    """Why docs/methods.md says that a method's verdict fails with these faults; empty where it does not."""
-    if made.method.endswith("-plain"):
-        return "methods as their papers describe them"
-    assert made.program is not None
-    under_g61 = (
-        made.method in ("fir", "fir-spline")
-        or "shaped" in made.settings
-        or (made.method == "kinematic" and len(made.program.splines))
-    )
-    only = all(fault.startswith("exact path") for fault in said)
-    return "chords within the tolerance under G61" if under_g61 and only else ""
-
-
-def _law(made: Job, found: Plan) -> Row:
-    assert made.program is not None
-    rng = np.random.default_rng([43, made.seed])
-    other = changed(made.program, made.machine, made.tolerance, rng)
-    if other is None or (other.law == "split" and made.method == "stop"):  # which stops there
-        return {}
-    try:
-        after = plan(
-            other.program, other.machine, method=made.method, tolerance=other.tolerance, **made.settings
-        )
-    except InputError as fault:
-        return {"law": other.law, "law_said": f"refused: {fault}"}
-    if after.trajectory is None or after.verdict is None or not after.verdict.passed:
-        said = after.sentence if after.verdict is None else after.verdict.faults[0]
-        return {"law": other.law, "law_said": f"{after.status.name}: {said}"}
-    stops = 1 + int(np.isin(made.program.kind, (Kind.STOP, Kind.DWELL, Kind.RAPID)).sum())
-    slack = made.machine.dt * (
-        stops if found.status in (Status.OPTIMAL, Status.ACCEPTABLE) else len(made.program)
-    )
-    return {
-        "law": other.law,
-        "law_time": after.cycle_time,
-        "law_broken": broken(other, found.cycle_time, after.cycle_time, slack),
-        "law_second": second_verdict(after, other.tolerance),
-    }
-
-
-def second_verdict(found: Plan, tolerance: float | None = None) -> list[str]:
-    """What the second judge finds wrong with a plan's samples."""
-    assert found.trajectory is not None
-    axes = found.trajectory.axes
-    asked = course(blocks_of(found.program, found.machine, axes, tolerance))
-    return faults(motion_of(found), asked)
-
-
-def motion_of(found: Plan) -> Motion:
-    """The samples and limits of a plan, as arrays."""
-    trajectory, machine = found.trajectory, found.machine
-    assert trajectory is not None
-    axes = trajectory.axes
-    limits = np.array([machine.limits(name, axes) for name in ("velocity", "acceleration", "jerk")])
-    if found.method in NO_JERK_LIMIT:
-        limits[2] = np.inf
-    return Motion(
-        t=np.array(trajectory.t),
-        q=np.array(trajectory.position),
-        dt=machine.dt,
-        limits=limits,
-        linear=np.isin(axes, LINEAR_AXES),
-        normal_acceleration=machine.normal_acceleration or np.inf,
-        filters=machine.fir.time_constants if machine.fir is not None else (),
-    )
-
-
-def blocks_of(program: Program, machine: Machine, axes: tuple[str, ...], tolerance: float | None) -> Blocks:
-    """A program as arrays, for the axes of its motion."""
-    of = [program.axes.index(letter) for letter in axes]
-    rotary = np.isin(axes, ROTARY_AXES)
-    scale = np.where(rotary, machine.radius, 1.0)
-    allowed = np.where(np.isnan(program.tolerance), machine.tolerance, program.tolerance)
-    return Blocks(
-        kind=program.kind,
-        start=program.start[of] * scale,
-        end=program.end[:, of] * scale,
-        feed=program.feed,
-        dwell=program.dwell,
-        control=program.path_control,
-        tolerance=allowed if tolerance is None else np.full(len(program), tolerance),
-        arc_block=program.arc_block,
-        arc_center=program.arc_center,
-        arc_normal=program.arc_normal,
-        arc_sweep=program.arc_sweep,
-        spline_block=program.splines.block,
-        spline_points=program.splines.points[:, :, of] * scale,
-        spline_weights=program.splines.weights,
-        linear=np.isin(axes, LINEAR_AXES),
-        rotary=rotary,
-        radius=machine.radius,
-        feed_max=machine.feed_max or np.inf,
-        blend_rapids=machine.blend_rapids,
-    )
-
-
-# ---- processes ---------------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -272,10 +85,10 @@ class Worker:
         self.process.kill()
         self.process.join()
         try:
-            about = _about(job(self.seed))
+            row = about(job(self.seed))
         except Exception:  # what cannot be drawn is named by its seed
-            about = {"seed": self.seed}
-        return about | {"outcome": TOO_LONG, "said": f"more than {limit:g} CPU s", "cpu": limit}
+            row = {"seed": self.seed}
+        return row | {"outcome": TOO_LONG, "said": f"more than {limit:g} CPU s", "cpu": limit}
 
 
 def _serve(ends: Connection) -> None:
@@ -332,7 +145,13 @@ def main(argv: list[str] | None = None) -> int:
     if options.show is not None:
         print(json.dumps(job(options.show).data(), indent=1))
         return 0
+    draws = fingerprint()
     tally = Tally.read(SUMMARY) if options.file == KEPT else Tally()
+    if len(tally) and tally.draws != draws:
+        parser.error(
+            f"{SUMMARY.name} is of other draws of the seeds: move it and {KEPT.name} away to begin again"
+        )
+    tally.draws = draws
     tally.add(kept_rows(options.file).values())
     seeds = [seed for seed in range(options.seed, options.seed + options.count) if seed not in tally]
     if options.again is not None:
@@ -349,4 +168,5 @@ def main(argv: list[str] | None = None) -> int:
                 print(json.dumps(row), flush=True)
     if options.file == KEPT:
         write_summary(tally)
+        KEPT.unlink()  # counted: the next run would count it again
     return 0

@@ -13,6 +13,7 @@ in less time; dwells are cut.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import importlib
 import itertools
 import sys
@@ -44,6 +45,7 @@ DWELL_MAX = 0.05  # [s]
 DRAWS = 60  # of a program until one has few blocks and moves; the least one counts where none has
 VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
+FIRST_SEEDS = 20  # by whose jobs the draws are known again
 PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
 QUICK: dict[str, Any] = {"effort": "quick"}
 # Methods with their settings, and how often each is drawn.
@@ -118,6 +120,14 @@ class Job:
             "machine": machine,
             "text": self.text.splitlines(),
         }
+
+
+def fingerprint() -> str:
+    """A word for what seeds draw: another one where the first of them draw other jobs."""
+    drawn = [
+        (made.text, repr(made.machine), made.way, made.tolerance) for made in map(job, range(FIRST_SEEDS))
+    ]
+    return hashlib.sha256(repr(drawn).encode()).hexdigest()[:12]
 
 
 def job_from(data: dict[str, Any]) -> Job:

@@ -15,8 +15,9 @@ def write_summary(tally: Tally) -> None:
     if not len(tally):
         return
     cpu = tally.seconds_of_all()
+    commits = tally.commits + Counter(row.get("commit", "?") for row in tally.wrong.values())
     text = (
-        f"{len(tally)} jobs, made at {', '.join(tally.commits)}; {cpu:.0f} CPU s, {cpu / len(tally):.2f} s in the mean; half of the "
+        f"{len(tally)} jobs, made at {', '.join(commits)}; {cpu:.0f} CPU s, {cpu / len(tally):.2f} s in the mean; half of the "
         f"jobs within {tally.seconds(0.5):.2f} s, 99 % within {tally.seconds(0.99):.1f} s.\n\n"
     )
     for number, name in enumerate(("source", "way")):

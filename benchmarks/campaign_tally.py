@@ -9,7 +9,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,8 +52,12 @@ class Tally:
     cpu      : how many took so many processor seconds, by the number of their bin
     cpu_sum  : of all of `right` [s]
     commits  : at which they were planned
-    seeds    : of `right`
+    seeds    : of `right`, by outcome
     wrong    : rows that are not as they should be, by seed
+    draws    : names what is drawn from seeds (`campaign_jobs.fingerprint`)
+
+    A job that is planned again counts as it came out the last time; its processor seconds, law and commit stay those of before where
+    it was right before.
     """
 
     right: Counter[tuple[str, str, str]] = field(default_factory=Counter)
@@ -62,27 +66,32 @@ class Tally:
     cpu: Counter[int] = field(default_factory=Counter)
     cpu_sum: float = 0.0
     commits: Counter[str] = field(default_factory=Counter)
-    seeds: set[int] = field(default_factory=set)
+    seeds: dict[str, set[int]] = field(default_factory=dict)
     wrong: dict[int, Row] = field(default_factory=dict)
+    draws: str = ""
 
     def __contains__(self, seed: object) -> bool:
-        return seed in self.seeds or seed in self.wrong
+        return seed in self.wrong or any(seed in some for some in self.seeds.values())
 
     def __len__(self) -> int:
-        return len(self.seeds) + len(self.wrong)
+        return sum(map(len, self.seeds.values())) + len(self.wrong)
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Count rows; those of seeds that are right already are not looked at, those that were wrong are replaced."""
+        """Count rows; the last one of a seed counts."""
         for row in rows:
-            seed = row["seed"]
-            if seed in self.seeds:
-                continue
+            seed, job = row["seed"], (row.get("source", "?"), row.get("way", "?"))
+            before = next((outcome for outcome, some in self.seeds.items() if seed in some), None)
+            if before is not None:
+                self.seeds[before].remove(seed)
+                self.right[*job, before] -= 1
             self.wrong.pop(seed, None)
             if wrongs(row):
                 self.wrong[seed] = {key: row[key] for key in KEPT_OF_A_ROW if row.get(key) or key == "seed"}
                 continue
-            self.seeds.add(seed)
-            self.right[row.get("source", "?"), row.get("way", "?"), row["outcome"]] += 1
+            self.seeds.setdefault(row["outcome"], set()).add(seed)
+            self.right[*job, row["outcome"]] += 1
+            if before is not None:
+                continue
             self.commits[row.get("commit", "?")] += 1
             self.cpu[_bin(row.get("cpu", 0.0))] += 1
             self.cpu_sum += row.get("cpu", 0.0)
@@ -108,10 +117,11 @@ class Tally:
     def data(self) -> dict[str, Any]:
         """As JSON has it."""
         return {
+            "draws": self.draws,
             "jobs": len(self),
             "outcomes": dict(self.outcomes()),
-            "seeds": list(_ranges(self.seeds)),
-            "right": [[*key, count] for key, count in sorted(self.right.items())],
+            "seeds": {outcome: _ranges(some) for outcome, some in sorted(self.seeds.items()) if some},
+            "right": [[*key, count] for key, count in sorted(self.right.items()) if count],
             "laws": dict(self.laws),
             "said": dict(self.said.most_common()),
             "cpu": {str(number): self.cpu[number] for number in sorted(self.cpu)},
@@ -125,7 +135,7 @@ class Tally:
         found = Counter(row["outcome"] for row in self.wrong.values())
         for (_, _, outcome), count in self.right.items():
             found[outcome] += count
-        return found
+        return +found
 
     @classmethod
     def read(cls, file: Path) -> Tally:
@@ -140,8 +150,9 @@ class Tally:
             cpu=Counter({int(number): count for number, count in data["cpu"].items()}),
             cpu_sum=data["cpu_sum"],
             commits=Counter(data["commits"]),
-            seeds={seed for first, last in data["seeds"] for seed in range(first, last + 1)},
+            seeds={outcome: _numbers(runs) for outcome, runs in data["seeds"].items()},
             wrong={row["seed"]: row for row in data["wrong"]},
+            draws=data["draws"],
         )
 
 
@@ -153,14 +164,15 @@ def _without_numbers(said: str) -> str:
     return re.sub(r"-?\d+(\.\d+)?(e[-+]?\d+)?", "N", said.replace("|", "/"))[:SENTENCE]
 
 
-def _ranges(seeds: set[int]) -> Iterator[tuple[int, int]]:
-    """First and last of each run of numbers."""
-    first = last = None
-    for seed in sorted(seeds):
-        if last is None or seed > last + 1:
-            if first is not None and last is not None:
-                yield first, last
-            first = seed
-        last = seed
-    if first is not None and last is not None:
-        yield first, last
+def _ranges(seeds: set[int]) -> str:
+    """Numbers as runs: "0-17 19 21-40"."""
+    ordered = sorted(seeds)
+    first = [k for k in range(len(ordered)) if k == 0 or ordered[k] > ordered[k - 1] + 1]
+    runs = zip(first, [*(k - 1 for k in first[1:]), len(ordered) - 1], strict=True)
+    return " ".join(f"{ordered[a]}-{ordered[b]}" if b > a else f"{ordered[a]}" for a, b in runs)
+
+
+def _numbers(runs: str) -> set[int]:
+    """The numbers of `_ranges`."""
+    ends = [run.split("-") for run in runs.split()]
+    return {seed for own in ends for seed in range(int(own[0]), int(own[-1]) + 1)}

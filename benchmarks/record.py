@@ -17,21 +17,23 @@ PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "copp-py")
 
 
 def provenance() -> dict[str, Any]:
-    """Command, commit, versions and machine of this run."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        cwd=Path(__file__).parent,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    """Command, commit, versions and machine of this run; the commit with "+" where Python files have further changes."""
+    changed = _git("status", "--porcelain", "--", ":/*.py")
     return {
         "command": "python -m " + " ".join([_module(), *sys.argv[1:]]),
-        "commit": commit.stdout.strip(),
+        "commit": _git("rev-parse", "--short", "HEAD") + ("+" if changed else ""),
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES},
         "machine": f"{platform.machine()}, {os.cpu_count()} processors",
     }
+
+
+def _git(*words: str) -> str:
+    """What git says, "" where it says nothing."""
+    done = subprocess.run(
+        ["git", *words], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
+    )
+    return done.stdout.strip()
 
 
 def write_results(name: str, data: dict[str, Any], table: str) -> None:

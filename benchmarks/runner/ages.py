@@ -20,7 +20,7 @@ BEGIN, END = "<!-- ages: written by `python -m benchmarks report` -->", "<!-- en
 README_LIMIT = 300  # commits that changed the planner: about a week of this project's work
 STALE = 200  # of the same, from which a result of docs/ is listed
 _MADE = re.compile(
-    r"Made by (?P<by>.+?) at (?:commit )?(?P<commit>[0-9a-f]{7,40}),?(?: written)? on (?P<date>\d{4}-\d\d-\d\d)"
+    r"Made by (?P<by>.+?) at (?:commit )?(?P<commit>[0-9a-f]{7,40})\+?,?(?: written)? on (?P<date>\d{4}-\d\d-\d\d)"
 )
 _QUOTED = re.compile(r"\b([A-Za-z0-9_-]+\.md)\b")
 

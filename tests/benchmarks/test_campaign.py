@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.campaign import SUMMARY, blocks_of, kept_rows, motion_of, outcome, row_of, rows_of
+from benchmarks.campaign import SUMMARY, kept_rows, rows_of
 from benchmarks.campaign_course import course
 from benchmarks.campaign_jobs import job, job_from
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
 from benchmarks.campaign_laws import ALLOWED, mirrored, reversed_program, scaled, scaled_machine, split
+from benchmarks.campaign_rows import blocks_of, motion_of, outcome, row_of
 from benchmarks.campaign_tally import LEAST, Tally, wrongs
 from planner.job.plan import Plan
 from planner.machine import Axis, Machine
@@ -254,10 +255,22 @@ def test_a_tally_counts_what_is_right_keeps_what_is_not_and_is_read_as_it_was(tm
     file = tmp_path / "campaign.json"
     file.write_text(json.dumps(tally.data()), encoding="utf-8")
     assert Tally.read(file) == tally
-    tally.add([dict(ROWS[2], outcome="passed", said=""), dict(ROWS[0], outcome="crash")])
+    tally.add([dict(ROWS[2], outcome="passed", said="")])
     assert list(tally.wrong) == [4]
     assert tally.outcomes() == {"passed": 3, "refused": 1}
-    assert tally.data()["seeds"] == [(0, 2)]
+    assert tally.data()["seeds"] == {"passed": "0 2", "refused": "1"}
+    tally.add(dict(ROWS[0], seed=seed) for seed in (11, 12, 13))
+    assert tally.data()["seeds"]["passed"] == "0 2 11-13"
+    file.write_text(json.dumps(tally.data()), encoding="utf-8")
+    assert Tally.read(file).seeds == tally.seeds
+
+
+def test_what_is_wrong_when_it_is_planned_again_counts_as_wrong() -> None:
+    tally = Tally()
+    tally.add([*ROWS, dict(ROWS[0], outcome="crash"), dict(ROWS[1], outcome="passed")])
+    assert sorted(tally.wrong) == [0, 2, 4]
+    assert len(tally) == len(ROWS)
+    assert tally.outcomes() == {"crash": 1, "too long": 1, "passed": 2}
 
 
 def test_the_same_number_makes_the_same_job() -> None:

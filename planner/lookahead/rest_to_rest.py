@@ -12,7 +12,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
 GOLDEN = float((np.sqrt(5.0) - 1.0) / 2.0)
-GOLDEN_STEPS = 26  # which leave 4e-6 of the range of log v, and no more of the time
+GOLDEN_STEPS = 26  # which leave 4e-6 of the range of log v
 AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
 
 
@@ -24,7 +24,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
     (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve
     kappa changes, and a bound of |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
-    takes least time from rest to rest: no limit that gets larger makes it longer.
+    takes least time from rest to rest: none of these limits makes it longer when it gets larger.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
@@ -61,7 +61,8 @@ def _fastest(
     length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray, product: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """v and a (n,) of the shortest moves from rest to rest with v a <= product, below the given v and a; by golden sections of log v,
-    from the v that leaves a as it is to the one that is given."""
+    from the v that leaves a as it is to the one that is given. Where v is reached, a move takes L/v + v^2/P + P/(v j) with P the
+    product: a sum of exponentials of log v, which is convex. Where it is not, it takes the longer the lower a is, and so the higher v."""
     low, high = np.log(product / a), np.log(v)
 
     def time(at: FloatArray) -> FloatArray:

@@ -88,7 +88,7 @@ class BezierMethod(Method):
             corner=self.corner.name,
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=f"{len(rounded)} corners are run through, {len(stops)} are faster as full stops",
+            sentence=f"{len(corner_apexes(samples))} corners are run through, {len(stops)} are faster as full stops",
             grid_points=len(samples),
             tables=Tables(rounded=rounded),
         )

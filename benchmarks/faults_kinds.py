@@ -232,8 +232,8 @@ def changing_input(bench: Bench, rng: random.Random) -> dict[str, Any]:
 
 
 def children(pid: int) -> list[int]:
-    """The processes that a process has started, and those that these have; without joblib's resource tracker, which plans nothing: where
-    it is killed another one begins, and complains of names that only the first one knew."""
+    """The processes that a process has started, and those that these have; without joblib's resource tracker, which plans nothing:
+    where it is killed another one begins, and complains of names that only the first one knew."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:

@@ -12,8 +12,9 @@ tolerance; p does not. It follows that:
 * Where D exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the times of all copies, and
   is solved again. What remains after `ROUNDS` is removed by slowing down runs of p.
 
-Of the `CANDIDATES` the fastest D is delivered. There always is one: with the limits as they are, stops at all corners and rests of the
-whole length, every limit and the tolerance are kept.
+Of the `CANDIDATES` the fastest D is delivered, or the one with the limits as they are, stops at all corners and rests of the whole
+length, which along straight blocks keeps every limit and the tolerance. Its least time is known beforehand; it is planned when another
+one takes longer than that, and no candidate is pursued that takes longer than what is there.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.constraints.normal_limit import slowest
-from planner.delivery.filters import Behind
+from planner.delivery.filters import WIDER, Behind
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
@@ -251,6 +252,9 @@ class _Settling:
             for delay in self.shaper.delay:
                 np.maximum.at(factor, self._piece(motion, chunk.t[over] - delay), worst[over])
         t, ratio, _, near, near_time = self.behind.errors(delivered, self.filters)
+        ratio = np.minimum(
+            ratio, WIDER
+        )  # more is the distance from a piece that D is not on: the match was lost before
         room = 1.0 - SPARE_ERROR - self.bow / self.job.toolpath.tolerance.min()
         missed = near > room
         t, ratio = np.append(t, near_time[missed]), np.append(ratio, near[missed])

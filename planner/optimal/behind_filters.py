@@ -23,7 +23,7 @@ from planner.job.job import Job
 from planner.motion.timing import Motion
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
-from planner.optimal.tighten import slowed_now, within_limits
+from planner.optimal.tighten import within_limits
 
 ROUNDS = 10  # at most; pentagon and zig-zag behind 20/13 and 50/30 ms take 1 to 7
 # The feed is limited this far on both sides of a place [tolerances]. Pentagon at 20/13 and 50/30 ms with 0.3, 1, 2, 4: 1.030, 1.033,
@@ -85,12 +85,9 @@ def within_filters(
         slower = solve_again(planned, limited, order.solver)
         if not slower.solution.solved:
             break
-        planned = slower
-        motion, tighter = slowed_now(planned, order, job.toolpath, job.machine)
-        plain = dataclasses.replace(plain, limit_scale=tighter.limit_scale)
+        planned, motion = within_limits(slower, order, job.toolpath, job.machine)
     if best is not None and best[0] is planned:
         return best
-    planned, motion = within_limits(planned, order, job.toolpath, job.machine)
     if best is None and useless(motion.end):
         return planned, motion
     last = planned, kept(motion, toolpath, machine)

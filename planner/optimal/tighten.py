@@ -208,19 +208,6 @@ def within_limits(
     return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
 
 
-def slowed_now(
-    planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine
-) -> tuple[Motion, FeedrateProblem]:
-    """A motion that keeps all limits, slowed down where it exceeds them between grid points, and the problem with limits that are
-    tighter there, for whoever solves another one next."""
-    motion = planned.motion()
-    if not order.jerk_limited:
-        return motion, planned.problem
-    factor = excess(motion, toolpath, machine)
-    tighter = tightened(planned.problem, np.where(factor > 1.0 + TIGHTENED_EXCESS, factor, 1.0))
-    return slowed(motion, toolpath, machine, factor), tighter
-
-
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
     """The same motion with every run slowed down by its `excess` (L,), and by a little more; the motion itself where none needs it.
 

@@ -48,6 +48,7 @@ class Job:
     stages    : the clock
     noted     : what the method has noted so far (`note`)
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
+    most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
     motion_of : the motions of the trajectories delivered so far, as long as the trajectories exist
     """
 
@@ -57,6 +58,7 @@ class Job:
     stages: Stages
     noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
+    most: float = np.inf
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
 
     @property

@@ -85,7 +85,7 @@ class Method(ABC):
         if job.machine.fir is None or not best.solved:
             return best
         for share, seen in self.ways:
-            made = self.plan_within_periods(job.with_share(share, seen))
+            made = self.plan_within_periods(_faster_than(best, job.with_share(share, seen)))
             before, best = best, faster(best, made)
             job.tell(
                 "share of tolerance",
@@ -108,17 +108,15 @@ class Method(ABC):
         cuts out of step with the spindle is not delivered: it is no thread."""
         return True
 
-    def plan_within_periods(self, job: Job, within: float = np.inf) -> Plan:
-        """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py).
-
-        within : a motion that takes longer than this is not planned again: with less tolerance it would hardly be faster [s]
-        """
+    def plan_within_periods(self, job: Job) -> Plan:
+        """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py). A motion that takes longer
+        than `job.most` is not planned again: with less tolerance it would hardly be faster."""
         made = self.plan_job(job)
         given, planned, (machine, programmed) = job, job.toolpath, job.real
         for again in range(1, PERIOD_ROUNDS + 1):
             if not self.keeps_tolerance or made.trajectory is None or _inside(made):
                 break
-            if made.cycle_time > within:
+            if made.cycle_time > job.most:
                 break
             with job.stage("geometry"):
                 near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
@@ -144,7 +142,7 @@ class Method(ABC):
         elif not fault:
             return made
         for other in self.instead if made.grid_points <= INSTEAD_POINTS else ():
-            rival = other.plan_within_periods(given.afresh(), _time(made))
+            rival = other.plan_within_periods(_faster_than(made, given.afresh()))
             wins = faster(made, rival) is rival
             job.tell(
                 "another method",
@@ -179,6 +177,12 @@ def faster(plan: Plan, other: Plan) -> Plan:
     if plan.verdict.passed != other.verdict.passed:
         return plan if plan.verdict.passed else other
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _faster_than(plan: Plan, job: Job) -> Job:
+    """The job, of which only motions are asked for that take less time than the plan, if that passes."""
+    passed = plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
+    return dataclasses.replace(job, most=min(job.most, plan.cycle_time)) if passed else job
 
 
 def _out_of_step(plan: Plan) -> str:

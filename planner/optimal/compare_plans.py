@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from functools import cached_property
 
 from planner.corners.smooth import round_corners
 from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.job.trace import Tell
+from planner.methods.stop import StopMethod
 from planner.optimal.compare_corners import corner_bounds
 from planner.optimal.geometry import corner_shape
 from planner.optimal.order import Order
@@ -42,9 +44,24 @@ SAME_MOTION = 2e-3
 FASTER = 1e-4  # less is the same time [-]: the solver's own gap
 
 
+class Stopped:
+    """The plan with full stops at all blocks, made when it is asked for; the least that it takes is known before."""
+
+    def __init__(self, job: Job):
+        self._job = job
+
+    @cached_property
+    def plan(self) -> Plan:
+        return StopMethod().plan_job(self._job.afresh())
+
+    def sooner_than(self, time: float) -> bool:
+        """Whether it takes less time [s]."""
+        return self._job.stop_time < time and counted_time(self.plan) < time
+
+
 def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
     """Corner shapes on which a motion may be faster than the plan."""
-    dwell = float(job.toolpath.dwell.sum())
+    dwell, most = float(job.toolpath.dwell.sum()), min(counted_time(best), job.most)
     for name in SHAPES:
         with job.stage("geometry"):
             shape = corner_shape(name, job.machine, job.toolpath)
@@ -54,10 +71,10 @@ def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
         job.tell(
             "bound on corners", found=bounds.time.sum() + dwell, corner=name, points=int(bounds.points.sum())
         )
-        if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= counted_time(best):
+        if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= most:
             continue
         coarse = order.solve(path, job, COARSER * RESOLUTION).solution
-        if coarse.solved and coarse.cycle_time + dwell < CHANCE * counted_time(best):
+        if coarse.solved and coarse.cycle_time + dwell < CHANCE * most:
             yield name
 
 

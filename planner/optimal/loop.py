@@ -57,11 +57,10 @@ from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
 from planner.job.records import Tables
 from planner.methods.kinematic import KinematicMethod
-from planner.methods.stop import StopMethod
 from planner.motion.timing import Motion, MotionInTime
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
-from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, better, chances, counted_time
+from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, Stopped, better, chances, counted_time
 from planner.optimal.effort import COARSE, EFFORTS, Effort, Grids
 from planner.optimal.geometry import corner_shape, lost_joints, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
@@ -114,21 +113,22 @@ class Settings:
 def fastest_plan(job: Job, settings: Settings) -> Plan:
     """The plan on a smooth path; with "auto" another plan if that takes less time or passes while the smooth one fails. The sentence of
     the plan says which."""
-    smooth = best = plan_on_path(job, settings)
     if settings.corner != AUTO or not settings.order.jerk_limited:
-        return smooth
-    if job.stop_time < counted_time(best):
-        stopped = StopMethod().plan_job(job.afresh())
-        best = better(best, stopped, "full stops at all blocks take less time", job.tell)
+        return plan_on_path(job, settings)
+    stopped = Stopped(job)
+    smooth = best = plan_on_path(job, settings, stopped)
+    if stopped.sooner_than(min(counted_time(best), job.most)):
+        best = better(best, stopped.plan, "full stops at all blocks take less time", job.tell)
     if smooth.grid_points <= RIVAL_POINTS:
         for name in chances(best, job, settings.order):
+            rival = dataclasses.replace(job.afresh(), most=min(counted_time(best), job.most))
             if name == "kinematic":
-                kinematic = KinematicMethod().plan_job(job.afresh())
+                kinematic = KinematicMethod().plan_job(rival)
                 best = better(best, kinematic, "method kinematic takes less time", job.tell)
             else:
-                cornered = plan_on_path(job.afresh(), dataclasses.replace(settings, corner=name))
+                cornered = plan_on_path(rival, dataclasses.replace(settings, corner=name))
                 best = better(best, cornered, f"{name} corners take less time", job.tell)
-    if counted_time(best) == np.inf:
+    if min(counted_time(best), job.most) == np.inf:
         kinematic = KinematicMethod().plan_job(job.afresh())
         best = better(best, kinematic, "method kinematic keeps all limits in less time", job.tell)
     if best is smooth:
@@ -139,24 +139,34 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
     return best
 
 
-def plan_on_path(job: Job, settings: Settings) -> Plan:
-    """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered."""
+def plan_on_path(job: Job, settings: Settings, stopped: Stopped | None = None) -> Plan:
+    """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered; without a trajectory
+    if it takes longer than `job.most`, or than full stops at all blocks."""
+
+    def useless(time: float) -> bool:
+        return time > job.most or (stopped is not None and stopped.sooner_than(time / (1.0 + SAME_MOTION)))
+
     try:
-        return _plan_of(job, settings, [time_optimal(job, settings)])
+        return _plan_of(job, settings, [time_optimal(job, settings)], useless)
     except NotSolvedError as fault:  # no grid follows the path
         return job.plan(
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
         )  # fmt: skip
 
 
-def _plan_of(job: Job, settings: Settings, found: list[OnPath]) -> Plan:
-    """The plan of the one motion found, with its limits kept at grid points; the list is emptied, to let go of it."""
+def _plan_of(job: Job, settings: Settings, found: list[OnPath], useless: Callable[[float], bool]) -> Plan:
+    """The plan of the one motion found, with its limits kept at grid points; the list is emptied, to let go of it.
+
+    useless : whether a motion that takes so long [s] need not be delivered
+    """
     made = prices = pricing = None
     if found[0].solution.solved:
         with job.stage("solve"):  # a third of a kilobyte a point is let go of
             best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
-            best, motion = within_filters(best, motion, settings.order, job)
+            best, motion = within_filters(best, motion, settings.order, job, useless)
+        if useless(motion.end):
+            return plan_of_solution(job, best, None, method=settings.method, corner=settings.corner)
         not_limited = () if settings.order.jerk_limited else ("jerk",)
         if settings.order.jerk_limited:
             pricing = pricing_of(best, job.machine)

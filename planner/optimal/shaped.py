@@ -12,21 +12,24 @@ tolerance; p does not. It follows that:
 * Where D exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the times of all copies, and
   is solved again. What remains after `ROUNDS` is removed by slowing down runs of p.
 
-Of the `CANDIDATES` the fastest D is delivered. There always is one: with the limits as they are, stops at all corners and rests of the
-whole length, every limit and the tolerance are kept.
+Of the `CANDIDATES` the fastest D is delivered, or the one with the limits as they are, stops at all corners and rests of the whole
+length, which along straight blocks keeps every limit and the tolerance. Its least time is known beforehand; it is planned when another
+one takes longer than that, and no candidate is pursued that takes longer than what is there.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.constraints.normal_limit import slowest
-from planner.delivery.filters import Behind
+from planner.delivery.filters import WIDER, Behind
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
@@ -76,44 +79,81 @@ class Shaped:
 def shaped(
     job: Job, settings: Settings, candidates: tuple[tuple[float, float], ...] = CANDIDATES
 ) -> Shaped | None:
-    """The fastest shaped motion of the candidates, which are time-optimal with larger limits, a smaller tolerance and more stops; None
-    if none of their problems has a solution."""
-    shaper = shaper_of(job.machine.modes)
-    best: Shaped | None = None
+    """The fastest shaped motion of the candidates, which are time-optimal with larger limits, a smaller tolerance and more stops, or
+    the one with stops at all corners where that is faster; None if none of them takes less than `job.most`."""
+    search = _Search(job, settings)
     seen: set[tuple[int, float]] = set()
     for sharp, more in candidates:
         toolpath = _stopping(job.toolpath, sharp)
         stops = int((toolpath.joint == Joint.STOP).sum())
-        if (stops, more) in seen:
-            continue  # no corner between the angles
+        if (stops, more) not in seen:  # a corner is between the angles
+            search.best = search.tried(job, toolpath, more, search.useless) or search.best
         seen.add((stops, more))
+    return search.fastest()
+
+
+class _Search:
+    """The fastest of the candidates so far, and the one with stops at all corners, made when it is asked for."""
+
+    def __init__(self, job: Job, settings: Settings):
+        self.job, self.settings, self.shaper = job, settings, shaper_of(job.machine.modes)
+        self.best: Shaped | None = None
+        self._stopping = dataclasses.replace(job, toolpath=_stopping(job.toolpath, 0.0, 1.0))
+        stops = int((self._stopping.toolpath.joint[1:] == Joint.STOP).sum())
+        self._least = job.stop_time + self.shaper.length * stops
+
+    @cached_property
+    def _stopped(self) -> Shaped | None:
+        return self.tried(
+            self._stopping, _stopping(self.job.toolpath, 0.0), 1.0, lambda time: time >= self.job.most
+        )
+
+    def _stopped_before(self, time: float) -> bool:
+        """Whether the motion with stops at all corners takes less time [s]; it is not made where it cannot."""
+        return self._least < time and self._stopped is not None and self._stopped.delivered.end < time
+
+    def useless(self, time: float) -> bool:
+        """Whether a motion that takes so long [s] is no faster than what is there."""
+        most = self.best.delivered.end if self.best else np.inf
+        return time >= min(most, self.job.most) or self._stopped_before(time)
+
+    def fastest(self) -> Shaped | None:
+        """The best of the candidates, or the motion with stops at all corners if it is faster."""
+        return (
+            self._stopped
+            if self._stopped_before(self.best.delivered.end if self.best else np.inf)
+            else self.best
+        )
+
+    def tried(
+        self, job: Job, toolpath: Toolpath, more: float, useless: Callable[[float], bool]
+    ) -> Shaped | None:
+        """The shaped motion of a job on a path with stops, planned with `more` times the accelerations; None if it is useless."""
         candidate = dataclasses.replace(job, machine=_faster(job.machine, more), toolpath=toolpath)
-        planned = time_optimal(candidate, settings)
+        planned = time_optimal(candidate, self.settings)
         if not planned.solution.solved:
-            continue
-        made = _Settling(job, shaper, settings).settled(planned, best.delivered.end if best else np.inf)
+            return None
+        made = _Settling(job, self.shaper, self.settings).settled(planned, useless)
+        stops = int((toolpath.joint == Joint.STOP).sum())
         job.tell(
             "shaped",
             found=made[2].end if made else np.nan,
-            before=best.delivered.end if best else np.inf,
+            before=self.best.delivered.end if self.best else np.inf,
             kept=made is not None,
             stops=stops,
             limits=more,
         )
-        if made is None:
-            continue
         said = (
-            f"shaped for {len(job.machine.modes)} vibration modes, {1e3 * shaper.length:.4g} ms longer than what was planned with "
+            f"shaped for {len(job.machine.modes)} vibration modes, {1e3 * self.shaper.length:.4g} ms longer than what was planned with "
             f"{more:g} times the accelerations and {stops - 2} stops"
         )
-        best = Shaped(planned=made[0], motion=made[1], delivered=made[2], sentence=said)
-    return best
+        return Shaped(planned=made[0], motion=made[1], delivered=made[2], sentence=said) if made else None
 
 
-def _stopping(toolpath: Toolpath, sharp: float) -> Toolpath:
+def _stopping(toolpath: Toolpath, sharp: float, share: float = OF_PATH) -> Toolpath:
     """The path with a share of its tolerance, and stops at sharp corners."""
     stop = np.flatnonzero(toolpath.theta > sharp)
-    return dataclasses.replace(toolpath.with_joints(stop, Joint.STOP), tolerance=OF_PATH * toolpath.tolerance)
+    return dataclasses.replace(toolpath.with_joints(stop, Joint.STOP), tolerance=share * toolpath.tolerance)
 
 
 def _faster(machine: Machine, by: float) -> Machine:
@@ -145,15 +185,23 @@ class _Settling:
         self.feed = np.full(int(job.toolpath.block[-1]) + 1, np.inf)
         self.feed[job.toolpath.block] = job.toolpath.feed
 
-    def settled(self, planned: OnPath, most: float) -> tuple[OnPath, Motion, ShapedMotion] | None:
-        """The fastest D found on the path of `planned`, with the p that it is made of; None if it takes `most` [s] or longer."""
+    def settled(
+        self, planned: OnPath, useless: Callable[[float], bool]
+    ) -> tuple[OnPath, Motion, ShapedMotion] | None:
+        """The fastest D found on the path of `planned`, with the p that it is made of; None if none is of use.
+
+        useless : whether a D that takes so long [s] is no faster than what is there
+        """
         best: tuple[OnPath, Motion, ShapedMotion] | None = None
+
+        def late(time: float) -> bool:
+            return (best is not None and time >= best[2].end) or useless(time)
+
         for _ in range(ROUNDS):
-            if planned.solution.cycle_time + self.shaper.length >= most:
+            if late(planned.solution.cycle_time + self.shaper.length):
                 break  # gentler problems take longer
-            motion, delivered, factor = self._kept(planned)
-            if motion is not None and delivered.end < most:
-                best, most = (planned, motion, delivered), delivered.end
+            made, factor = self._kept(planned, late)
+            best = made or best
             if factor.max() <= 1.0 + EXCESS:
                 break
             planned = solve_again(planned, tightened(planned.problem, factor), self.order.solver)
@@ -161,24 +209,28 @@ class _Settling:
                 break
         return best
 
-    def _kept(self, planned: OnPath) -> tuple[Motion | None, ShapedMotion, FloatArray]:
-        """p with rests, slowed down until D keeps everything, None if it never does; D; and what p as planned exceeds (P,)."""
+    def _kept(
+        self, planned: OnPath, late: Callable[[float], bool]
+    ) -> tuple[tuple[OnPath, Motion, ShapedMotion] | None, FloatArray]:
+        """`planned`, its p with rests, slowed down until D keeps everything, and D; None if it never does, or not before it is late;
+        and what p as planned exceeds (P,)."""
         plain = planned.motion()
         runs = runs_of(plain)
         slower, first = np.ones(len(runs)), np.ones(len(planned.problem))
-        delivered = ShapedMotion(plain, self.shaper)
         for n in range(ROUNDS):
             motion = slower_runs(plain, runs, slower)
             motion = standing_longer(motion, runs_of(motion), self._rests(motion, planned))
             delivered = ShapedMotion(motion, self.shaper)
+            if n and late(delivered.end):
+                break
             factor = self._factor(motion, delivered)
             if n == 0:
                 first = factor
             if factor.max() <= 1.0 + EXCESS:
-                return motion, delivered, first
+                return None if late(delivered.end) else (planned, motion, delivered), first
             worst = np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(len(runs))))
             slower = slower * np.where(worst > 1.0 + EXCESS, worst * (1.0 + SPARE), 1.0)
-        return None, delivered, first
+        return None, first
 
     def _factor(self, motion: Motion, delivered: ShapedMotion) -> FloatArray:
         """(L,) by what factor p has to be slower on each piece of its law for D to keep everything."""
@@ -200,6 +252,9 @@ class _Settling:
             for delay in self.shaper.delay:
                 np.maximum.at(factor, self._piece(motion, chunk.t[over] - delay), worst[over])
         t, ratio, _, near, near_time = self.behind.errors(delivered, self.filters)
+        ratio = np.minimum(
+            ratio, WIDER
+        )  # more is the distance from a piece that D is not on: the match was lost before
         room = 1.0 - SPARE_ERROR - self.bow / self.job.toolpath.tolerance.min()
         missed = near > room
         t, ratio = np.append(t, near_time[missed]), np.append(ratio, near[missed])
@@ -225,17 +280,21 @@ class _Settling:
         joint = samples.path.legs.first[samples.stop][1:-1]
         end, begin = runs.end[:-1], runs.begin[1:]
         budget = toolpath.tolerance[joint] * (1.0 - SPARE_ERROR) - self.bow
-        delay = self.shaper.delay
         at = np.linspace(0.0, self.shaper.length, STEPS + 1)
         into = self._seen(motion, end[:, None] - at) - toolpath.start[joint][:, None]
         out = self._seen(motion, begin[:, None] + at) - toolpath.start[joint][:, None]
-        low, high = np.zeros(len(end)), np.full(len(end), self.shaper.length)
-        high = np.where(_miss(into, out, low, self.shaper) <= budget, 0.0, high)
-        for _ in range(HALVINGS):
+        delay = self.shaper.length
+        rest[:-1] = delay
+        free = np.flatnonzero(toolpath.joint[joint] != Joint.STOP)
+        near = _miss(into[free], out[free], np.zeros(len(free)), self.shaper) <= budget[free]
+        rest[free[near]] = 0.0
+        free = free[~near]
+        low, high = np.zeros(len(free)), np.full(len(free), delay)
+        for _ in range(HALVINGS if len(free) else 0):
             middle = (low + high) / 2.0
-            enough = _miss(into, out, middle, self.shaper) <= budget
+            enough = _miss(into[free], out[free], middle, self.shaper) <= budget[free]
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        rest[:-1] = np.where(toolpath.joint[joint] == Joint.STOP, delay[-1], high)
+        rest[free] = high
         return rest
 
     def _seen(self, motion: Motion, times: FloatArray) -> FloatArray:

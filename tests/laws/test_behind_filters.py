@@ -138,7 +138,7 @@ def test_a_shorter_filter_costs_less():
 @pytest.mark.parametrize("method", ["stop", "optimal"])
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
-    monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, order, job: (planned, motion))
+    monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, *rest: (planned, motion))
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed
     assert all("after the filters" in fault for fault in made.verdict.faults)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 from quick import slow_but
 
@@ -43,12 +44,13 @@ def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):
 
     class Asked:
         stop_time = 1.01 * plan.trajectory.cycle_time
+        most = np.inf
 
     settings = loop.Settings(method="optimal", corner="auto", order=ThirdOrder(JerkLimited()))
-    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings: plan)
+    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings, stopped: plan)
     monkeypatch.setattr(loop, "chances", lambda best, job, order: iter(()))
     assert loop.fastest_plan(Asked(), settings) is plan
     large = dataclasses.replace(plan, grid_points=loop.RIVAL_POINTS + 1)
-    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings: large)
+    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings, stopped: large)
     monkeypatch.setattr(loop, "chances", None)
     assert loop.fastest_plan(Asked(), settings) is large

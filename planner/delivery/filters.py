@@ -72,11 +72,28 @@ class Violations:
         return room / (self.ratio - (1.0 - SPARE) + room)
 
 
-class _Measured(NamedTuple):
-    """Whether a motion leaves the tolerance, and what `Behind.errors` returns of it."""
+class Errors(NamedTuple):
+    """How far a motion is from the program, as shares of the tolerance [-]; 1 - SPARE and less is not told of places.
 
-    over: bool
-    columns: tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]
+    time      : (n,) of places where the contour leaves the tolerance [s]
+    ratio     : (n,) there
+    piece     : (n,) and the piece of the path that they are at
+    near      : (N+1,) of every vertex
+    near_time : (N+1,) when the motion is nearest to it [s]; where it is lost, when it passed the last one before
+    worst     : (N,) the largest of the contour on each piece
+    """
+
+    time: FloatArray
+    ratio: FloatArray
+    piece: Array
+    near: FloatArray
+    near_time: FloatArray
+    worst: FloatArray
+
+    @property
+    def over(self) -> bool:
+        """Whether the motion leaves the tolerance."""
+        return bool(len(self.time)) or bool((self.near > 1.0 - SPARE).any())
 
 
 class Behind:
@@ -93,27 +110,22 @@ class Behind:
         weights = self.filters.step(self.filters.delay * np.arange(STEPS + 1) / STEPS)
         self._weights = np.diff(weights)
 
-    def errors(
-        self, motion: MotionInTime, filters: tuple[float, ...]
-    ) -> tuple[FloatArray, FloatArray, Array, FloatArray, FloatArray]:
-        """Errors of the filtered motion.
+    def errors(self, motion: MotionInTime, filters: tuple[float, ...]) -> Errors:
+        """Errors of the filtered motion, matched with the path as the verifier does it. That loses a motion which leaves the tolerance;
+        so it is matched again with wider budgets, which measure how far it does. Where another way along the path fits these, what the
+        verifier finds counts.
 
         filters : lengths of the moving averages [s]; none for the motion itself
-
-        Returns times [s], ratios [-] and pieces where the ratio of the contour is large, (n,) each, and the ratio and time of every
-        vertex, (N+1,) each: as the verifier sees them where it finds a vertex or a place off, as far as wider budgets measure them.
         """
         seen = self._measured(motion, filters, self.pieces, 1.0)
         if not seen.over:
-            return seen.columns
+            return seen
         wide = self._measured(motion, filters, self._wide, WIDER)
-        return (
-            wide.columns if wide.over else seen.columns
-        )  # within wider budgets another way along the path may fit
+        return wide if wide.over else seen
 
     def _measured(
         self, motion: MotionInTime, filters: tuple[float, ...], pieces: ProgramPieces, wider: float
-    ) -> _Measured:
+    ) -> Errors:
         """The errors of the motion matched with budgets `wider` times as large."""
         kept: list[tuple[FloatArray, FloatArray, Array]] = []
         worst = np.zeros(len(self.pieces.piece))
@@ -127,31 +139,32 @@ class Behind:
         at = motion_asked(motion, self.machine.dt)
         look = look_behind(at, motion.end, filters, self.machine.dt, pieces, each)
         near = look.seen.match.passed["near"] / self.pieces.joint["budget"]
-        near[np.isinf(near)] = 2.0 * wider
+        lost = np.isinf(near)
+        near[lost] = 2.0 * wider
+        near_time = np.where(lost, 0.0, look.seen.match.passed["near_time"])
+        near_time[lost] = np.maximum.accumulate(near_time)[lost]
         t, ratio, piece = (np.concatenate(column) for column in zip(*kept, strict=True))
-        self._worst = worst
-        over = bool(len(t)) or bool((near > 1.0 - SPARE).any())
-        return _Measured(over, (t, ratio, piece, near, look.seen.match.passed["near_time"]))
+        return Errors(t, ratio, piece, near, near_time, worst)
 
     def path_shares(self, motion: Timed) -> tuple[FloatArray, FloatArray]:
         """Ratios of the path itself, without filters: the largest on each piece (N,), and at the vertices (N+1,) [-]."""
-        near = self.errors(motion, ())[3]
-        return self._worst, near
+        of_path = self.errors(motion, ())
+        return of_path.worst, of_path.near
 
     def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Violations:
         """Where a motion leaves the tolerance behind the filters.
 
         path : `path_shares` (N,), (N+1,) of any motion along the same path
         """
-        t, ratio, piece, near, near_time = self.errors(motion, self.filters.times)
-        missed = np.flatnonzero(near > 1.0 - SPARE)
+        found = self.errors(motion, self.filters.times)
+        missed = np.flatnonzero(found.near > 1.0 - SPARE)
         return Violations(
-            time=np.concatenate([t, near_time[missed]]),
-            ratio=np.concatenate([ratio, near[missed]]),
-            path=np.concatenate([path[0][piece], path[1][missed]]),
-            vertex=np.concatenate([np.full(len(t), -1), missed]),
-            near=near,
-            near_time=near_time,
+            time=np.concatenate([found.time, found.near_time[missed]]),
+            ratio=np.concatenate([found.ratio, found.near[missed]]),
+            path=np.concatenate([path[0][found.piece], path[1][missed]]),
+            vertex=np.concatenate([np.full(len(found.time), -1), missed]),
+            near=found.near,
+            near_time=found.near_time,
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:

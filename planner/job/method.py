@@ -29,7 +29,7 @@ from planner.verify.held import FAULT
 PERIOD_ROUNDS = 8
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
 INSTEAD_POINTS = 50_000
-IN_STEP = "plan threads by method optimal, without --shaped"
+IN_STEP = "plan threads by method optimal or kinematic, without --shaped"
 
 
 class Method(ABC):
@@ -70,10 +70,8 @@ class Method(ABC):
         require_samples(at_feed, machine.dt)
         stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
         made = self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
-        if not self.keeps_step and (lost := _out_of_step(made)):
-            return _not_delivered(
-                made, f"{lost}: its filters or its shaper reach the feed behind the run-in; {IN_STEP}"
-            )
+        if lost := _out_of_step(made):  # it would be no thread
+            return _not_delivered(made, f"{lost}: the feed is reached behind the run-in; {IN_STEP}")
         if made.pricing is None:
             return made
         with stages.stage("report"):
@@ -100,12 +98,6 @@ class Method(ABC):
     @property
     def keeps_tolerance(self) -> bool:
         """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
-        return True
-
-    @property
-    def keeps_step(self) -> bool:
-        """Whether the method reaches the feed of a thread within the run-in that the program was checked for. If not, a thread that it
-        cuts out of step with the spindle is not delivered: it is no thread."""
         return True
 
     def plan_within_periods(self, job: Job) -> Plan:

@@ -62,7 +62,7 @@ def _fastest(
 ) -> tuple[FloatArray, FloatArray]:
     """v and a (n,) of the shortest moves from rest to rest with v a <= product, below the given v and a; by golden sections of log v,
     from the v that leaves a as it is to the one that is given. Where v is reached, a move takes L/v + v^2/P + P/(v j) with P the
-    product: a sum of exponentials of log v, which is convex. Where it is not, it takes the longer the lower a is, and so the higher v."""
+    product: a sum of exponentials of log v, which is convex. Where it is not, it takes the longer the lower a is: the higher v."""
     low, high = np.log(product / a), np.log(v)
 
     def time(at: FloatArray) -> FloatArray:

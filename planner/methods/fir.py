@@ -51,10 +51,6 @@ class FirMethod(Method):
         check_profile_filters(self.profile_filters)
 
     @property
-    def keeps_step(self) -> bool:
-        return False
-
-    @property
     def keeps_tolerance(self) -> bool:
         return not self.plain
 

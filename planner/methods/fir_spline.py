@@ -77,10 +77,6 @@ class FirSplineMethod(Method):
             raise InputError(f"phase_lag = {self.phase_lag} rad; it must be positive and finite")
 
     @property
-    def keeps_step(self) -> bool:
-        return False
-
-    @property
     def keeps_tolerance(self) -> bool:
         return not self.plain
 

@@ -74,10 +74,6 @@ class OptimalMethod(Method):
         corners = (dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
         return (*corners, KinematicMethod(), StopMethod())
 
-    @property
-    def keeps_step(self) -> bool:
-        return not self.shaped
-
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(
             method="optimal",

@@ -41,10 +41,6 @@ class SecondOrderMethod(Method):
 
     ways = ((0.5, 1.0), (0.1, 1.0))
 
-    @property
-    def keeps_step(self) -> bool:
-        return not self.shaped
-
     def plan_job(self, job: Job) -> Plan:
         order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)
         effort = EFFORTS[effort_name(self.effort)]

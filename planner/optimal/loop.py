@@ -147,21 +147,23 @@ def plan_on_path(job: Job, settings: Settings, stopped: Stopped | None = None) -
         return time > job.most or (stopped is not None and stopped.sooner_than(time / (1.0 + SAME_MOTION)))
 
     try:
-        return _plan_of(job, settings, [time_optimal(job, settings)], useless)
+        found = [time_optimal(job, settings)]
     except NotSolvedError as fault:  # no grid follows the path
         return job.plan(
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
         )  # fmt: skip
+    return _plan_of(job, settings, found, useless)
 
 
 def _plan_of(job: Job, settings: Settings, found: list[OnPath], useless: Callable[[float], bool]) -> Plan:
-    """The plan of the one motion found, with its limits kept at grid points; the list is emptied, to let go of it.
+    """The plan of the one motion found, with its limits kept at grid points. The list is emptied, so that tightening lets go of it: a
+    third of a kilobyte a point.
 
     useless : whether a motion that takes so long [s] need not be delivered
     """
     made = prices = pricing = None
     if found[0].solution.solved:
-        with job.stage("solve"):  # a third of a kilobyte a point is let go of
+        with job.stage("solve"):
             best, motion = within_limits(found.pop(), settings.order, job.toolpath, job.machine, job.tell)
         with job.stage("filters"):
             best, motion = within_filters(best, motion, settings.order, job, useless)

@@ -27,7 +27,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.errors import InputError
+from planner.base.errors import InputError, NotSolvedError
 from planner.constraints.normal_limit import slowest
 from planner.delivery.filters import WIDER, Behind
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
@@ -130,7 +130,10 @@ class _Search:
     ) -> Shaped | None:
         """The shaped motion of a job on a path with stops, planned with `more` times the accelerations; None if it is useless."""
         candidate = dataclasses.replace(job, machine=_faster(job.machine, more), toolpath=toolpath)
-        planned = time_optimal(candidate, self.settings)
+        try:
+            planned = time_optimal(candidate, self.settings)
+        except NotSolvedError:  # no grid follows the path
+            return None
         if not planned.solution.solved:
             return None
         made = _Settling(job, self.shaper, self.settings).settled(planned, useless)
@@ -251,13 +254,12 @@ class _Settling:
             over = worst > 1.0 + EXCESS
             for delay in self.shaper.delay:
                 np.maximum.at(factor, self._piece(motion, chunk.t[over] - delay), worst[over])
-        t, ratio, _, near, near_time = self.behind.errors(delivered, self.filters)
-        ratio = np.minimum(
-            ratio, WIDER
-        )  # more is the distance from a piece that D is not on: the match was lost before
+        off = self.behind.errors(delivered, self.filters)
         room = 1.0 - SPARE_ERROR - self.bow / self.job.toolpath.tolerance.min()
-        missed = near > room
-        t, ratio = np.append(t, near_time[missed]), np.append(ratio, near[missed])
+        missed = off.near > room
+        # a contour error above WIDER is the distance from a piece that D is not on: the match was lost before
+        ratio = np.append(np.minimum(off.ratio, WIDER), off.near[missed])
+        t = np.append(off.time, off.near_time[missed])
         # at long periods the bow leaves less room than the path may use: nothing is gained there by going slower
         slower = np.sqrt(np.maximum(ratio - OF_PATH, 0.0) / max(room - OF_PATH, ROOM_LEAST))
         seen = self.shaper.length + sum(self.filters)  # what D is made of, back from t

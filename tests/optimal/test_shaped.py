@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import never_slower, problems
-from planner.base.errors import InputError
+from planner.base.errors import InputError, NotSolvedError
 from planner.machine import Axis, Fir, Machine, Mode
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
@@ -33,6 +33,16 @@ def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
     assert left(made) < LEFT
     assert made.trajectory.cycle_time < plan(pentagon, SHAKEN, method="fir").trajectory.cycle_time
     assert "shaped for 1 vibration modes" in made.sentence
+
+
+def test_a_path_that_no_grid_follows_is_a_status(pentagon, monkeypatch):
+    def fail(*_):
+        raise NotSolvedError("no grid follows the path")
+
+    monkeypatch.setattr("planner.optimal.shaped.time_optimal", fail)
+    made = plan(pentagon, SHAKEN, method="second-order", shaped=True)
+    assert not made.solved
+    assert "plan without --shaped" in made.sentence
 
 
 def test_without_shaping_it_rings(pentagon):

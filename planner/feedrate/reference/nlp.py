@@ -153,7 +153,9 @@ def _solve_piece(
     # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
     h_guess = guess.duration[here][:-1] / SLOWER
     lasts = np.isfinite(h_guess)  # not where the guess stands still at both ends of a tiny interval
-    slow = ds / np.sqrt(problem.feed_sq_limit[here].max())  # what they take at the largest speed of the segment
+    slow = ds / np.sqrt(
+        problem.feed_sq_limit[here].max()
+    )  # what they take at the largest speed of the segment
     h_guess = np.where(lasts, h_guess, h_guess[lasts].mean() if lasts.any() else slow)
     length, second = ds.mean(), h_guess.mean()
     speed, acc, jerk = length / second, length / second**2, length / second**3

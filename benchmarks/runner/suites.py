@@ -95,19 +95,21 @@ class Suite:
 
 MODELS = ("linuxcnc (model)", "grbl (model)", "klipper (model)")
 QUICK_WAYS = ("optimal", "optimal:quick", "second-order", "kinematic", "fir", "bezier", "stop")
+COPP_WAYS = ("copp", "copp:quick", "copp-lp:quick")
 SMALL = (
     *METHODS,
     "optimal:quick",
     "optimal:best",
     "toppra",
     "sequential-convex",
-    "copp",
+    *COPP_WAYS,
     "ruckig",
     "linuxcnc",
     "ipopt",
+    "fatrop",
     *MODELS,
 )
-USUAL = (*QUICK_WAYS, "toppra", "copp", "ruckig", "linuxcnc", *MODELS)
+USUAL = (*QUICK_WAYS, "toppra", "copp", "copp:quick", "ruckig", "linuxcnc", *MODELS)
 LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "linuxcnc", "kinematic", "stop", *MODELS)
 
 
@@ -319,11 +321,15 @@ SUITES: dict[str, Suite] = {
     "relief": Suite(
         says="a relief of 1,000 to 100,000 blocks: how planning grows", scales=True, jobs=relief, ways=LARGE
     ),
-    "axes7": Suite(says="random jobs in seven axes", jobs=axes7, ways=QUICK_WAYS),
+    "axes7": Suite(
+        says="random jobs in seven axes",
+        jobs=axes7,
+        ways=(*QUICK_WAYS, "toppra", *COPP_WAYS[1:]),
+    ),
     "five-axis": Suite(
         says="an S-shaped piece on a tilting rotary table",
         jobs=five_axes,
-        ways=("optimal", "second-order", "toppra", "copp"),
+        ways=("optimal", "optimal:quick", "second-order", "toppra", "copp:quick"),
     ),
     "nasty": Suite(says="what has broken planners before", jobs=difficult, ways=USUAL),
     "random": Suite(says="random lines and arcs on random machines", jobs=random, ways=USUAL),

@@ -3,7 +3,7 @@
     toppra              second-order feed on the planner's own geometry, by the package toppra; jerk is not limited
     sequential-convex   jerk-limited feed on the planner's splines, by convex problems and ipopt
     copp, copp-lp       the same by the package copp (copp-py), TOPP3-SOCP and TOPP3-LP, passes until nothing is gained, brought
-                        onto constant jerks as the one before; copp:quick and so on are on the grid of that effort, which has fewer points
+                        onto constant jerks as the one before; copp:quick and so on: on the grid of that effort, with fewer points
     ruckig              every line from rest to rest by the package ruckig, phase-synchronised, so that the motion stays on the line.
                         Its open version has no waypoints of its own (it sends them to a server): it cannot do better here
     ipopt, fatrop       geometry and feed together (method tube), by casadi's solvers on a whole run

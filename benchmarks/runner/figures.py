@@ -1,4 +1,4 @@
-"""Pictures of a suite: performance profiles, motion against planning time, and how planning grows."""
+"""Pictures of a suite: performance profiles, motion against planning time, how planning grows, and accuracy against the grid."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from benchmarks.runner import grid_report
 from benchmarks.runner.figures_of_merit import growth, ratios, trades
 from benchmarks.runner.rows import Row
 
@@ -27,6 +28,8 @@ def draw(folder: Path, suite: str, jobs: dict[str, dict[str, Row]], *, scales: b
         made.append(_drawn(folder / f"suite-{suite}-trade.png", lambda axes: _trade(axes, jobs)))
     if scales and growth(jobs):
         made.append(_drawn(folder / f"suite-{suite}-growth.png", lambda axes: _growth(axes, jobs)))
+    if grid_report.converging(jobs, False):
+        made.append(_drawn(folder / f"suite-{suite}-order.png", lambda axes: grid_report.draw_on(axes, jobs)))
     return made
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from benchmarks.record import markdown
-from benchmarks.runner import figures
+from benchmarks.runner import figures, grid_report
 from benchmarks.runner.ages import write_stale
 from benchmarks.runner.figures_of_merit import best_times, by_job, growth, profile, ratios, trades
 from benchmarks.runner.rows import (
@@ -53,6 +53,7 @@ def report_of(name: str, results: Results, pictures: Iterable[Path] = ()) -> str
     jobs = by_job(rows)
     ways = list(dict.fromkeys(row.way for row in rows if row.status != SKIPPED))
     parts = [_head(results), f"# Suite {name}: {SUITES[name].says}", _outcomes(rows)]
+    parts += grid_report.tables(jobs)
     parts += ["## Cycle time [s]", CYCLE_NOTE, _cycle_times(jobs, ways)]
     if shares := ratios(jobs):
         parts += ["## Share of the jobs within a factor of the best motion", PROFILE_NOTE, _profiles(shares)]

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks import axes_campaign, five_axis, growth, long_jobs, never_slower, planned_ngc, problems
 from benchmarks.corner_shapes import corner
 from benchmarks.random_paths import COPP_LIMITS, CURVES, copp_spline
-from benchmarks.runner import nasty
+from benchmarks.runner import grids, nasty
 from planner.base.names import METHODS
 from planner.geometry.nurbs import Nurbs
 from planner.kinematics import at_tip
@@ -28,27 +28,8 @@ from planner.nc.reader import read_program
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))
 CORNER_ANGLES = (
-    1,
-    2,
-    5,
-    10,
-    20,
-    30,
-    45,
-    60,
-    75,
-    90,
-    105,
-    120,
-    135,
-    150,
-    160,
-    170,
-    174,
-    176,
-    178,
-    179,
-)  # [deg]
+    1, 2, 5, 10, 20, 30, 45, 60, 75, 90, 105, 120, 135, 150, 160, 170, 174, 176, 178, 179,
+)  # [deg]  # fmt: skip
 CURVE_TOLERANCES = (0.005, 0.02, 0.1)  # [mm]
 CURVE_CHORDS = 0.1  # of the tolerance: what the chords of a curve may leave it by [-]
 RELIEFS = (1_000, 3_000, 10_000, 30_000, 100_000)  # blocks
@@ -56,6 +37,9 @@ RANDOM_JOBS = 40
 AXES_JOBS, AXES, COPP_JOBS = 10, 7, 2
 COPP_SCALE = 100.0  # [mm] and [deg] for a unit of the splines that the authors of copp test with
 S_POINTS = (161, 321)  # tips of the five-axis piece
+GRID_JOBS = (
+    "pentagon", "lines and arcs", "circle", "relief", "stops", "seed 3", "90 degrees", "trident 20 um",
+)  # fmt: skip
 PAPER_JERK = (
     2000 / 0.03
 )  # papers 000, 001 and 003: filters of 50 and 30 ms at 100 mm/s and 2000 mm/s2 [mm/s3]
@@ -312,6 +296,15 @@ def quick() -> list[Job]:
     ]
 
 
+def on_grids() -> list[Job]:
+    """Jobs of other suites that are small on every grid."""
+    return [
+        *(one for one in quick() if one.name in GRID_JOBS),
+        *(one for one in corners() if one.name in GRID_JOBS),
+        *(one for one in curves() if one.name in GRID_JOBS),
+    ]
+
+
 SUITES: dict[str, Suite] = {
     "quick": Suite(says="small jobs of every kind; the guard of the test suite", jobs=quick, ways=QUICK_WAYS),
     "papers": Suite(says="the jobs of the four papers", jobs=papers, ways=SMALL),
@@ -330,6 +323,11 @@ SUITES: dict[str, Suite] = {
         says="an S-shaped piece on a tilting rotary table",
         jobs=five_axes,
         ways=("optimal", "optimal:quick", "second-order", "toppra", "copp:quick"),
+    ),
+    "grids": Suite(
+        says="the same motions on coarser and finer grids",
+        jobs=on_grids,
+        ways=tuple(grids.WAYS),
     ),
     "nasty": Suite(says="what has broken planners before", jobs=difficult, ways=USUAL),
     "random": Suite(says="random lines and arcs on random machines", jobs=random, ways=USUAL),

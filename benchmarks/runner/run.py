@@ -11,10 +11,14 @@ import selectors
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import IO
+
+from joblib import Parallel, delayed
 
 from benchmarks.record import RESULTS, provenance
 from benchmarks.runner import rows
@@ -43,6 +47,7 @@ class Request:
     repeats : of one pair at most
     only    : patterns of job names; empty for all
     count   : jobs of each suite, the first ones; None for all
+    processes : ways that are measured at the same time; above 1 all times are marked as not quiet
     resume  : leave pairs alone that the file has of this commit
     folder  : where files of rows are
     """
@@ -54,6 +59,7 @@ class Request:
     repeats: int = REPEATS
     only: tuple[str, ...] = ()
     count: int | None = None
+    processes: int = 1
     resume: bool = False
     folder: Path = FOLDER
 
@@ -65,10 +71,10 @@ class Request:
         for way in (*(self.methods or ()), *(self.peers or ())):
             if way not in (NONE, ALL):
                 way_of(way)
-        if not (0.0 < self.limit < math.inf and self.repeats > 0 and (self.count is None or self.count > 0)):
-            raise InputError(
-                f"limit {self.limit:g}, repeats {self.repeats}, count {self.count}; each must be above 0"
-            )
+        numbers = {"repeats": self.repeats, "processes": self.processes, "count": self.count}
+        if not 0.0 < self.limit < math.inf or any(one is not None and one <= 0 for one in numbers.values()):
+            said = ", ".join(f"{name} {one}" for name, one in numbers.items())
+            raise InputError(f"limit {self.limit:g}, {said}; each must be above 0")
 
     def ways(self, suite: str) -> list[str]:
         """Names of the ways of a suite."""
@@ -111,10 +117,7 @@ def run(request: Request) -> dict[str, list[Row]]:
             print(f"{suite}: nothing to do", flush=True)
             continue
         rows.append(file, [rows.about_line(about | {"planner": commit})])
-        for row in _measured(request, suite, pairs, commit):
-            rows.append(file, [line_of(row)])
-            made[suite].append(row)
-            print(_told(row), flush=True)
+        made[suite] = _measured(request, suite, pairs, commit, partial(_kept, file))
         rows.compact(file, {job.name for job in SUITES[suite].jobs()})
     return made
 
@@ -126,20 +129,43 @@ def _pairs(request: Request, suite: str, done: set[rows.Key]) -> dict[str, list[
     return {way: jobs for way, jobs in pairs.items() if jobs}
 
 
-def _measured(request: Request, suite: str, pairs: dict[str, list[str]], commit: str) -> Iterator[Row]:
-    for way, jobs in pairs.items():
-        worker: Worker | None = None
-        for job in jobs:
-            worker = worker or Worker(way)
-            asked = {
-                "suite": suite, "job": job, "repeats": request.repeats, "limit": request.limit, "commit": commit,
-            }  # fmt: skip
-            row = worker.answer(asked, PATIENCE * request.limit + START)
-            if not worker.alive:
-                worker = None
-            yield row
-        if worker is not None:
-            worker.close()
+def _kept(file: Path, row: Row) -> None:
+    """Append a row to the file, and tell of it."""
+    rows.append(file, [line_of(row)])
+    print(_told(row), flush=True)
+
+
+def _measured(
+    request: Request, suite: str, pairs: dict[str, list[str]], commit: str, keep: Callable[[Row], None]
+) -> list[Row]:
+    """The rows of pairs, each kept as soon as it is measured; so many ways at a time as there may be processes."""
+    made: list[Row] = []
+    one_at_a_time = Lock()
+
+    def serve(way: str, jobs: list[str]) -> None:
+        for row in _of_way(request, suite, way, jobs, commit):
+            with one_at_a_time:
+                keep(row)
+                made.append(row)
+
+    # threads that wait for the ways' processes
+    Parallel(n_jobs=request.processes, backend="threading")(delayed(serve)(*one) for one in pairs.items())
+    return made
+
+
+def _of_way(request: Request, suite: str, way: str, jobs: list[str], commit: str) -> Iterator[Row]:
+    worker: Worker | None = None
+    for job in jobs:
+        worker = worker or Worker(way)
+        asked = {
+            "suite": suite, "job": job, "repeats": request.repeats, "limit": request.limit, "commit": commit,
+        }  # fmt: skip
+        row = worker.answer(asked, PATIENCE * request.limit + START)
+        if not worker.alive:
+            worker = None
+        yield dataclasses.replace(row, beside=request.processes - 1)
+    if worker is not None:
+        worker.close()
 
 
 class Worker:

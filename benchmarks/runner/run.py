@@ -8,6 +8,7 @@ import fnmatch
 import json
 import math
 import selectors
+import signal
 import subprocess
 import sys
 import tempfile
@@ -192,10 +193,15 @@ class Worker:
         if line:
             return rows.row_of_line(json.loads(line), "worker")
         self.close()
+        spent = self._process.returncode == -signal.SIGXCPU
         blank = Row(
             suite=str(asked["suite"]), job=str(asked["job"]), way=self.way.name, kind=self.way.kind,
-            status=OVER_LIMIT if line is None else ERROR, commit=str(asked["commit"]),
+            status=OVER_LIMIT if line is None or spent else ERROR, commit=str(asked["commit"]),
         )  # fmt: skip
+        if spent:
+            return dataclasses.replace(
+                blank, message=f"more than {asked['limit']:g} CPU s in a call that did not come back"
+            )
         late, died = f"no answer within {patience:g} s", f"the process died: {self._words}"
         return dataclasses.replace(blank, message=late if line is None else died)
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,7 @@ from benchmarks.runner.judged import NotApplicable, NotHere
 from benchmarks.runner.measure import Calibration, Protocol, measured, outcome
 from benchmarks.runner.rows import ERROR, NOT_APPLICABLE, OVER_LIMIT, SKIPPED, SOLVED, Row, read
 from benchmarks.runner.run import Request, Worker, run
-from benchmarks.runner.suites import SUITES, Job
+from benchmarks.runner.suites import ROOT, SUITES, Job
 from benchmarks.runner.ways import MODELS, PEERS, Way, way_of
 from planner.base.errors import InputError
 from planner.machine import Machine
@@ -84,6 +87,33 @@ def test_a_process_that_dies_is_a_row_and_says_why() -> None:
     )
     assert (row.status, row.message) == (ERROR, "the process died: KeyError: 'none of that name'")
     assert not worker.alive
+
+
+@pytest.mark.slow
+def test_a_process_that_its_processor_limit_ends_is_over_the_limit() -> None:
+    worker = Worker("stop")
+    worker._process.send_signal(signal.SIGXCPU)
+    row = worker.answer({"suite": "quick", "job": "pentagon", "repeats": 1, "limit": 1.0, "commit": ""}, 60.0)
+    assert (row.status, row.message) == (OVER_LIMIT, "more than 1 CPU s in a call that did not come back")
+
+
+COMPILED = """
+import resource
+from benchmarks.runner.measure import Calibration, Protocol, measured
+from benchmarks.runner.rows import Row
+from benchmarks.runner.suites import SUITES
+from benchmarks.runner.ways import Way
+resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+way = Way(name="way", kind="peer", plan=lambda *given: sum(range(10**12)))  # no handler runs within
+blank = Row(suite="quick", job="pentagon", way="way", kind="peer", status="error")
+measured(way, SUITES["quick"].jobs()[0], blank, Protocol(limit=0.1), Calibration())
+"""
+
+
+@pytest.mark.slow
+def test_compiled_code_that_does_not_come_back_ends_with_its_process() -> None:
+    ran = subprocess.run([sys.executable, "-c", COMPILED], cwd=ROOT, timeout=120.0, check=False)
+    assert ran.returncode == -signal.SIGXCPU
 
 
 def failing(fault: BaseException) -> Way:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import axes_campaign, five_axis, growth, long_jobs, never_slower, planned_ngc, problems
+from benchmarks import axes_campaign, five_axis, growth, long_jobs, planned_ngc, problems, random_lines
 from benchmarks.corner_shapes import corner
 from benchmarks.random_paths import COPP_LIMITS, CURVES, copp_spline
 from benchmarks.runner import grids, nasty
@@ -33,7 +33,7 @@ CORNER_ANGLES = (
 CURVE_TOLERANCES = (0.005, 0.02, 0.1)  # [mm]
 CURVE_CHORDS = 0.1  # of the tolerance: what the chords of a curve may leave it by [-]
 RELIEFS = (1_000, 3_000, 10_000, 30_000, 100_000)  # blocks
-RANDOM_JOBS = 40
+RANDOM_JOBS = 100
 AXES_JOBS, AXES, COPP_JOBS = 10, 7, 2
 COPP_SCALE = 100.0  # [mm] and [deg] for a unit of the splines that the authors of copp test with
 S_POINTS = (161, 321)  # tips of the five-axis piece
@@ -94,6 +94,7 @@ SMALL = (
     *MODELS,
 )
 USUAL = (*QUICK_WAYS, "toppra", "copp", "copp:quick", "ruckig", "linuxcnc", *MODELS)
+RANDOM_RIVALS = ("stop", "kinematic", "optimal/bezier", "optimal/fir", "optimal/kinematic")
 LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "linuxcnc", "kinematic", "stop", *MODELS)
 
 
@@ -239,12 +240,12 @@ def _s_piece(points: int, machine: Machine) -> Program:
 
 
 def random() -> list[Job]:
-    """The first random jobs of never_slower.py, each on a machine of its own."""
+    """The first random jobs of random_lines.py, each on a machine of its own."""
     return [
         Job(
             name=f"seed {seed}",
-            program=made(lambda seed=seed: never_slower.job(seed)[0]),
-            machine=lambda seed=seed: never_slower.job(seed)[1],
+            program=made(lambda seed=seed: random_lines.job(seed)[0]),
+            machine=lambda seed=seed: random_lines.job(seed)[1],
         )
         for seed in range(RANDOM_JOBS)
     ]
@@ -330,7 +331,9 @@ SUITES: dict[str, Suite] = {
         ways=tuple(grids.WAYS),
     ),
     "nasty": Suite(says="what has broken planners before", jobs=difficult, ways=USUAL),
-    "random": Suite(says="random lines and arcs on random machines", jobs=random, ways=USUAL),
+    "random": Suite(
+        says="random lines and arcs on random machines", jobs=random, ways=(*USUAL, *RANDOM_RIVALS[2:])
+    ),
     "programs": Suite(
         says="real programs of ../shared/nc", scales=True, jobs=programs, ways=LARGE, absent=_no_programs
     ),

@@ -24,7 +24,7 @@ from joblib import Parallel, delayed
 from benchmarks.record import RESULTS, provenance
 from benchmarks.runner import rows
 from benchmarks.runner.measure import REPEATS
-from benchmarks.runner.rows import ERROR, OVER_LIMIT, Row, line_of
+from benchmarks.runner.rows import ERROR, METHOD, OVER_LIMIT, Row, line_of
 from benchmarks.runner.suites import ROOT, SUITES, Job
 from benchmarks.runner.ways import MODELS, PEERS, way_of
 from benchmarks.runner.worker import READY
@@ -81,8 +81,9 @@ class Request:
         """Names of the ways of a suite."""
         usual = SUITES[suite].ways
         others = (*PEERS, *MODELS)
-        methods = _chosen(self.methods, tuple(way for way in usual if way not in others), usual)
-        return [*methods, *_chosen(self.peers, tuple(way for way in usual if way in others), others)]
+        own = tuple(way for way in usual if way_of(way).kind == METHOD)
+        foreign = tuple(way for way in usual if way_of(way).kind != METHOD)
+        return [*_chosen(self.methods, own, usual), *_chosen(self.peers, foreign, others)]
 
     def jobs(self, suite: str) -> list[Job]:
         """Jobs of a suite."""

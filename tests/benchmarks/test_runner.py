@@ -192,6 +192,8 @@ def test_wrong_requests_are_refused(given: dict, said: str) -> None:
 def test_ways_are_the_suites_or_those_asked_for() -> None:
     request = Request(suites=("papers",), methods=("stop",), peers=("none",))
     assert request.ways("papers") == ["stop"]
+    assert "copp:quick" in Request(suites=("papers",), methods=("none",)).ways("papers")
+    assert "copp:quick" not in Request(suites=("papers",), peers=("none",)).ways("papers")
     assert set(Request(suites=("papers",)).ways("papers")) == set(SUITES["papers"].ways)
     assert Request(suites=("quick",), peers=("all",)).ways("quick")[-len(PEERS) - len(MODELS) :] == [
         *PEERS,

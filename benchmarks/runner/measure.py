@@ -139,11 +139,13 @@ def _limited(way: Way, job: Job, blank: Row, limit: float | None) -> Row:
     resource.setrlimit(resource.RLIMIT_CPU, (last, hard))
     signal.setitimer(signal.ITIMER_PROF, limit, 1.0)
     try:
-        return outcome(way, job, blank)
-    except OverTheLimit:  # between the call and the timer's end
+        try:
+            return outcome(way, job, blank)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+    except OverTheLimit:  # from within the call, or on its way to the timer's end
         return dataclasses.replace(blank, status=OVER_LIMIT, message=f"more than {limit:g} CPU s")
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
         resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
         signal.signal(signal.SIGPROF, was)
 

@@ -115,7 +115,7 @@ PROFILE_NOTE = (
 )
 BEATEN_NOTE = (
     "On the jobs on which a way has a motion that passed with every quantity limited. Only differences above "
-    f"{ALLOWED:g} of the time count as slower."
+    f"{ALLOWED:g} of the time count as slower, and having no such motion."
 )
 TRADE_NOTE = (
     "Geometric means over the jobs that the way and `optimal` solve. On the front are ways that limit all and solve all of these jobs, "
@@ -192,7 +192,10 @@ def _beaten(against: dict[str, dict[str, float]]) -> str:
     for way, of_way in against.items():
         by = np.array(list(of_way.values()))
         slower = sorted((job for job in of_way if of_way[job] > ALLOWED), key=lambda job: -of_way[job])
-        told = ", ".join(f"{job} ({of_way[job]:.1e})" for job in slower[:SHOWN])
+        told = ", ".join(
+            f"{job} ({f'{of_way[job]:.1e}' if of_way[job] < math.inf else 'has none'})"
+            for job in slower[:SHOWN]
+        )
         table.append([way, str(len(by)), str(len(slower)), f"{np.median(-by):.1%}", told])
     return markdown(["way", "jobs", "optimal is slower on", "shorter by, median", "by"], table)
 

@@ -44,6 +44,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--only", nargs="+", default=[], help="patterns of job names")
     run.add_argument("--count", type=int, help="the first jobs of each suite")
+    run.add_argument(
+        "--processes", type=int, default=1, help="ways at a time; their times are marked as not quiet"
+    )
     run.add_argument("--resume", action="store_true", help="not what the file has of this commit")
     run.add_argument("--folder", type=Path, default=FOLDER)
     run.set_defaults(do=_run)
@@ -77,6 +80,7 @@ def _run(options: argparse.Namespace) -> int:
             repeats=options.repeats,
             only=tuple(options.only),
             count=options.count,
+            processes=options.processes,
             resume=options.resume,
             folder=options.folder,
         )

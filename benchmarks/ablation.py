@@ -2,7 +2,7 @@
 
     python -m benchmarks.ablation [--jobs 150] [--traces FILE] [--report]     into results/ablation.json and .md
 
-The random jobs of benchmarks/never_slower.py, and the programs of ../shared/nc up to `NC_BYTES` on machine "mill", are planned by
+The random jobs of benchmarks/random_lines.py, and the programs of ../shared/nc up to `NC_BYTES` on machine "mill", are planned by
 `optimal` with a trace (planner/job/trace.py), in one process. A trace has every try with the cycle time of what it competed with, so
 that one run tells of all heuristics. Traces are added to FILE, one job a line; jobs in it are not planned again, and --report plans
 none.
@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from benchmarks.never_slower import job
+from benchmarks.random_lines import job
 from benchmarks.record import markdown, write_results
 from benchmarks.tries import add_row, programs, read_rows, summed
 from planner.base.errors import PlannerError

@@ -1,6 +1,6 @@
 """The jobs of the campaign: from a number a random program, machine, tolerance, interpolation period and method.
 
-Programs of eleven sources: of lines and arcs in three axes (never_slower.py), of up to nine axes (axes_campaign.py), of everything that
+Programs of eleven sources: of lines and arcs in three axes (random_lines.py), of up to nine axes (axes_campaign.py), of everything that
 moves in one program and of points on a curve (campaign_programs.py), and those that are compared with LinuxCNC's interpreter: cycles,
 offsets, feed modes, lathe, cutter compensation, splines, and all of these in subprograms, loops and branches (tests/nc/random_nc.py,
 random_splines.py, random_together.py).
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import axes_campaign, never_slower
+from benchmarks import axes_campaign, random_lines
 from benchmarks.campaign_programs import BLOCKS, dense, mixed
 from planner.base.errors import InputError
 from planner.machine import ROTARY_AXES, Axis, Fir, Machine, Mode
@@ -188,7 +188,7 @@ def _job(seed: int, rng: Rng) -> Job:
 def _drawn(source: str, rng: Rng) -> tuple[str, Machine, Program | None, str]:
     """Text, machine, and program or refusal."""
     if source == "lines and arcs":
-        program, _ = never_slower.job(int(rng.integers(1 << 30)))
+        program, _ = random_lines.job(int(rng.integers(1 << 30)))
         return "", machine_of(rng, "xyz"), program, ""
     if source == "axes":
         text, other = axes_campaign.job(int(rng.integers(1 << 30)))

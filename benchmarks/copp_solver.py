@@ -1,8 +1,10 @@
-"""The package copp (copp-py, MIT; https://copp.pro), TOPP3-SOCP through its Python interface: a peer for the solvers with jerk limits.
+"""The package copp (copp-py, MIT; https://copp.pro), TOPP3-SOCP and TOPP3-LP through its Python interface: a peer for the solvers with
+jerk limits.
 
 Copp has x = feed^2 and u = acceleration at the stations, du/ds constant between them, and the jerk rows |g| sqrt(x) <= j made convex
 around a given profile; one conic program for Clarabel per pass. The first pass is around its own second-order optimum, the next ones
-are around the pass before, as its documentation advises. Next to rest it has constant jerk ("stationary" intervals).
+are around the pass before, as its documentation advises. TOPP3-LP has a linear objective in place of the time. Next to rest both have
+constant jerk ("stationary" intervals).
 
 It is given every problem in units in which the mean interval and its duration at second order are 1: in millimetres and seconds
 Clarabel's tolerances let its times be off by 1 to 4 % on the curves here, and it takes three times as many iterations.
@@ -38,20 +40,23 @@ def copp() -> ModuleType | None:
 
 @dataclass(frozen=True, kw_only=True)
 class CoppSocp:
-    """TOPP3-SOCP with copp's settings.
+    """TOPP3-SOCP, or TOPP3-LP, with copp's settings.
 
     passes : as many at most; copp's published figures are for one
     tol    : a pass that gains a smaller share of the time is the last [-]
+    linear : TOPP3-LP
     """
 
     passes: int = 10
     tol: float = 1e-5
+    linear: bool = False
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
         """One piece, from rest to rest. The jerk is the mean of each interval, the durations are copp's."""
         package = copp()
         if package is None:
             raise ModuleNotFoundError(INSTALL)
+        solver = package.solver.topp3_lp if self.linear else package.solver.topp3_socp
         began = time.perf_counter()
         length = float(np.diff(problem.s).mean())
         second = Reachability().solve(problem).cycle_time / (len(problem) - 1)
@@ -62,8 +67,7 @@ class CoppSocp:
             constraints = _constraints(package, problem, length, second)
             around = {"a_linearization": _second_order(package, constraints, len(problem))}
             for _ in range(self.passes):
-                linearised = package.solver.topp3_socp.Problem(constraints, **around)
-                found = package.solver.topp3_socp.solve_expert(linearised)
+                found = solver.solve_expert(solver.Problem(constraints, **around))
                 iterations += found.iterations
                 if found.profile is None:
                     sentence = f"Clarabel ended with {found.solver_status}"

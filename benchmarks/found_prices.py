@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 import planner
-from benchmarks import never_slower, problems
+from benchmarks import problems, random_lines
 from benchmarks.prices import BRACKET, time_of
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.job.plan import Plan
@@ -42,7 +42,7 @@ RATIOS = 0.98, 1.02, 1.1
 WORTH = 3e-4  # by how much a limit's 2 % have to change the time to be planned again [share of the time]
 RIGHT, NOISE = 0.1, 2e-4  # how far a forecast may be off, as a share of what was found, and of the time [-]
 CORNERS = 2  # dearest ones
-RANDOM = 3  # job of never_slower.py
+RANDOM = 3  # job of random_lines.py
 METHOD = TubeMethod(starts=(OptimalMethod(effort="quick"),))
 
 
@@ -55,7 +55,7 @@ def jobs() -> dict[str, Callable[[], tuple[Program, Machine]]]:
         "pentagon, peers": lambda: (problems.pentagon(), peers),
         "zig-zag, peers": lambda: (problems.zigzag(), peers),
         "arcs, peers": lambda: (problems.arcs(), peers),
-        f"random {RANDOM}": lambda: never_slower.job(RANDOM),
+        f"random {RANDOM}": lambda: random_lines.job(RANDOM),
         "bracket, mill": lambda: (read_program(BRACKET, mill), mill),
     }
 

@@ -47,6 +47,7 @@ SOLVERS: dict[str, FeedrateSolver] = {
     "convex": SequentialConvex(),
     "copp": copp_solver.CoppSocp(),
     "copp, 1 pass": copp_solver.CoppSocp(passes=1),
+    "copp, LP": copp_solver.CoppSocp(linear=True),
 }
 CONSTANT_JERK = ("own", REFERENCE, "fatrop")  # on every interval; `constraint_ratios` reads these
 QUICK = ("own", "copp", "copp, 1 pass")  # fast enough to be timed several times

@@ -4,7 +4,7 @@
 
 The named jobs are those of issue trackers and papers that the other benchmarks use: pentagon, zig-zag, circle and star spiral of
 problems.py on the built-in `mill` and on the machine of problems.py, the bracket, and windows of real programs of ../shared where
-these are there. `--random N`: the jobs 0 to N-1 of never_slower.py.
+these are there. `--random N`: the jobs 0 to N-1 of random_lines.py.
 
 Results: benchmarks/results/joint.json and .md, as far as they have come.
 """
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import planner
-from benchmarks import never_slower, problems
+from benchmarks import problems, random_lines
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.errors import PlannerError
 from planner.base.names import NORMAL
@@ -133,7 +133,7 @@ def main() -> None:
         print(name, rows[name], flush=True)
         write_results("joint", {"jobs": rows}, _table(rows))
     for seed in range(asked.random):
-        program, machine = never_slower.job(seed)
+        program, machine = random_lines.job(seed)
         rows[f"random {seed}"] = measured(program, machine)
         write_results("joint", {"jobs": rows}, _table(rows))
 

@@ -2,7 +2,7 @@
 
     python -m benchmarks.joint_campaign [--jobs 250] [--first 0] [--processes 2]     into results/joint-campaign.json and .md
 
-The random programs of never_slower.py on the built-in `mill` and on the machine of problems.py; every program on both. Compared are
+The random programs of random_lines.py on the built-in `mill` and on the machine of problems.py; every program on both. Compared are
 `optimal` with the rounds of reshaping that effort `normal` has and no search, and `optimal` as it is by default. Jobs that the results
 hold already are not made again.
 """
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import planner
-from benchmarks import never_slower, problems
+from benchmarks import problems, random_lines
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
@@ -62,7 +62,7 @@ def made(seed: int, name: str) -> dict[str, Any]:
     """One job with and without the search."""
     os.nice(max(NICE - os.nice(0), 0))
     use_threads(1)
-    program, _ = never_slower.job(seed)
+    program, _ = random_lines.job(seed)
     machine, found, trace = machines()[name], counted(), Trace()
     row: dict[str, Any] = {"seed": seed, "machine": name, "blocks": len(program.kind)}
     try:

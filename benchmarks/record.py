@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 RESULTS = Path(__file__).parent / "results"
-PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "copp-py")
+PACKAGES = ("numpy", "scipy", "numba", "casadi", "toppra", "ruckig", "copp-py", "clarabel")
 
 
 def provenance() -> dict[str, Any]:

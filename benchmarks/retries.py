@@ -4,7 +4,7 @@
     python -m benchmarks.retries --traces FILE --without NAME [--seconds 60]    the jobs on which NAME fired once more, without it
     python -m benchmarks.retries --traces FILE --report                         into results/ablation-retries.json and .md
 
-The random jobs of benchmarks/never_slower.py, some of the first ones also behind filters (`FILTERED`) and shaped (`SHAPED`), and the
+The random jobs of benchmarks/random_lines.py, some of the first ones also behind filters (`FILTERED`) and shaped (`SHAPED`), and the
 programs of ../shared/nc up to `NC_BYTES` with effort "quick", are planned by `optimal` on one thread with `ROUNDS` rounds of reshaping.
 Counts come from the trace (planner/job/trace.py) and from counters (retry_counts.py). A retry whose effect the trace does not tell is
 switched off (`SWITCHES`) on jobs where it fired, and cycle times are compared.
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import never_slower
+from benchmarks import random_lines
 from benchmarks.record import markdown, write_results
 from benchmarks.retry_counts import count_steps, counts, watch
 from benchmarks.tries import add_row, programs, read_rows, summed
@@ -55,7 +55,7 @@ def cases(jobs: int) -> Iterator[Case]:
         if seed == FILTERED_JOBS:
             for name, program, machine in programs(NC_BYTES):
                 yield name, program, machine, OptimalMethod(effort="quick")
-        program, machine = never_slower.job(seed)
+        program, machine = random_lines.job(seed)
         yield f"random {seed}", program, machine, usual
         if seed < FILTERED_JOBS and seed % FILTERED == 0:
             delay = np.median([axis.acceleration / axis.jerk for axis in machine.axes.values()])

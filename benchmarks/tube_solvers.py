@@ -2,7 +2,7 @@
 
     python -m benchmarks.tube_solvers [--jobs 50] [--fatrop]     into results/tube-solvers.json and .md
 
-The random programs of never_slower.py, lines and arcs, on the built-in `mill` and on the machine of problems.py, where no normal
+The random programs of random_lines.py, lines and arcs, on the built-in `mill` and on the machine of problems.py, where no normal
 acceleration is limited (the solvers hold it between its places in different ways), with one run between full stops and at most `STEPS`
 steps; single corners, pentagons and arcs before them. The start is the motion on the first splines. ipopt begins there, and once more
 where the own solver ended: what it still finds there is what the own solver left. The own solver
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import planner
-from benchmarks import never_slower, problems
+from benchmarks import problems, random_lines
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.arrays import FloatArray
 from planner.geometry.build import toolpath_from_program
@@ -93,7 +93,7 @@ def jobs() -> Iterator[tuple[str, Program, Machine]]:
     seed = 0
     while True:
         for name, machine in (("mill", mill), ("peers", peers)):
-            yield f"random {seed}, {name}", never_slower.job(seed)[0], machine
+            yield f"random {seed}, {name}", random_lines.job(seed)[0], machine
         seed += 1
 
 

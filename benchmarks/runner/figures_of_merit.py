@@ -6,6 +6,7 @@ A motion counts where it passed its verdict with every quantity limited (`Row.co
                     without such a motion counts as not reached, a job that no way solves is left out
     trade           geometric means, over the jobs that a way and the reference both solve: cycle time over the best, and processor time
                     over that of the reference
+    beaten          by how much the reference is slower than a way, where both have a motion that counts
     slope           exponent p of processor time = c blocks^p, by least squares of the logarithms
 """
 
@@ -21,6 +22,7 @@ from benchmarks.growth import fitted_slope
 from benchmarks.runner.rows import MODEL, SKIPPED, Row
 
 REFERENCE = "optimal"
+ALLOWED = 1e-4  # share of the cycle time by which the reference may be slower: what grids leave [-]
 FEWEST = 3  # sizes from which a slope is told
 
 
@@ -109,6 +111,20 @@ def trades(jobs: dict[str, dict[str, Row]], reference: str = REFERENCE) -> list[
         )
         for way, mean in means.items()
     ]
+
+
+def beaten(jobs: dict[str, dict[str, Row]], reference: str = REFERENCE) -> dict[str, dict[str, float]]:
+    """For each way with motions that count, the reference's cycle time over its own, less 1, by job; inf where the reference has no
+    motion that counts."""
+    found: dict[str, dict[str, float]] = {}
+    for job, of_job in jobs.items():
+        base = of_job.get(reference)
+        for way, row in of_job.items():
+            if base is None or way == reference or not row.comparable or not row.cycle_s:
+                continue
+            counts = base.comparable and base.cycle_s
+            found.setdefault(way, {})[job] = base.cycle_s / row.cycle_s - 1.0 if counts else math.inf
+    return found
 
 
 def growth(jobs: dict[str, dict[str, Row]]) -> dict[str, tuple[list[int], list[float], float]]:

@@ -4,12 +4,14 @@ warm-up       two small jobs by the same way load kernels and packages
 repeats       at most `repeats` calls, no further one after `ENOUGH` processor seconds
 processor     seconds of this process and of children it has waited for (getrusage), the least of the repeats
 quiet         a fixed loop before and after the calls, over the fastest one that this process has seen
-limit         processor seconds of a single call; a call above it is ended (SIGXCPU) and its row says so
+limit         processor seconds of a single call; a call above it is ended (SIGPROF) and its row says so. Compiled code that does not
+              come back for `NATIVE` times the limit ends with its process (SIGXCPU)
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
 import resource
 import signal
 import time
@@ -43,6 +45,7 @@ from planner.verify import Verdict
 REPEATS, ENOUGH = 3, 2.0  # calls, and the processor seconds after which none follows [s]
 LOOP = 60_000  # turns of the calibration loop: some 5 ms
 LOOPS = 5  # of which the fastest counts on either side of a measure
+NATIVE = 1.5  # of the limit after which the process is ended [-]
 FIRST_LOOPS = 40  # at the start, to know what a quiet core does
 
 
@@ -130,13 +133,20 @@ def _limited(way: Way, job: Job, blank: Row, limit: float | None) -> Row:
     if limit is None:
         return outcome(way, job, blank)
     was = signal.signal(signal.SIGPROF, _stop)
+    soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    last = math.ceil(own.ru_utime + own.ru_stime + NATIVE * limit) + 1  # whole seconds
+    resource.setrlimit(resource.RLIMIT_CPU, (last, hard))
     signal.setitimer(signal.ITIMER_PROF, limit, 1.0)
     try:
-        return outcome(way, job, blank)
-    except OverTheLimit:  # between the call and the timer's end
+        try:
+            return outcome(way, job, blank)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+    except OverTheLimit:  # from within the call, or on its way to the timer's end
         return dataclasses.replace(blank, status=OVER_LIMIT, message=f"more than {limit:g} CPU s")
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
         signal.signal(signal.SIGPROF, was)
 
 

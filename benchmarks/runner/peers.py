@@ -2,7 +2,8 @@
 
     toppra              second-order feed on the planner's own geometry, by the package toppra; jerk is not limited
     sequential-convex   jerk-limited feed on the planner's splines, by convex problems and ipopt
-    copp                the same by the package copp (copp-py), brought onto constant jerks as the one before
+    copp, copp-lp       the same by the package copp (copp-py), TOPP3-SOCP and TOPP3-LP, passes until nothing is gained, brought
+                        onto constant jerks as the one before; copp:quick and so on: on the grid of that effort, with fewer points
     ruckig              every line from rest to rest by the package ruckig, phase-synchronised, so that the motion stays on the line.
                         Its open version has no waypoints of its own (it sends them to a server): it cannot do better here
     ipopt, fatrop       geometry and feed together (method tube), by casadi's solvers on a whole run
@@ -24,15 +25,18 @@ import planner
 from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
+from planner.base.names import NORMAL
 from planner.control_files import models
 from planner.control_files.chords import Polyline, programmed_polyline
 from planner.control_files.for_linuxcnc import standing
 from planner.control_files.linuxcnc_model import linuxcnc_time
+from planner.feedrate.solvers import ThirdOrderSolver
 from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Kind, Program
 
+SEQUENTIAL_CONVEX, COPP, COPP_LP = ALONG_SPLINES = ("sequential-convex", "copp", "copp-lp")
 CHORDS = (
     0.1  # of the tolerance: how far the chords of arcs may be from them where a model takes lines only [-]
 )
@@ -43,20 +47,25 @@ def toppra(program: Program, machine: Machine, tolerance: float | None) -> Plan:
     return planner.plan(program, machine, tolerance=tolerance, method="second-order", solver="toppra")
 
 
-def sequential_convex(program: Program, machine: Machine, tolerance: float | None) -> Plan:
-    """The first splines, and sequential convex problems along them."""
-    method = OptimalMethod(corner="spline", rounds=0, solver="sequential-convex")
-    return method.plan(program, machine, tolerance)
+def along_splines(solver: str) -> Callable[[Program, Machine, float | None], Plan]:
+    """The first splines, and the feed along them by "sequential-convex", "copp" or "copp-lp", each with ":EFFORT" for another grid than
+    the usual one. The two of copp raise NotHere without the package."""
+    name, _, effort = solver.partition(":")
+
+    def planned(program: Program, machine: Machine, tolerance: float | None) -> Plan:
+        own = name if name == SEQUENTIAL_CONVEX else _copp(linear=name == COPP_LP)
+        method = OptimalMethod(corner="spline", rounds=0, solver=own, effort=effort or NORMAL)
+        return method.plan(program, machine, tolerance)
+
+    return planned
 
 
-def copp(program: Program, machine: Machine, tolerance: float | None) -> Plan:
-    """The first splines, and copp along them. Raises NotHere without the package."""
+def _copp(*, linear: bool) -> ThirdOrderSolver:
     from benchmarks import copp_solver
 
     if copp_solver.copp() is None:
         raise NotHere("copp-py is not installed (pip install '.[bench]')")
-    method = OptimalMethod(corner="spline", rounds=0, solver=copp_solver.CoppMotion())
-    return method.plan(program, machine, tolerance)
+    return copp_solver.CoppMotion(solver=copp_solver.CoppSocp(linear=linear))
 
 
 def tube_by(solver: str) -> Callable[[Program, Machine, float | None], Plan]:

@@ -6,10 +6,22 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from benchmarks.record import markdown
-from benchmarks.runner import figures
+from benchmarks.runner import figures, grid_report
 from benchmarks.runner.ages import write_stale
-from benchmarks.runner.figures_of_merit import best_times, by_job, growth, profile, ratios, trades
+from benchmarks.runner.figures_of_merit import (
+    ALLOWED,
+    REFERENCE,
+    beaten,
+    best_times,
+    by_job,
+    growth,
+    profile,
+    ratios,
+    trades,
+)
 from benchmarks.runner.rows import (
     MODEL,
     NOT_APPLICABLE,
@@ -53,9 +65,12 @@ def report_of(name: str, results: Results, pictures: Iterable[Path] = ()) -> str
     jobs = by_job(rows)
     ways = list(dict.fromkeys(row.way for row in rows if row.status != SKIPPED))
     parts = [_head(results), f"# Suite {name}: {SUITES[name].says}", _outcomes(rows)]
+    parts += grid_report.tables(jobs)
     parts += ["## Cycle time [s]", CYCLE_NOTE, _cycle_times(jobs, ways)]
     if shares := ratios(jobs):
         parts += ["## Share of the jobs within a factor of the best motion", PROFILE_NOTE, _profiles(shares)]
+    if against := beaten(jobs):
+        parts += [f"## Is `{REFERENCE}` ever slower?", BEATEN_NOTE, _beaten(against)]
     if found := trades(jobs):
         table = [
             [
@@ -97,6 +112,10 @@ CYCLE_NOTE = (
 )
 PROFILE_NOTE = (
     "A job counts as not reached where the way has no motion that passed with every quantity limited."
+)
+BEATEN_NOTE = (
+    "On the jobs on which a way has a motion that passed with every quantity limited. Only differences above "
+    f"{ALLOWED:g} of the time count as slower, and having no such motion."
 )
 TRADE_NOTE = (
     "Geometric means over the jobs that the way and `optimal` solve. On the front are ways that limit all and solve all of these jobs, "
@@ -166,6 +185,19 @@ def _profiles(shares: dict[str, object]) -> str:
         [way, *(f"{100.0 * profile(of_way, tau):.0f} %" for tau in FACTORS)] for way, of_way in shares.items()
     ]
     return markdown(["way", *(f"{tau:g}" for tau in FACTORS)], table)
+
+
+def _beaten(against: dict[str, dict[str, float]]) -> str:
+    table = []
+    for way, of_way in against.items():
+        by = np.array(list(of_way.values()))
+        slower = sorted((job for job in of_way if of_way[job] > ALLOWED), key=lambda job: -of_way[job])
+        told = ", ".join(
+            f"{job} ({f'{of_way[job]:.1e}' if of_way[job] < math.inf else 'has none'})"
+            for job in slower[:SHOWN]
+        )
+        table.append([way, str(len(by)), str(len(slower)), f"{np.median(-by):.1%}", told])
+    return markdown(["way", "jobs", "optimal is slower on", "shorter by, median", "by"], table)
 
 
 def _cpu_times(jobs: dict[str, dict[str, Row]], ways: list[str]) -> str:

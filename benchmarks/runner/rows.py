@@ -38,6 +38,7 @@ class Row:
     cpu_s     : processor seconds of one whole call, verification included: the least of `cpu_all`, children included [s]
     wall_s    : of the call with the least processor time [s]
     quiet     : the calibration loop beside the calls over the fastest one of the process [-]; above `NOISY` the core was busy
+    beside    : other ways that were measured at the same time (`run --processes`); the core then counts as busy
     blocks    : of the program
     points    : grid points of the problem that was solved
     excess    : largest ratio to a limit that is judged [-]
@@ -58,6 +59,7 @@ class Row:
     cpu_all: tuple[float, ...] = ()
     wall_s: float | None = None
     quiet: float | None = None
+    beside: int = 0
     blocks: int | None = None
     points: int | None = None
     excess: float | None = None
@@ -78,7 +80,7 @@ class Row:
     @property
     def noisy(self) -> bool:
         """Whether the core was busy beside the measure."""
-        return self.quiet is not None and self.quiet > NOISY
+        return self.beside > 0 or (self.quiet is not None and self.quiet > NOISY)
 
 
 _FIELDS = {one.name: one for one in dataclasses.fields(Row)}

@@ -8,18 +8,23 @@ import fnmatch
 import json
 import math
 import selectors
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import IO
+
+from joblib import Parallel, delayed
 
 from benchmarks.record import RESULTS, provenance
 from benchmarks.runner import rows
 from benchmarks.runner.measure import REPEATS
-from benchmarks.runner.rows import ERROR, OVER_LIMIT, Row, line_of
+from benchmarks.runner.rows import ERROR, METHOD, OVER_LIMIT, Row, line_of
 from benchmarks.runner.suites import ROOT, SUITES, Job
 from benchmarks.runner.ways import MODELS, PEERS, way_of
 from benchmarks.runner.worker import READY
@@ -43,6 +48,7 @@ class Request:
     repeats : of one pair at most
     only    : patterns of job names; empty for all
     count   : jobs of each suite, the first ones; None for all
+    processes : ways that are measured at the same time; above 1 all times are marked as not quiet
     resume  : leave pairs alone that the file has of this commit
     folder  : where files of rows are
     """
@@ -54,6 +60,7 @@ class Request:
     repeats: int = REPEATS
     only: tuple[str, ...] = ()
     count: int | None = None
+    processes: int = 1
     resume: bool = False
     folder: Path = FOLDER
 
@@ -65,17 +72,18 @@ class Request:
         for way in (*(self.methods or ()), *(self.peers or ())):
             if way not in (NONE, ALL):
                 way_of(way)
-        if not (0.0 < self.limit < math.inf and self.repeats > 0 and (self.count is None or self.count > 0)):
-            raise InputError(
-                f"limit {self.limit:g}, repeats {self.repeats}, count {self.count}; each must be above 0"
-            )
+        numbers = {"repeats": self.repeats, "processes": self.processes, "count": self.count}
+        if not 0.0 < self.limit < math.inf or any(one is not None and one <= 0 for one in numbers.values()):
+            said = ", ".join(f"{name} {one}" for name, one in numbers.items())
+            raise InputError(f"limit {self.limit:g}, {said}; each must be above 0")
 
     def ways(self, suite: str) -> list[str]:
         """Names of the ways of a suite."""
         usual = SUITES[suite].ways
         others = (*PEERS, *MODELS)
-        methods = _chosen(self.methods, tuple(way for way in usual if way not in others), usual)
-        return [*methods, *_chosen(self.peers, tuple(way for way in usual if way in others), others)]
+        own = tuple(way for way in usual if way_of(way).kind == METHOD)
+        foreign = tuple(way for way in usual if way_of(way).kind != METHOD)
+        return [*_chosen(self.methods, own, usual), *_chosen(self.peers, foreign, others)]
 
     def jobs(self, suite: str) -> list[Job]:
         """Jobs of a suite."""
@@ -111,10 +119,7 @@ def run(request: Request) -> dict[str, list[Row]]:
             print(f"{suite}: nothing to do", flush=True)
             continue
         rows.append(file, [rows.about_line(about | {"planner": commit})])
-        for row in _measured(request, suite, pairs, commit):
-            rows.append(file, [line_of(row)])
-            made[suite].append(row)
-            print(_told(row), flush=True)
+        made[suite] = _measured(request, suite, pairs, commit, partial(_kept, file))
         rows.compact(file, {job.name for job in SUITES[suite].jobs()})
     return made
 
@@ -126,20 +131,43 @@ def _pairs(request: Request, suite: str, done: set[rows.Key]) -> dict[str, list[
     return {way: jobs for way, jobs in pairs.items() if jobs}
 
 
-def _measured(request: Request, suite: str, pairs: dict[str, list[str]], commit: str) -> Iterator[Row]:
-    for way, jobs in pairs.items():
-        worker: Worker | None = None
-        for job in jobs:
-            worker = worker or Worker(way)
-            asked = {
-                "suite": suite, "job": job, "repeats": request.repeats, "limit": request.limit, "commit": commit,
-            }  # fmt: skip
-            row = worker.answer(asked, PATIENCE * request.limit + START)
-            if not worker.alive:
-                worker = None
-            yield row
-        if worker is not None:
-            worker.close()
+def _kept(file: Path, row: Row) -> None:
+    """Append a row to the file, and tell of it."""
+    rows.append(file, [line_of(row)])
+    print(_told(row), flush=True)
+
+
+def _measured(
+    request: Request, suite: str, pairs: dict[str, list[str]], commit: str, keep: Callable[[Row], None]
+) -> list[Row]:
+    """The rows of pairs, each kept as soon as it is measured; so many ways at a time as there may be processes."""
+    made: list[Row] = []
+    one_at_a_time = Lock()
+
+    def serve(way: str, jobs: list[str]) -> None:
+        for row in _of_way(request, suite, way, jobs, commit):
+            with one_at_a_time:
+                keep(row)
+                made.append(row)
+
+    # threads that wait for the ways' processes
+    Parallel(n_jobs=request.processes, backend="threading")(delayed(serve)(*one) for one in pairs.items())
+    return made
+
+
+def _of_way(request: Request, suite: str, way: str, jobs: list[str], commit: str) -> Iterator[Row]:
+    worker: Worker | None = None
+    for job in jobs:
+        worker = worker or Worker(way)
+        asked = {
+            "suite": suite, "job": job, "repeats": request.repeats, "limit": request.limit, "commit": commit,
+        }  # fmt: skip
+        row = worker.answer(asked, PATIENCE * request.limit + START)
+        if not worker.alive:
+            worker = None
+        yield dataclasses.replace(row, beside=request.processes - 1)
+    if worker is not None:
+        worker.close()
 
 
 class Worker:
@@ -166,10 +194,15 @@ class Worker:
         if line:
             return rows.row_of_line(json.loads(line), "worker")
         self.close()
+        spent = self._process.returncode == -signal.SIGXCPU
         blank = Row(
             suite=str(asked["suite"]), job=str(asked["job"]), way=self.way.name, kind=self.way.kind,
-            status=OVER_LIMIT if line is None else ERROR, commit=str(asked["commit"]),
+            status=OVER_LIMIT if line is None or spent else ERROR, commit=str(asked["commit"]),
         )  # fmt: skip
+        if spent:
+            return dataclasses.replace(
+                blank, message=f"more than {asked['limit']:g} CPU s in a call that did not come back"
+            )
         late, died = f"no answer within {patience:g} s", f"the process died: {self._words}"
         return dataclasses.replace(blank, message=late if line is None else died)
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import axes_campaign, five_axis, growth, long_jobs, never_slower, planned_ngc, problems
+from benchmarks import axes_campaign, five_axis, growth, long_jobs, planned_ngc, problems, random_lines
 from benchmarks.corner_shapes import corner
 from benchmarks.random_paths import COPP_LIMITS, CURVES, copp_spline
-from benchmarks.runner import nasty
+from benchmarks.runner import grids, nasty
 from planner.base.names import METHODS
 from planner.geometry.nurbs import Nurbs
 from planner.kinematics import at_tip
@@ -28,34 +28,18 @@ from planner.nc.reader import read_program
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))
 CORNER_ANGLES = (
-    1,
-    2,
-    5,
-    10,
-    20,
-    30,
-    45,
-    60,
-    75,
-    90,
-    105,
-    120,
-    135,
-    150,
-    160,
-    170,
-    174,
-    176,
-    178,
-    179,
-)  # [deg]
+    1, 2, 5, 10, 20, 30, 45, 60, 75, 90, 105, 120, 135, 150, 160, 170, 174, 176, 178, 179,
+)  # [deg]  # fmt: skip
 CURVE_TOLERANCES = (0.005, 0.02, 0.1)  # [mm]
 CURVE_CHORDS = 0.1  # of the tolerance: what the chords of a curve may leave it by [-]
 RELIEFS = (1_000, 3_000, 10_000, 30_000, 100_000)  # blocks
-RANDOM_JOBS = 40
+RANDOM_JOBS = 100
 AXES_JOBS, AXES, COPP_JOBS = 10, 7, 2
 COPP_SCALE = 100.0  # [mm] and [deg] for a unit of the splines that the authors of copp test with
 S_POINTS = (161, 321)  # tips of the five-axis piece
+GRID_JOBS = (
+    "pentagon", "lines and arcs", "circle", "relief", "stops", "seed 3", "90 degrees", "trident 20 um",
+)  # fmt: skip
 PAPER_JERK = (
     2000 / 0.03
 )  # papers 000, 001 and 003: filters of 50 and 30 ms at 100 mm/s and 2000 mm/s2 [mm/s3]
@@ -95,19 +79,22 @@ class Suite:
 
 MODELS = ("linuxcnc (model)", "grbl (model)", "klipper (model)")
 QUICK_WAYS = ("optimal", "optimal:quick", "second-order", "kinematic", "fir", "bezier", "stop")
+COPP_WAYS = ("copp", "copp:quick", "copp-lp:quick")
 SMALL = (
     *METHODS,
     "optimal:quick",
     "optimal:best",
     "toppra",
     "sequential-convex",
-    "copp",
+    *COPP_WAYS,
     "ruckig",
     "linuxcnc",
     "ipopt",
+    "fatrop",
     *MODELS,
 )
-USUAL = (*QUICK_WAYS, "toppra", "copp", "ruckig", "linuxcnc", *MODELS)
+USUAL = (*QUICK_WAYS, "toppra", "copp", "copp:quick", "ruckig", "linuxcnc", *MODELS)
+RANDOM_RIVALS = ("stop", "kinematic", "optimal/bezier", "optimal/fir", "optimal/kinematic")
 LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "linuxcnc", "kinematic", "stop", *MODELS)
 
 
@@ -253,12 +240,12 @@ def _s_piece(points: int, machine: Machine) -> Program:
 
 
 def random() -> list[Job]:
-    """The first random jobs of never_slower.py, each on a machine of its own."""
+    """The first random jobs of random_lines.py, each on a machine of its own."""
     return [
         Job(
             name=f"seed {seed}",
-            program=made(lambda seed=seed: never_slower.job(seed)[0]),
-            machine=lambda seed=seed: never_slower.job(seed)[1],
+            program=made(lambda seed=seed: random_lines.job(seed)[0]),
+            machine=lambda seed=seed: random_lines.job(seed)[1],
         )
         for seed in range(RANDOM_JOBS)
     ]
@@ -310,6 +297,15 @@ def quick() -> list[Job]:
     ]
 
 
+def on_grids() -> list[Job]:
+    """Jobs of other suites that are small on every grid."""
+    return [
+        *(one for one in quick() if one.name in GRID_JOBS),
+        *(one for one in corners() if one.name in GRID_JOBS),
+        *(one for one in curves() if one.name in GRID_JOBS),
+    ]
+
+
 SUITES: dict[str, Suite] = {
     "quick": Suite(says="small jobs of every kind; the guard of the test suite", jobs=quick, ways=QUICK_WAYS),
     "papers": Suite(says="the jobs of the four papers", jobs=papers, ways=SMALL),
@@ -319,14 +315,25 @@ SUITES: dict[str, Suite] = {
     "relief": Suite(
         says="a relief of 1,000 to 100,000 blocks: how planning grows", scales=True, jobs=relief, ways=LARGE
     ),
-    "axes7": Suite(says="random jobs in seven axes", jobs=axes7, ways=QUICK_WAYS),
+    "axes7": Suite(
+        says="random jobs in seven axes",
+        jobs=axes7,
+        ways=(*QUICK_WAYS, "toppra", *COPP_WAYS[1:]),
+    ),
     "five-axis": Suite(
         says="an S-shaped piece on a tilting rotary table",
         jobs=five_axes,
-        ways=("optimal", "second-order", "toppra", "copp"),
+        ways=("optimal", "optimal:quick", "second-order", "toppra", "copp:quick"),
+    ),
+    "grids": Suite(
+        says="the same motions on coarser and finer grids",
+        jobs=on_grids,
+        ways=tuple(grids.WAYS),
     ),
     "nasty": Suite(says="what has broken planners before", jobs=difficult, ways=USUAL),
-    "random": Suite(says="random lines and arcs on random machines", jobs=random, ways=USUAL),
+    "random": Suite(
+        says="random lines and arcs on random machines", jobs=random, ways=(*USUAL, *RANDOM_RIVALS[2:])
+    ),
     "programs": Suite(
         says="real programs of ../shared/nc", scales=True, jobs=programs, ways=LARGE, absent=_no_programs
     ),

@@ -1,7 +1,9 @@
 """Ways to plan a job, by their names.
 
 METHOD[/CORNER][:EFFORT]    a method of the planner: optimal, optimal:quick, optimal/bezier, second-order/spline, kinematic, ...
-a name of `PEERS`           another solver (peers.py); its motion is judged as the planner's are
+a name of `PEERS`           another solver (peers.py); its motion is judged as the planner's are. Those along the planner's splines
+                            (sequential-convex, copp, copp-lp) take :EFFORT too, for its grid
+a name of `grids.WAYS`      method optimal on a grid of its own (grids.py)
 a name of `MODELS`          a model of a control's planner: a time, no motion
 """
 
@@ -11,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import planner
-from benchmarks.runner import linuxcnc, peers
+from benchmarks.runner import grids, linuxcnc, peers
 from benchmarks.runner.judged import Judged
 from benchmarks.runner.rows import METHOD, MODEL, PEER
 from planner.base.errors import InputError
@@ -38,8 +40,7 @@ class Way:
 
 PEERS: dict[str, Callable[[Program, Machine, float | None], Made]] = {
     "toppra": peers.toppra,
-    "sequential-convex": peers.sequential_convex,
-    "copp": peers.copp,
+    **{name: peers.along_splines(name) for name in peers.ALONG_SPLINES},
     "ruckig": peers.ruckig,
     "linuxcnc": linuxcnc.linuxcnc,
     "ipopt": peers.tube_by("ipopt"),
@@ -54,13 +55,17 @@ def way_of(name: str) -> Way:
         return Way(name=name, kind=PEER, plan=PEERS[name])
     if name in MODELS:
         return Way(name=name, kind=MODEL, plan=MODELS[name])
+    if name in grids.WAYS:
+        return Way(name=name, kind=METHOD, plan=grids.WAYS[name])
     left, _, effort = name.partition(":")
     method, _, corner = left.partition("/")
     known_name("method, peer or model", method, (*METHODS, *PEERS, *MODELS))
-    if corner:
-        known_name("corner", corner, SMOOTHINGS)
     if effort:
         known_name("effort", effort, EFFORTS)
+    if effort and left in peers.ALONG_SPLINES:
+        return Way(name=name, kind=PEER, plan=peers.along_splines(name))
+    if corner:
+        known_name("corner", corner, SMOOTHINGS)
     if (corner or effort) and method not in users_of("effort"):
         raise InputError(
             f"{name}: method {method} has no corner and no effort; {', '.join(users_of('effort'))} have"

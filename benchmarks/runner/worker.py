@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import sys
 
 from benchmarks.runner.measure import Calibration, Protocol, measured, warm_up
@@ -26,6 +27,7 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     use_threads(1)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a process that its limit ends leaves no image
     way = way_of(sys.argv[1])
     warm_up(way)
     calibration = Calibration()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from results_rows import keyed, row
 
-from benchmarks.runner.figures_of_merit import best_times, by_job, growth, profile, ratios, trades
+from benchmarks.runner.figures_of_merit import beaten, best_times, by_job, growth, profile, ratios, trades
 from benchmarks.runner.report import report_of, write_reports
 from benchmarks.runner.rows import MODEL, NOT_APPLICABLE, SKIPPED, Results, about_line, append, line_of
 from planner.base.errors import InputError
@@ -62,6 +62,12 @@ def test_a_way_that_is_beaten_in_both_is_not_on_the_front() -> None:
     }
 
 
+def test_where_the_reference_is_slower_than_others() -> None:
+    found = beaten(by_job((*ROWS, row("d", "stop", cycle_s=1.0), row("d", "optimal", verdict="failed"))))
+    assert found.keys() == {"stop"}  # the others do not limit the jerk, fail, or are models
+    assert found["stop"] == {"a": pytest.approx(-1 / 3), "b": pytest.approx(0.1), "d": np.inf}
+
+
 def test_slopes_are_those_of_power_laws() -> None:
     rows = [row(f"{n}", "optimal", blocks=n, cpu_s=3e-4 * n**1.2) for n in (3000, 1000, 10_000)]
     sizes, _, slope = growth(by_job(rows))["optimal"]
@@ -78,6 +84,7 @@ def test_a_report_is_made_of_the_rows() -> None:
     assert lines[0].startswith("Made by `c` at d on e")
     (of_b,) = (line for line in lines if line.startswith("| b |") and "2.2" in line)
     assert of_b.split(" | ")[1:5] == ["2.2", "**2**", "", "0.1*"]
+    assert "| stop | 2 | 1 | 11.7% | b (1.0e-01) |" in lines
     assert "* wrong, b: verdict failed: jerk.x is exceeded" in lines
     assert "* stop, c: not applicable: no arcs here" in lines
 

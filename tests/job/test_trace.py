@@ -10,7 +10,7 @@ import pytest
 from hand_made import SQUARE
 from typer.testing import CliRunner
 
-from benchmarks.never_slower import job
+from benchmarks.random_lines import job
 from planner.cli import app
 from planner.job.trace import Step, Trace
 from planner.methods.optimal import OptimalMethod

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from quick import slow_but
 
-from benchmarks.never_slower import compared, job, slower
+from benchmarks.random_lines import job
+from benchmarks.runner.figures_of_merit import ALLOWED, beaten
+from benchmarks.runner.measure import outcome
+from benchmarks.runner.rows import ERROR, METHOD, Row
+from benchmarks.runner.suites import RANDOM_RIVALS, Job
+from benchmarks.runner.ways import way_of
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import Status
 from planner.methods.optimal import OptimalMethod
@@ -22,9 +27,16 @@ from planner.optimal.order import ThirdOrder
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", slow_but([3, 86], [3, 40, 70, 86, 97, 99, 167, 197]))
 def test_nothing_is_faster_than_optimal(seed):
-    row = compared(seed)
-    assert row["optimal"] is not None
-    assert not list(slower(row))
+    program, machine = job(seed)
+    one = Job(name="random", program=lambda machine: program, machine=lambda: machine)
+    rows = {
+        way: outcome(way_of(way), one, Row(suite="", job="", way=way, kind=METHOD, status=ERROR))
+        for way in ("optimal", *RANDOM_RIVALS)
+    }
+    assert rows["optimal"].comparable
+    against = beaten({"random": rows})
+    assert "stop" in against
+    assert [way for way, by in against.items() if by["random"] > ALLOWED] == []
 
 
 def test_the_plan_says_when_full_stops_take_its_place():

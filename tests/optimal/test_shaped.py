@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import never_slower, problems
+from benchmarks import problems, random_lines
 from planner.base.errors import InputError, NotSolvedError
 from planner.machine import Axis, Fir, Machine, Mode
 from planner.methods.registry import plan
@@ -87,7 +87,7 @@ def test_an_exact_stop_stands_still():
 
 def test_a_bow_between_samples_of_half_the_tolerance():
     """Seed 12: two lines at 2 ms and 5 um, where a chord bows by more than half of the tolerance."""
-    program, machine = never_slower.job(12)
+    program, machine = random_lines.job(12)
     machine = machine.model_copy(update={"modes": (Mode(frequency=25.0, damping=0.03),)})
     made = plan(program, machine, method="second-order", corner="bezier", shaped=True)
     assert made.verdict.passed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from starts import MACHINE, PROGRAMS, begun
 
-from benchmarks import never_slower, problems, tube_solvers
+from benchmarks import problems, random_lines, tube_solvers
 from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
 from planner.methods.optimal import OptimalMethod
@@ -215,7 +215,7 @@ def test_any_number_of_threads_finds_the_same_bytes(monkeypatch):
 
 def test_normal_acceleration_between_its_places_is_lowered_and_solved_again(monkeypatch):
     """Watched in the middle and at the nodes alone it is too large between them; what is taken then keeps it everywhere."""
-    program, machine = never_slower.job(40)
+    program, machine = random_lines.job(40)
     toolpath = toolpath_from_program(program, machine)
     (run,) = tube_runs_of(toolpath, machine)
     assert np.isfinite(run.across_max).any()

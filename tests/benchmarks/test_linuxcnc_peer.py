@@ -51,8 +51,8 @@ def test_the_pentagon_takes_the_time_that_linuxcnc_itself_takes() -> None:
 
 @needs_linuxcnc
 def test_feeds_that_differ_are_exceeded_where_linuxcnc_itself_exceeds_them() -> None:
-    """Where it blends a slow move with fast ones. In LinuxCNC 2.9 itself the program took 2,053 periods, and 28.1 times the slowest feed
-    where the planner alone has 27.8: the joints' interpolation is between them."""
+    """Where it blends a slow move with fast ones. In LinuxCNC 2.9 itself the program took 2,053 periods, and had 28.1 times the slowest
+    feed where the planner alone has 27.8: the joints' interpolation is between them."""
     program = parse_program("G1 X5 F60000\nY1 F30\nX0 F6000\nY0.8 F60\nX0.01 F6000\nX10\nM2\n")
     found = run(program)
     assert found.cycle_s == pytest.approx(2.053, abs=0.01)

@@ -1,13 +1,30 @@
-"""The summary of the campaign, from its tally alone: tables of sources, ways and laws, and how many jobs are not as they should be."""
+"""The summary of the campaign, from its tally alone: tables of sources, ways and laws, and the jobs that are not as they should be;
+and the paragraph of docs/benchmarks.md."""
 
 from __future__ import annotations
 
+import textwrap
 from collections import Counter
+from typing import Any
 
-from benchmarks.campaign_tally import OUTCOMES, PASSED, Tally
-from benchmarks.record import markdown, write_results
+from benchmarks.campaign_tally import (
+    CRASH,
+    DOCUMENTED,
+    FAILED,
+    OUTCOMES,
+    PASSED,
+    REFUSED,
+    TOO_LONG,
+    UNSOLVED,
+    Tally,
+)
+from benchmarks.record import ROOT, markdown, write_results
 
 REASONS = 40  # sentences at most
+WIDTH = 136  # characters of a line of the page
+WORDS = 200  # characters of what is said of a job
+PAGE = ROOT / "docs" / "benchmarks.md"
+BEGIN, END = "<!-- campaign: written by `python -m benchmarks campaign` -->\n\n", "\n<!-- end of campaign -->"
 
 
 def write_summary(tally: Tally) -> None:
@@ -30,8 +47,41 @@ def write_summary(tally: Tally) -> None:
     text += "Why jobs are refused or not solved (numbers left out):\n\n" + markdown(
         ["jobs", "sentence"], reasons
     )
-    text += f"\n{len(tally.wrong)} jobs are not as they should be; they are listed in campaign.json.\n"
+    text += f"\n{len(tally.wrong)} jobs are not as they should be. Those that did not take too long:\n\n"
+    text += markdown(["seed", "source", "way", "outcome", "what"], list(map(_wrong, _besides_long(tally))))
     write_results("campaign", tally.data(), text)
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    PAGE.write_text(f"{before}{BEGIN}{paragraph(tally)}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+
+
+def paragraph(tally: Tally) -> str:
+    """What the jobs came to, in words."""
+    of = tally.outcomes()
+    changed = sum(tally.laws.values()) + sum(bool(row.get("law")) for row in tally.wrong.values())
+    broken = sorted(row["law_broken"] for row in tally.wrong.values() if row.get("law_broken"))
+    worst = f", by {broken[0]:.1e} to {broken[-1]:.1e}" if broken else ""
+    second = sum(bool(row.get("second")) for row in tally.wrong.values() if row["outcome"] == PASSED)
+    second += sum(bool(row.get("law_second")) for row in tally.wrong.values())
+    text = (
+        f"{len(tally):,} jobs: {of[PASSED]:,} plans pass the verifier, {of[REFUSED]:,} programs are refused and {of[UNSOLVED]:,} not "
+        f"solved, with a reason, {of[DOCUMENTED]:,} plans fail as [methods](methods.md) says of their method (the papers' methods as "
+        f"they are, chords under G61), {of[TOO_LONG]:,} take more than their processor seconds, {of[FAILED]:,} fail, "
+        f"{of[CRASH]:,} crash. The second judge finds a fault in {second:,} of the plans that pass. Of {changed:,} changed jobs "
+        f"{len(broken):,} break their law{worst}."
+    )
+    return textwrap.fill(text, WIDTH, break_on_hyphens=False)
+
+
+def _besides_long(tally: Tally) -> list[dict[str, Any]]:
+    return [row for _, row in sorted(tally.wrong.items()) if row["outcome"] != TOO_LONG]
+
+
+def _wrong(row: dict[str, Any]) -> list[str]:
+    """A row of the table of what is not as it should be."""
+    said = [str(row.get(key)) for key in ("said", "second", "law_said", "law_second") if row.get(key)]
+    said += [f"{row['law']}: {row['law_broken']:.2e}"] if row.get("law_broken") else []
+    told = "; ".join(said).replace("|", "/")[:WORDS]
+    return [str(row["seed"]), row.get("source", "?"), row.get("way", "?"), row["outcome"], told]
 
 
 def _counts(tally: Tally, number: int) -> list[list[str]]:

@@ -3,8 +3,8 @@
     python -m benchmarks.fuzz [--minutes 10] [--kinds nc hpgl machine imports trajectory report] [--seconds 600]
 
 NC programs of all dialects, drawings (HPGL), machine files, settings of controls, trajectory files, and pages of plans, each read as
-the commands read them, in this process. Where it helps (results/fuzz-guidance.md) the inputs that reach a new way through the readers
-are kept and changed further (fuzz_coverage.py, fuzz_corpus.py). A finding is an exception, a warning of a library, a refusal without a
+the commands read them, in this process. Of a guided kind (fuzz_kinds.py) the inputs that reach a new way through the readers are kept
+and changed further (fuzz_coverage.py, fuzz_corpus.py). A finding is an exception, a warning of a library, a refusal without a
 sentence, a page in which a text of the input became an element or a script, or an input that takes longer than `SECONDS`.
 
 Runs add up: seeds go on where the last run of a kind ended, the kept inputs are in `--corpus`, and results/fuzz.json and .md are
@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 import traceback
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ SECONDS = 20  # of computing for one input
 SLOW = 2.0  # [s] inputs that take longer are not changed further: a tenth as many could be tried
 MEMORY = 6 << 30  # bytes of address space
 SHOWN = 25  # findings whose traceback is printed, of each kind
+TRACED = 10  # without guidance only one of so many inputs is traced, to know which lines were reached
 SAVED = 20.0  # [s] of computing between two writings
 GUIDED = 0.5  # of the inputs, how many are kept ones changed further
 SAME_OPTIONS = 0.5  # of those, how many are tried with the settings that the kept one was tried with
@@ -107,7 +109,7 @@ def run(name: str, given: argparse.Namespace, stop: _Stop) -> int:
             before = time.process_time()
             one = new_input(kind, seed, corpus if kind.guided else None, place)
             try:
-                with tracer.watching():
+                with tracer.watching() if kind.guided or seed % TRACED == 0 else nullcontext():
                     tally.ended(outcome(kind, one, place))
             except Finding as fault:
                 findings += 1
@@ -116,7 +118,7 @@ def run(name: str, given: argparse.Namespace, stop: _Stop) -> int:
                     print(f"---- {name} {seed}", flush=True)
                     traceback.print_exc(file=sys.stdout)
             now = time.process_time()
-            if tracer.new and now - before < SLOW:
+            if kind.guided and tracer.new and now - before < SLOW:
                 corpus.keep(one, seed)
             tally.took(now - before)
             if now > saved + SAVED:
@@ -186,7 +188,7 @@ def _quietly(kind: Kind, one: Input, place: Place) -> None:
     try:
         outcome(kind, one, place)
     except Finding as fault:
-        print(f"finding: {fault}"[:300], flush=True)
+        print(f"finding, options {one.options}: {fault}"[:300], flush=True)
 
 
 def main() -> None:

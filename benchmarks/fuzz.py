@@ -15,6 +15,7 @@ finding; its input is a file, which `--again FILE --kinds KIND` tries again. `--
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import resource
 import signal
 import sys
@@ -33,6 +34,7 @@ from benchmarks.fuzz_run import Finding, Kind, Place, command
 from benchmarks.fuzz_tally import Tally, write_guidance
 
 SECONDS = 20  # of computing for one input
+STUCK = 300.0  # [s] on the clock, after which the process is ended: a kernel is not interrupted by `SECONDS`
 SLOW = 2.0  # [s] inputs that take longer are not changed further: a tenth as many could be tried
 MEMORY = 6 << 30  # bytes of address space
 SHOWN = 25  # findings whose traceback is printed, of each kind
@@ -103,11 +105,14 @@ def run(name: str, given: argparse.Namespace, stop: _Stop) -> int:
         place = Place(Path(folder), command)
         corpus.load(lambda one: _tried_again(kind, one, place))
         tally = Tally(name, guided=kind.guided)
+        findings += _left_over(corpus, tally)
         began = saved = time.process_time()
         while not stop and time.process_time() < began + 60.0 * given.minutes:
             seed = tally.next_seed
             before = time.process_time()
             one = new_input(kind, seed, corpus if kind.guided else None, place)
+            current = write_input(corpus.folder / "current", one, seed)
+            faulthandler.dump_traceback_later(STUCK, exit=True)
             try:
                 with tracer.watching() if kind.guided or seed % TRACED == 0 else nullcontext():
                     tally.ended(outcome(kind, one, place))
@@ -117,6 +122,8 @@ def run(name: str, given: argparse.Namespace, stop: _Stop) -> int:
                 if findings <= SHOWN:
                     print(f"---- {name} {seed}", flush=True)
                     traceback.print_exc(file=sys.stdout)
+            faulthandler.cancel_dump_traceback_later()
+            current.unlink()
             now = time.process_time()
             if kind.guided and tracer.new and now - before < SLOW:
                 corpus.keep(one, seed)
@@ -124,9 +131,23 @@ def run(name: str, given: argparse.Namespace, stop: _Stop) -> int:
             if now > saved + SAVED:
                 saved = now
                 tally.save(corpus)
-        tally.save(corpus)
+        if tally.row["inputs"]:
+            tally.save(corpus)
     print(name, tally.row["inputs"], tally.row["found"], f"{findings} findings", flush=True)
     return findings
+
+
+def _left_over(corpus: Corpus, tally: Tally) -> int:
+    """An input that ended the process, as a kernel that is stuck does: a finding of this run, which goes on behind it."""
+    files = sorted((corpus.folder / "current").glob("*-*"))
+    for file in files:
+        one, seed = read_input(file), int(file.name.partition("-")[0])
+        tally.found(
+            "the process ended while it was tried", write_input(corpus.folder / "findings", one, seed)
+        )
+        tally.next_seed = max(tally.next_seed, seed + 1)
+        file.unlink()
+    return len(files)
 
 
 def _tried_again(kind: Kind, one: Input, place: Place) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks import fuzz, fuzz_tally
 from benchmarks.fuzz import new_input, outcome, run
-from benchmarks.fuzz_corpus import Corpus, Input
+from benchmarks.fuzz_corpus import Corpus, Input, write_input
 from benchmarks.fuzz_coverage import Tracer, count_lines
 from benchmarks.fuzz_kinds import KINDS
 from benchmarks.fuzz_pages import MARKER, Page, check_page
@@ -117,6 +117,17 @@ def test_a_finding_is_kept_with_its_input(letters: argparse.Namespace, tmp_path:
     file = letters.corpus / "letters" / "findings" / one["input"]
     with pytest.raises(Finding, match="AssertionError"):
         outcome(KINDS["letters"], fuzz.read_input(file), Place(tmp_path, command))
+
+
+def test_an_input_that_ended_the_process_is_a_finding_of_the_next_run(
+    letters: argparse.Namespace, tmp_path: Path
+) -> None:
+    write_input(letters.corpus / "letters" / "current", Input(b"a", 7), 7)
+    assert run("letters", letters, After(3)) > 0
+    row = json.loads((tmp_path / "fuzz.json").read_text())["kinds"]["letters"][0]
+    assert row["findings"]["the process ended while it was tried"]["times"] == 1
+    assert row["next_seed"] == 8 + 3
+    assert not list((letters.corpus / "letters" / "current").iterdir())
 
 
 def test_kept_inputs_are_tried_again_where_the_sources_changed(

@@ -47,9 +47,12 @@ ODD_VALUES: tuple[Any, ...] = (
 LINE_MAX = 20_000  # bytes: a longer line is not doubled
 
 
-def text_of(rng: np.random.Generator, corpus: Sequence[bytes], smallest: float = 1e-12) -> bytes:
-    """A text of the corpus with one to eight changes; numbers are scaled by `smallest` to 1e12."""
-    lines = corpus[int(rng.integers(len(corpus)))].split(b"\n")
+def text_of(
+    rng: np.random.Generator, corpus: Sequence[bytes], smallest: float = 1e-12, start: bytes | None = None
+) -> bytes:
+    """A text of the corpus, or `start`, with one to eight changes; numbers are scaled by `smallest` to 1e12."""
+    text = corpus[int(rng.integers(len(corpus)))] if start is None else start
+    lines = text.split(b"\n")
     for _ in range(int(rng.integers(1, 9))):
         k, other = (int(v) for v in rng.integers(0, len(lines), 2))
         change = int(rng.integers(0, 12))

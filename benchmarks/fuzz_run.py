@@ -1,12 +1,15 @@
-"""Commands of the planner run inside this process, and what counts as a finding."""
+"""Commands of the planner run inside this process, what counts as a finding, and what a kind of inputs is."""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 ENDS = (0, 1, 2, 3)  # done, verdict failed, bad input, not solved: the exit codes of a proper end
 SENTENCE_MAX = 2_000_000  # characters of one run's output: more is a flood
@@ -22,6 +25,30 @@ class Command(Protocol):
     def __call__(self, *words: str | Path) -> int:
         """Run it."""
         ...
+
+
+class Place(NamedTuple):
+    """Where inputs are tried: a folder of their own, and how commands are run."""
+
+    folder: Path
+    command: Command
+
+
+class Kind(NamedTuple):
+    """Inputs of a kind.
+
+    make    : (rng, start, place) -> an input: `start` changed further, or a new one where it is None
+    judge   : (input, rng, place) -> how it ended; the settings it is tried with come from rng. Raises for a finding
+    readers : files and folders of what reads it, below the project
+    guided  : whether inputs that reach something new are changed further (results/fuzz-guidance.md)
+    joined  : whether lines of one input can be put into another
+    """
+
+    make: Callable[[np.random.Generator, bytes | None, Place], bytes]
+    judge: Callable[[bytes, np.random.Generator, Place], str]
+    readers: tuple[str, ...]
+    guided: bool
+    joined: bool = True
 
 
 def command(*words: str | Path) -> int:

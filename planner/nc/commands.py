@@ -28,7 +28,8 @@ _HARMLESS = re.compile(
 )
 _HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
 _LONGEST = 80  # characters of bare axis letters that are looked at
-_BARE = re.compile(rb"[ \t]*((?:[XYZWO][ \t]*0?[ \t]*)+)[\r\n;(]", re.IGNORECASE)
+# Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in 3^n ways.
+_BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNORECASE)
 
 
 def command(words: Words, word: int, block: Block, report: Report, assumed: Assumed) -> bool:

@@ -12,6 +12,8 @@ from planner.base.errors import InputError
 from planner.nc.hpgl.lexer import CONTROL
 from planner.nc.reading import HEIDENHAIN, SIEMENS
 
+# What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one that fits nowhere is tried
+# in 2^n ways, such as n comments in a file of no language.
 _LOOKED_AT = 20_000  # bytes at the start of a file that tell its language
 _CONVERSATIONAL = re.compile(
     rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b", re.MULTILINE | re.IGNORECASE
@@ -28,10 +30,16 @@ _SIEMENS = re.compile(
 # program is a letter followed by a letter. (A semicolon before it may start a comment of an NC program.)
 _FIRST = rb"(?:IN|DF|PU|PD|PA|PR|SP|VS|IP|SC|RO|PS|BP|PG|LT|CO|FS|PW|WU|QL|NP|AF)"
 _HPGL = re.compile(
-    rb"\A(?:\s|\xef\xbb\xbf)*(?:" + CONTROL + rb"[\s;]*)*" + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"|\Z)",
+    rb"\A(?:\s|\xef\xbb\xbf)*+(?>"
+    + CONTROL
+    + rb"[\s;]*)*+"
+    + _FIRST
+    + rb"(?=[-+.\d,;\s]|"
+    + _FIRST
+    + rb"|\Z)",
     re.IGNORECASE,
 )
-_NC = re.compile(rb"\A(?:[%\s]|;[^\n]*|\([^)\n]*\)|/)*[GMNOFST][ \t]*\d", re.IGNORECASE)
+_NC = re.compile(rb"\A(?>[%\s]|;[^\n]*|\([^)\n]*\)|/)*+[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
 
 
@@ -40,14 +48,14 @@ _MODELS = (
     # name, what only such a file starts with, what to do
     (
         "a drawing (DXF)",
-        re.compile(rb"\A\s*(?:999\s*\n[^\n]*\n\s*)*0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF"),
+        re.compile(rb"\A\s*+(?>999[^\S\n]*\n[^\n]*\n\s*)*+0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF"),
         _CAM,
     ),
     ("a model (STL)", re.compile(rb"\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", re.IGNORECASE), _CAM),
     ("a model (STEP)", re.compile(rb"\A\s*ISO-10303-21\s*;"), _CAM),
     (
         "a drawing (SVG)",
-        re.compile(rb"\A\s*(?:<\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*<svg\b", re.DOTALL),
+        re.compile(rb"\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", re.DOTALL),
         _CAM,
     ),
     ("a document (PDF)", re.compile(rb"\A%PDF-\d"), _CAM),

@@ -9,7 +9,9 @@ velocity and of the position. With p'' = a0 + b x at the time x after the left s
 
     y = -(a0 + b x)/w^2 + 2 z b/w^3 + Re(C exp(P x)),        P = -z w + i w sqrt(1 - z^2),
 
-is exact from sample to sample; peaks between them are seen by steps of no more than `STEP` of the mode's phase. After the end nothing
+is exact from sample to sample; peaks between them are seen by steps of no more than `STEP` of the mode's phase. Of a mode that turns so
+fast that a period has more than `MOST_STEPS` of them, |y| <= max |a0 + b x - 2 z b/w| / w^2 + |C|, at either end, takes the place of
+its peaks: it turns more than thirty times there, and comes close to the bound but for its decay. After the end nothing
 shakes it any more, and y = Re(C exp(P x)): |C| is what it still rings with.
 
 The deflection during the motion holds its static part too, a/w^2 under a constant acceleration a.
@@ -29,6 +31,7 @@ from planner.motion.trajectory import Trajectory
 from planner.verify.pieces import kernel
 
 STEP = 0.2  # [rad] of the mode's phase between two looks: a peak is missed by less than 1 - cos(0.1) = 0.5 %
+MOST_STEPS = 1000  # in a period; 10 us of computing for an axis
 DEFLECTION, SLOPE, MOST = range(
     3
 )  # of an axis in a mode: where it is, how fast, and the largest deflection so far
@@ -116,7 +119,8 @@ def _shake(
             mean = (position[k, axis] - position[k - 1, axis]) / h
             a0 = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / h
             b = 6.0 * (v0 + v1 - 2.0 * mean) / (h * h)
-            steps = max(1, math.ceil(w * h / STEP))
+            bounded = w * h > STEP * MOST_STEPS
+            steps = 1 if bounded else max(1, math.ceil(w * h / STEP))
             dx = h / steps
             shrink = math.exp(decay * dx)
             c, s = shrink * math.cos(turn * dx), shrink * math.sin(turn * dx)
@@ -125,6 +129,8 @@ def _shake(
                 rest = -(a0 + b * n * dx) / (w * w) + 2.0 * damping * b / (w * w * w)
                 free, free_slope = y - rest, slope - drift
                 quarter = (free_slope - decay * free) / turn  # free = Re(C exp(P x)), C = free - i quarter
+                if bounded:
+                    most = max(most, max(abs(rest), abs(rest + drift * dx)) + math.hypot(free, quarter))
                 free, quarter = c * free + s * quarter, c * quarter - s * free
                 y = rest + drift * dx + free
                 slope = drift + decay * free + turn * quarter

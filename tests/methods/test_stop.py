@@ -93,3 +93,11 @@ def test_looser_limits_never_make_an_arc_take_longer(radius, sweep, velocity, ac
         assert np.hypot(kappa**2 * v**3 + j, 3 * kappa * v * a) <= largest * (1 + 1e-9)
         times.append(rest_to_rest_times(path.length[-1:], *(np.array([x]) for x in (v, a, j)))[0])
     assert times[1] <= times[0] * (1 + 1e-5)
+
+
+def test_an_arc_with_an_acceleration_far_beyond_its_jerk_takes_seconds():
+    """Found by benchmarks/fuzz.py: a quarter of a circle was planned at 0.003 mm/s, half an hour of samples for the verifier."""
+    machine = problems.machine(velocity=100.0, acceleration=9e7, jerk=1.0)
+    path = toolpath_from_program(parse_program("G21 G17 G90 F900\nG1 X5 Y1\nG2 X9 Y5 R4\n"), machine)
+    times = rest_to_rest_times(path.length, *block_limits(path, machine))
+    assert times[-1] < 20.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import time
 from pathlib import Path
 
 import pytest
@@ -186,3 +188,21 @@ def test_files_that_cannot_be_read(read, tmp_path: Path) -> None:
     binary.write_bytes(b"G0 X1\n\x00\x01")
     with pytest.raises(InputError, match="binary"):
         read(binary)
+
+
+# Found by benchmarks/fuzz.py, the first one in a file of 408 bytes: each took 5 to 50 s, and twice as long for one more.
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(b";PD1,1\r\n" * 27 + b"?", id="comments of a file of no language"),
+        pytest.param(b"@PJL\r\n" * 23 + b"?", id="headers of a printer"),
+        pytest.param(b"<!---->" * 26 + b"?", id="comments of XML"),
+        pytest.param(b"999\n\n" * 37 + b"?", id="comments of DXF"),
+        pytest.param(b"G28 " + b"X  " * 16 + b"?", id="bare axis letters"),
+    ],
+)
+def test_a_text_that_fits_nowhere_is_tried_in_one_way(data: bytes) -> None:
+    began = time.process_time()
+    with contextlib.suppress(InputError):
+        parse_program(data, source="drawing.plt" if data[:1] == b";" else "program.nc")
+    assert time.process_time() - began < 2.0

@@ -63,12 +63,13 @@ class LatheSingles(LatheWords):
         if codes & _MOTIONS:
             self.cut = ""
             return False
+        if named == "G92" and "F" not in letters:  # in G code system B it sets a position
+            self.cut = ""
+            raise ProgramFault(
+                line.place, "G92 with X and Z needs the lead of its thread as an F word on its line"
+            )
         if named:
             self.cut, self.cut_given = named, set()
-            if named == "G92" and "F" not in letters:  # in G code system B it sets a position
-                raise ProgramFault(
-                    line.place, "G92 with X and Z needs the lead of its thread as an F word on its line"
-                )
         elif not self.cut or not letters & set(_PLACE) or codes & _OWN_COORDINATES:
             return False
         self._cutting(words, line)

@@ -163,6 +163,8 @@ REFUSED = {
     "half of G90": ("G90 U-1\nZ-10\nM30", "needs X or U, and Z or W"),
     "a wrong taper": ("G94 U-1 Z-10 I1\nM30", "does not use I"),
     "G92 without a lead": ("F2.\nG92 X10 Z-10\nU1\nM30", "needs the lead"),
+    # found by benchmarks/fuzz.py: the second line repeated a thread without a lead
+    "G92 without a lead, and on": ("T0101\nG0 U1 W2\nG92 X30 Z-10\nX29 Z-11\nM30", "needs the lead"),
     "G92 without room": ("S500 M3\nG0 X20 Z0\nG92 X10 W0 F1\nM30", "room in z"),
     "G50 X": ("G50 X100 Z100\nU1\nM30", "sets a position"),
     "G76 without a lead": ("G76 X10 Z-10 K1. D.2\nU1\nM30", "lead"),

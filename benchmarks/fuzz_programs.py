@@ -1,32 +1,34 @@
-"""Mutated programs through the reader: does each end in a program or in a message, in time and in memory?
+"""Fuzzing of NC programs of all dialects, among them those of 3-D printers.
 
-    python -m benchmarks.nc_mutants [COUNT] [--seed N] [--folder FOLDER]
-
-The programs are pieces of those in FOLDER and of a list of constructs of all dialects, with lines, words and bytes changed, doubled,
-swapped and cut, read with settings by chance, half of them on a machine with nine axes and an extruder. Each has `SECONDS` and the
-process `MEMORY`. Writes results/nc-mutants.json and .md; exit code 1 for a crash or a hang, with the program's seed.
+Programs are pieces of those in the shared folder and of a list of constructs, with lines, words and bytes changed, doubled, swapped
+and cut; they are read with settings by chance, and on no machine, one with nine axes and an extruder, a lathe, or one of those that
+come with the package. Each must end in a program or in messages that say a place.
 """
 
 from __future__ import annotations
 
-import argparse
-import resource
-import signal
-import sys
-import traceback
-from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.record import markdown, write_results
+from benchmarks.fuzz_run import Place
 
-SECONDS = 20  # of computing for one program; the slowest of ordinary ones takes some hundredths
+ROOT = Path(__file__).resolve().parent.parent
 NOTES_MAX = 200
 LONG_LINE = 10_000  # bytes: a longer line (a plotter file can be one) is not doubled
-MEMORY = 6 << 30  # bytes of address space
 PIECE = 60  # lines of a program that are mutated together
+LINES_MAX = 3 * PIECE  # of a kept program that is mutated further
+ENDINGS = (
+    "nc",
+    "ngc",
+    "gcode",
+    "h",
+    "mpf",
+    "plt",
+)  # the name counts where the text does not tell the dialect
+INFO = 0.1  # of the programs that are read, how many the command `info` gets too
 
 CONSTRUCTS = """\
 %\nO1000 (NAME)\nG21 G90 G17 G94\nG0 X1 Y2 Z3\nG1 X5 F600\nG2 X7 I1 J0\nG3 X7 Y1 R2\nG3 I5 P2 Z1
@@ -56,15 +58,15 @@ CYCL DEF 254 Q375=40 Q219=9 Q248=50 Q201=-2
 ROT RPL=30\nMIRROR X0\nASCALE X2 Y2\nATRANS X1\nG41 X5 Y5\nG42\nG40 X0\nG1 X5 RND=2\nX9 CHR=1
 CT X5 Y5\nCIP X5 Y5 I1=3 J1=1\nREPEATB A P=2
 CYCLE84(9,0,2,-5,,0,3,8,,0,300)\nCYCLE86(9,0,2,-5,,1,3,1,1,1,0)\nPOCKET3(9,0,2,-5,40,30,6,0,0,0,2,.1,.1,500,100,0,11)\nPOCKET4(9,0,2,-5,20,0,0,2,0,0,500,100,1,21,,,,1,1)
+<!-- a -->\n<svg>\n@PJL SET A=B\n\x1b.@;\n999
 0\nSECTION\nsolid a\nfacet normal 0 0 1\nG0 X1 (open\nG0 X--1\nG1 X1..2\nG999 X1\nM-3\nS-5\nF0\nX99999999999\nG187 P1\nM73 P1 R70
 """.splitlines()
 _BYTES = b'GMXYZIJKRPQFSTNHDEABCUVWLO0123456789.+-#[]()<>=%/$:;,* \t\n\r"\x00\x80\xff\x1b'
 
 
-def mutant(seed: int, programs: list[list[bytes]]) -> bytes:
-    """A mutated program; the same for the same seed."""
-    rng = np.random.default_rng(seed)
-    lines = _piece(rng, programs)
+def mutant(rng: np.random.Generator, programs: list[list[bytes]], start: bytes | None = None) -> bytes:
+    """A mutated program, from `start` or a piece of one of the programs or of the constructs."""
+    lines = _piece(rng, programs) if start is None else start.splitlines()[:LINES_MAX] or [b""]
     for _ in range(int(rng.integers(1, 8))):
         k, other = (int(v) for v in rng.integers(0, len(lines), 2))
         change = int(rng.integers(0, 9))
@@ -101,29 +103,47 @@ def _changed(rng: np.random.Generator, line: bytes) -> bytes:
     return line[:at] + new + line[at + int(rng.integers(0, 3)) :]
 
 
-def a_reading(seed: int) -> Any:
-    """Settings of the reader by chance."""
-    from planner.nc.reading import ARC_CENTRES, EXTRUDERS, Reading
+def make_program(rng: np.random.Generator, start: bytes | None, _: Place) -> bytes:
+    """A program: `start` with changes, or a new one."""
+    return mutant(rng, load_programs(ROOT.parent / "shared" / "nc"), start)
 
-    rng = np.random.default_rng(seed)
+
+def try_program(data: bytes, rng: np.random.Generator, place: Place) -> str:
+    """Read a program, and show now and then what `info` says of it."""
+    source = f"mutant.{rng.choice(ENDINGS)}"
+    end = outcome(data, a_reading(rng), a_machine(rng), source)
+    if end == "read" and rng.random() < INFO:
+        file = place.folder / source
+        file.write_bytes(data)
+        place.command("info", file)
+    return end
+
+
+def a_reading(rng: np.random.Generator) -> Any:
+    """Settings of the reader by chance."""
+    from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading
+
     ignore = ("M6", "A", "$J", "G29", "M428")[: int(rng.integers(0, 6))]
     return Reading(
         strict=bool(rng.random() < 0.15),
         ignore=ignore if rng.random() < 0.3 else (),
         arc_centres=str(rng.choice(ARC_CENTRES)) if rng.random() < 0.3 else "auto",
         extruder=str(rng.choice(EXTRUDERS)),
+        dialect=str(rng.choice(DIALECTS)) if rng.random() < 0.3 else "auto",
         block_delete=bool(rng.random() < 0.7),
     )
 
 
-def outcome(data: bytes, reading: Any, machine: Any = None) -> str:
+def outcome(data: bytes, reading: Any, machine: Any = None, source: str = "mutant.nc") -> str:
     """What comes of a program: "read", "refused" or "not a program". Raises what is not a proper end."""
     from planner.base.errors import InputError
     from planner.nc.reader import interpret
 
     try:
-        program, faults = interpret(data, machine, reading, source="mutant.nc")
-    except InputError:
+        program, faults = interpret(data, machine, reading, source=source)
+    except InputError as fault:
+        if not str(fault):
+            raise ValueError("refused without a sentence") from fault
         return "not a program"
     if not np.isfinite(program.end).all() or len(program.notes) > NOTES_MAX:
         raise ValueError(f"positions {program.end}, {len(program.notes)} notes")
@@ -133,63 +153,38 @@ def outcome(data: bytes, reading: Any, machine: Any = None) -> str:
     return "refused" if faults else "read"
 
 
-def a_machine(seed: int) -> Any:
-    """None, or a machine with all axes and an extruder, by chance."""
+def a_machine(rng: np.random.Generator) -> Any:
+    """None, a machine with all axes and an extruder, a lathe, or one of the package, by chance."""
+    which = rng.random()
+    if which < 0.4:
+        return None
+    if which < 0.6:
+        shipped = sorted((ROOT / "planner" / "machines").glob("*.toml"))
+        return _shipped(shipped[int(rng.integers(len(shipped)))])
+    return _all_axes(lathe=which > 0.85)
+
+
+@cache
+def _shipped(file: Path) -> Any:
+    from planner.machine.files import load_machine
+
+    return load_machine(file)
+
+
+@cache
+def _all_axes(lathe: bool) -> Any:
     from planner.machine.files import machine_from_dict
 
-    if np.random.default_rng([seed, 1]).random() < 0.5:
-        return None
     axis = {"velocity": 100.0, "acceleration": 1000.0, "jerk": 1e5}
     axes = {letter: dict(axis) for letter in "xyzabcuvwe"}
-    return machine_from_dict({"name": "all axes", "tolerance": 0.02, "dt": 1e-3, "axes": axes})
+    machine = {"name": "all axes", "tolerance": 0.02, "dt": 1e-3, "axes": axes}
+    return machine_from_dict(
+        machine | ({"dialect": {"lathe": True, "least_increment": 1e-3}} if lathe else {})
+    )
 
 
+@cache
 def load_programs(folder: Path) -> list[list[bytes]]:
     """The lines of the programs of a folder; of long ones the first 3,000."""
     files = sorted(f for f in folder.glob("*") if f.suffix not in (".csv", ".md", ".txt"))
     return [f.read_bytes().splitlines()[:3000] for f in files]
-
-
-class _Hung(BaseException):
-    """A program took longer than `SECONDS`."""
-
-
-def _hung(*_: object) -> None:
-    raise _Hung
-
-
-def main() -> None:
-    """Read all mutants and print what came of them."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("count", type=int, nargs="?", default=15_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--folder", type=Path, default=Path("../shared/nc"))
-    options = parser.parse_args()
-    programs = load_programs(options.folder)
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGPROF, _hung)
-    found: Counter[str] = Counter()
-    bad = []
-    for seed in range(options.seed, options.seed + options.count):
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
-        try:
-            found[outcome(mutant(seed, programs), a_reading(seed), a_machine(seed))] += 1
-        except (Exception, _Hung) as fault:
-            found["hung" if isinstance(fault, _Hung) else "crashed"] += 1
-            bad.append(seed)
-            traceback.print_exc()
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        if seed % 1000 == 0:
-            print(f"{seed}: {dict(found)}", flush=True)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    rows = [[name, f"{times:,}"] for name, times in sorted(found.items())]
-    table = markdown(["what became of it", "programs"], [*rows, ["peak memory [GB]", f"{peak:.2f}"]])
-    print(table, f"crashed or hung: {bad[:20]}", sep="\n")
-    write_results(
-        "nc-mutants", {"seed": options.seed, "found": dict(found), "peak_GB": peak, "bad": bad}, table
-    )
-    sys.exit(1 if bad else 0)
-
-
-if __name__ == "__main__":
-    main()

@@ -103,7 +103,8 @@ class JerkLimited:
         pieces = self._solve_pieces(list(pairwise(problem.piece.tolist())), task, counted)
         stops = [stop for piece in pieces for stop in piece.stops]
         slower = max(piece.slower for piece in pieces)
-        sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; time-optimal within {self.tol:g} for the limits with jerk"
+        sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; " if slower > 1.0 else ""
+        sentence += f"time-optimal within {self.tol:g} for the limits with jerk"
         if stops:
             places = ", ".join(f"{problem.s[k]:.6g}" for k in stops[:PLACES_NAMED])
             more = ", ..." if len(stops) > PLACES_NAMED else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import rest_to_rest_times
 from planner.constraints import normal_limit
 from planner.corners.allocation import error_rate
@@ -13,18 +13,19 @@ from planner.machine import Machine
 
 GOLDEN = float((np.sqrt(5.0) - 1.0) / 2.0)
 GOLDEN_STEPS = 26  # which leave 4e-6 of the range of log v
-AT_REST = 1e-12  # an axis with a smaller component of the direction does not limit; below the rounding of unit vectors [-]
+AT_REST = 1e-12  # an axis with a smaller component of a unit vector does not limit; below the rounding of unit vectors [-]
 
 
 def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment such that every axis keeps its own, wherever on the segment.
 
-    On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest axis limit must hold
-    for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with
-    kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j
-    (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve
-    kappa changes, and a bound of |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
-    takes least time from rest to rest: none of these limits makes it longer when it gets larger.
+    On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest limit of the axes that
+    move, each over the largest component that a unit vector has there (`_components`), must hold for the vector: with kappa v^2 <=
+    a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s
+    <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N).
+    Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound of |r'''| takes the
+    place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment takes least time from rest to rest: none of
+    these limits makes it longer when it gets larger.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
@@ -36,13 +37,16 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     kappa = toolpath.curvature[curved]
     twist, on_curve = kappa**2, toolpath.curve[curved] >= 0
     twist[on_curve] = np.maximum(twist[on_curve], toolpath.curves.twist[toolpath.curve[curved][on_curve]])
-    v_all, a_all, j_all = (machine.limits(q, axes).min() for q in ("velocity", "acceleration", "jerk"))
+    component = np.maximum(_components(toolpath, curved), AT_REST)
+    v_all, a_all, j_all = (
+        (machine.limits(q, axes) / component).min(axis=1) for q in ("velocity", "acceleration", "jerk")
+    )
     half = np.sqrt(0.5)
     budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
     across = np.minimum(half * a_all, np.minimum(budget, normal_limit.largest(machine)))
     v[curved] = np.min(
         [
-            np.full(len(kappa), v_all),
+            v_all,
             np.sqrt(across / kappa),
             np.cbrt(half * j_all / (2 * twist)),
             toolpath.feed[curved],
@@ -55,6 +59,18 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     bound = np.flatnonzero(v * a > product)
     v[bound], a[bound] = _fastest(toolpath.length[bound], v[bound], a[bound], j[bound], product[bound])
     return np.minimum(v, toolpath.feed), a, j
+
+
+def _components(toolpath: Toolpath, curved: Array) -> FloatArray:
+    """(n, A) the largest component along each axis that a unit vector along or across the path can have, on the segments `curved` (M,):
+    on an arc its drift's and that of its plane, on a curve 1 for the axes in which its control points differ."""
+    arc, curve = toolpath.arc[curved], toolpath.curve[curved]
+    found = np.empty((len(arc), len(toolpath.axes)))
+    row = arc[arc >= 0]
+    in_plane = np.hypot(toolpath.arcs.e1[row], toolpath.arcs.e2[row])
+    found[arc >= 0] = np.minimum(in_plane + np.abs(toolpath.arcs.drift[row]), 1.0)
+    found[curve >= 0] = np.ptp(toolpath.curves.points[curve[curve >= 0]], axis=1) > 0.0
+    return found
 
 
 def _fastest(

@@ -52,6 +52,7 @@ class Stopped:
 
     @cached_property
     def plan(self) -> Plan:
+        """That plan, made when it is first asked for."""
         return StopMethod().plan_job(self._job.afresh())
 
     def sooner_than(self, time: float) -> bool:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import planner
 from benchmarks import problems
 from planner.base.point_to_point import rest_to_rest_times
 from planner.geometry.build import toolpath_from_program
@@ -71,6 +72,35 @@ def test_jerk_limits_on_arcs_are_safe_for_every_direction():
     kappa = path.curvature
     assert (np.hypot(kappa * v**2, a) <= 2000 * (1 + 1e-12)).all()
     assert (np.hypot(kappa**2 * v**3 + j, 3 * kappa * v * a) <= 2e5 * (1 + 1e-12)).all()
+
+
+@pytest.mark.parametrize("plane", ["G17", "G18", "G19"])
+def test_axes_that_stand_still_do_not_limit_an_arc(plane):
+    """Found by fuzzing: on a machine with a slow z an arc in x and y took seven times as long."""
+    ends = {"G17": "X0 Y0 I3 J0", "G18": "X0 Z0 I3 K0", "G19": "Y0 Z0 J3 K0"}
+    program = parse_program(f"G21 {plane} F6000\nG2 {ends[plane]}\n")
+    still = {"G17": "z", "G18": "y", "G19": "x"}[plane]
+    slow = MACHINE.axes["x"].model_copy(update={"velocity": 1.0, "acceleration": 10.0, "jerk": 100.0})
+    machine = MACHINE.model_copy(update={"axes": MACHINE.axes | {still: slow}})
+    for method in ("stop", "kinematic", "bezier"):
+        made, usual = (planner.plan(program, one, method=method) for one in (machine, MACHINE))
+        assert made.verdict.passed, made.verdict.faults
+        assert made.cycle_time == pytest.approx(usual.cycle_time, rel=1e-9)
+
+
+def test_an_axis_limits_a_helix_by_its_rise():
+    """z rises by 1 mm in a turn of 12 pi mm: a limit of a tenth of the others' does not matter there, one of a hundredth does."""
+    program = parse_program("G21 G17 F6000\nG2 X0 Y0 Z1 I6 J0\n")
+    times = []
+    for share in (1.0, 0.1, 0.01):
+        axis = MACHINE.axes["z"]
+        limits = {name: share * getattr(axis, name) for name in ("velocity", "acceleration", "jerk")}
+        machine = MACHINE.model_copy(update={"axes": MACHINE.axes | {"z": axis.model_copy(update=limits)}})
+        made = StopMethod().plan(program, machine)
+        assert made.verdict.passed, made.verdict.faults
+        times.append(made.trajectory.cycle_time)
+    assert times[1] == pytest.approx(times[0], rel=1e-9)
+    assert times[2] > 1.2 * times[1]
 
 
 @given(

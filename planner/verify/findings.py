@@ -42,8 +42,8 @@ def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
     joint before. That of a joint that is not reached is that of the last one before that is: its own is 0.
 
     A late time hides no fault: a joint is compared with the chords run while the piece before it is possible, so that its time reaches
-    only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it delays were passed in the
-    same stretch. An error of the tolerance is allowed there anyway.
+    only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it delays were passed within
+    it. An error of the tolerance is allowed there anyway.
     """
     near: FloatArray = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)

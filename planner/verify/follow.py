@@ -25,8 +25,9 @@ def follow(
     each: Each | None = None,
     search: bool = True,
 ) -> Look:
-    """Match a motion's times (T,) [s] and positions (T, A) [mm], part by part, with a path.
+    """Match a motion with a path.
 
+    parts  : of its samples, in order: times (T,) [s], positions (T, A) [mm]
     each   : called with times (T,) [s], distance over budget (T,) and piece (T,) of every part
     search : whether a motion that was lost is looked for on the pieces ahead; if not, it is lost for good
     """

@@ -13,7 +13,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.job.plan import Plan
 from planner.machine import Axis, Machine
 from planner.motion.trajectory import Trajectory
-from planner.verify import verify
+from planner.verify import Given, verify
 
 TEXT = (
     "G21 G17 {mode} F3000\nG1 X10 Y5\nG2 X10 Y5 Z6 I5 J0 P3\nG18 G3 X20 Z6 I5 K0\nG17 G3 X30.0002 Y15 I0 J10\nG1 Y30 Z0\n"
@@ -195,6 +195,22 @@ def test_another_order_within_the_tolerance_is_a_fault(asked: str, run: str, met
 )
 def test_the_program_in_its_order_is_none(program: str, method: str) -> None:
     assert found_in(program, program, method) == []
+
+
+@pytest.mark.parametrize("digits", [3, 6])
+def test_digits_of_the_positions_are_allowed(digits: int) -> None:
+    text = RUN_IN + SQUARE + circle(8) + "G5 X0.2 Y0.3 I0 J0.1 P-0.1 Q0\n"
+    program = planner.read_program(text=text, machine=COARSE)
+    made = planner.plan(program, COARSE, method="second-order")
+    assert made.trajectory is not None
+    found = verify(
+        dataclasses.replace(made.trajectory, position=np.round(made.trajectory.position, digits)),
+        toolpath_from_program(program, COARSE),
+        COARSE,
+        given=Given(columns=(), position_rounding=np.full(3, 0.5 * 10.0**-digits)),
+        not_limited=("jerk",),
+    )
+    assert not [fault for fault in found.faults if fault.startswith("exact path")]
 
 
 def test_an_overshoot_along_a_side_is_measured() -> None:

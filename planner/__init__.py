@@ -3,7 +3,7 @@
 >>> import planner
 >>> p = planner.plan("planner/examples/bracket.ngc", "mill", method="kinematic")
 >>> p
-<Plan of bracket.ngc on mill by kinematic: 15.6862 s, passed>
+<Plan of bracket.ngc on mill by kinematic: 15.6184 s, passed>
 
     plan                     plan, sample and verify a program: one call
     Plan                     what it returns: the motion, the verdict, what limits the motion and what the limits cost; it shows itself

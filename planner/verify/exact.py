@@ -1,192 +1,141 @@
-"""Blocks under G61 and G61.1: the delivered samples lie on the path itself.
+"""Blocks under G61 and G61.1: the delivered samples run along the path itself, in its order.
 
-Which block a sample is at follows from the times at which the joints are passed (matching.py), to within a period; the nearest of the
-blocks of these times and of their neighbours counts. On a line the distance is that from the chord, on an arc that from the place p(x)
-where the sample is perpendicular to the arc,
+They are matched with the path once more (matching.py), with the budgets that G61 means. With a motion x(t) on the path, |x''| <= a,
+and samples at most h apart:
 
-    (p(x) - q) p'(x) = 0,      by Newton's method from the angle at which q is seen from the axis, in each turn,
+    sample   on the path, to `PLACE_ROUNDING` and the digits of the positions
+    vertex   passed between two samples at a time u; the chord is at most a h^2 / 8 from x(u) there, and that is what it may miss the
+             vertex by, with the same rounding; at most the tolerance, which counts between samples (contour.py), and that where the
+             acceleration is not judged
 
-or from its ends; on a spline of the program the same, from the nearest of `STARTS` places (curves.py). Between samples the tolerance
-counts (contour.py), and within a period of a block under G64, and on the half of a block beside one, where the corner between them may
-be rounded.
+A motion on the path always fits: its own course is a way through the free space of the matching, since chord and motion are compared
+at the same time. One that leaves the path, or runs it in another order, leaves a block out or is not at its end, is lost. What stays
+within a h^2 / 8 of one place could be run between two samples; that it is left out is not seen.
 
-Where the tolerance is larger than what the path does between two joints, such as a whole circle, the times of the joints say little.
-A sample that is off is therefore looked for once more, at the nearest of the pieces that it can belong to by the order of the path.
+The tolerance stays the budget of blocks under G64, and of the half of a block that is beside one without a full stop between: the
+corner there may be rounded.
+
+How far a motion that is lost was off is measured within the tolerance: from the nearest of the pieces that it can be on, in order.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
-from planner.verify.curves import curve_points
-from planner.verify.findings import Look, joint_times
-from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
-from planner.verify.pieces import PLACE_ROUNDING, ProgramPieces
+from planner.verify.findings import Look, line_of
+from planner.verify.follow import follow
+from planner.verify.matching import HELD, LAST, LOST_AFTER
+from planner.verify.pieces import (
+    CONTOUR_ROUNDING,
+    PLACE_ROUNDING,
+    RATIO_ROUNDING,
+    ProgramPieces,
+    program_pieces,
+    widened,
+)
+from planner.verify.stream import BLOCK_SAMPLES, Limits
 
-STARTS = 17  # places on a curve
-CURVE_STEPS = 6  # of Newton's method without the curvature, which is exact for samples on the curve
-NEWTON = 3  # steps: the angle is off by the gap of an arc over its radius, some 1e-4 at most; squared twice that is rounding
 
-
-def exact_faults(
-    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, rounding: FloatArray
-) -> list[str]:
-    """The largest distance of a sample from a path that is to be followed exactly, as a sentence, if it is more than rounding.
-
-    rounding : (A,) largest error of a position by its digits [mm]
-    """
+def exact_faults(trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, limits: Limits) -> list[str]:
+    """What is wrong with a motion where the path is to be followed exactly, in a sentence; empty if nothing is."""
     if not toolpath.exact.any():
         return []
-    allowed = PLACE_ROUNDING + float(np.linalg.norm(rounding))
-    worst = _worst(trajectory, looks, toolpath, pieces, None)
-    if worst.apart > allowed:
-        worst = _worst(trajectory, looks, toolpath, pieces, new_match(pieces))
-    if worst.apart <= allowed:
+    digits = float(np.linalg.norm(limits.rounding))
+    bow = float(np.linalg.norm(limits.acceleration_at_stop)) * looks[0].seen.gap_max ** 2 / 8.0
+    pieces = program_pieces(toolpath, halved=np.logical_or(*_beside(toolpath)))
+    exact = _exact_pieces(toolpath, pieces)
+    tight = widened(_tightened(pieces, exact, bow), more=digits)
+    look = follow(_positions(trajectory), tight, search=False)
+    lost_at = _lost_at(look, tight)
+    if lost_at is None:
         return []
-    where = f"{worst.apart:.6g} mm off at t = {worst.time:.6g} s, line {worst.line}"
+    worst = _Worst(widened(pieces, more=digits), exact)
+    wide = follow(_positions(trajectory), worst.pieces, each=worst.take, search=False)
+    where = f"followed in its order only as far as line {line_of(toolpath, pieces, lost_at)}"
+    if worst.apart > PLACE_ROUNDING + digits and not wide.seen.match.tally[HELD]:
+        line = line_of(toolpath, pieces, worst.piece)
+        where = f"{worst.apart:.6g} mm off at t = {worst.time:.6g} s, line {line}"
     return [f"exact path: {where}: G61 asks for the path itself"]
 
 
-class Worst(NamedTuple):
-    """The sample that is farthest from a path to be followed exactly: its distance [mm], time [s] and line."""
+@dataclass
+class _Worst:
+    """The sample that is farthest from the exact ones of some pieces: its distance [mm], time [s] and piece.
 
+    exact : (N,) True for pieces that count
+    """
+
+    pieces: ProgramPieces
+    exact: Array
     apart: float = 0.0
     time: float = 0.0
-    line: int = 0
+    piece: int = 0
+
+    def take(self, t: FloatArray, ratio: FloatArray, piece: Array) -> None:
+        """The next samples, as `follow` tells of them."""
+        apart = np.where(self.exact[piece], ratio * self.pieces.piece["budget"][piece], 0.0)
+        k = int(apart.argmax())
+        if apart[k] > self.apart:
+            self.apart, self.time, self.piece = float(apart[k]), float(t[k]), int(piece[k])
 
 
-def _worst(
-    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, match: Match | None
-) -> Worst:
-    """The worst sample by the times of the joints; with a match, a new one, the nearest of what it finds possible counts too."""
-    passed = joint_times(looks[0], pieces)
-    free = np.append(0, np.cumsum(~toolpath.exact))  # blocks before that need not be followed exactly
-    worst = Worst()
-    before: Trajectory | None = None
+def _positions(trajectory: Trajectory) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Times and positions of the samples, some at a time."""
     for chunk in trajectory.chunks():
-        matched = None if match is None else _matched(pieces, match, before, chunk)
-        before = chunk.rows(np.array([len(chunk) - 1]))
-        first, k, last = (_segment(passed, chunk.t + by * chunk.dt, len(toolpath)) for by in (-1.0, 0.0, 1.0))
-        exact = free[last + 1] == free[first]
-        inside = np.flatnonzero(exact & ~_of_a_corner(toolpath, chunk.position, k))
-        if not len(inside):
-            continue
-        q = chunk.position[inside]
-        off = _least_distance(toolpath, q, first[inside] - 1, last[inside] + 1)
-        if matched is not None:
-            off = np.minimum(off, _least_distance(toolpath, q, matched[inside] - 1, matched[inside] + 1))
-        at = int(off.argmax())
-        if off[at] > worst.apart:
-            worst = Worst(float(off[at]), float(chunk.t[inside[at]]), int(toolpath.line[k[inside[at]]]))
-    return worst
+        for low in range(0, len(chunk), BLOCK_SAMPLES):
+            part = slice(low, low + BLOCK_SAMPLES)
+            yield chunk.t[part], chunk.position[part]
 
 
-def _matched(pieces: ProgramPieces, match: Match, before: Trajectory | None, chunk: Trajectory) -> Array:
-    """(T,) the segment of each sample: of the pieces it can belong to by the order of the path, the nearest.
+def _beside(toolpath: Toolpath) -> Array:
+    """(2, M) True for exact segments whose start, and whose end, is passed without a full stop from or to one that is not exact."""
+    free, moving = np.pad(~toolpath.exact, 1), toolpath.joint != Joint.STOP
+    return toolpath.exact & np.array([free[:-2] & moving[:-1], free[2:] & moving[1:]])
 
-    before : the last sample of the chunk before; None for the first chunk
+
+def _exact_pieces(toolpath: Toolpath, pieces: ProgramPieces) -> Array:
+    """(N,) True for pieces of exact segments, but for those of a half where a corner may be rounded."""
+    segment = pieces.piece["segment"]
+    chord = np.linalg.norm(np.diff(pieces.vertex, axis=0), axis=1)
+    run = np.append(0.0, np.cumsum(chord))
+    first = np.searchsorted(segment, np.arange(len(toolpath) + 1))
+    begin, whole = run[first[:-1]][segment], np.diff(run[first])[segment]
+    low, high = (run[:-1] - begin) / whole, (run[1:] - begin) / whole  # shares of the segment
+    at_start, at_end = _beside(toolpath)[:, segment]
+    of_a_corner = (at_start & (low < 0.5 - RATIO_ROUNDING)) | (at_end & (high > 0.5 + RATIO_ROUNDING))
+    exact: Array = toolpath.exact[segment] & ~of_a_corner
+    return exact
+
+
+def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces:
+    """The pieces with the budgets of the module's text on those that are `exact` (N,), and at the vertices at their ends.
+
+    bow : largest distance of a motion from its chord over a period [mm]; inf or NaN where the acceleration is not judged
     """
-    t, position, skip = chunk.t, chunk.position, 0
-    if before is not None:
-        t, position, skip = np.append(before.t, t), np.vstack([before.position, position]), 1
-    axes = position.shape[1]
-    place = Located(np.zeros(len(t), dtype=np.int64), np.zeros(len(t)))
-    anywhere = AtStop(np.full(axes, np.inf), np.zeros(axes))  # stops are judged elsewhere
-    match_samples(pieces, match, t, position, skip, False, anywhere, place)
-    segment: Array = pieces.piece["segment"][place.piece[skip:]]
-    return segment
+    piece, joint = pieces.piece.copy(), pieces.joint.copy()
+    piece["budget"][exact] = PLACE_ROUNDING
+    at_end = np.append(exact, False) | np.append(False, exact)
+    joint["budget"][at_end] = np.fmin(joint["budget"][at_end], bow + PLACE_ROUNDING)
+    return pieces._replace(piece=piece, joint=joint)
 
 
-def _segment(passed: FloatArray, t: FloatArray, count: int) -> Array:
-    """(n,) segment of `count` on which the motion is at times t (n,) [s], by when the joints are passed (count - 1,) [s]."""
-    found: Array = np.clip(np.searchsorted(passed, t, side="right") - 1, 0, count - 1)
-    return found
-
-
-def _least_distance(toolpath: Toolpath, q: FloatArray, first: Array, last: Array) -> FloatArray:
-    """(n,) distance of points q (n, A) from the nearest of the segments `first` to `last`."""
-    first, last = np.maximum(first, 0), np.minimum(last, len(toolpath) - 1)
-    least = np.full(len(q), np.inf)
-    for step in range(int((last - first).max()) + 1):
-        at = np.flatnonzero(first + step <= last)
-        least[at] = np.minimum(least[at], _distance(toolpath, q[at], first[at] + step))
-    return least
-
-
-def _of_a_corner(toolpath: Toolpath, q: FloatArray, segment: Array) -> Array:
-    """(n,) whether points q (n, A) may belong to a corner with a block that need not be followed exactly: they are on the half of their
-    segment that is beside it, and no full stop is between."""
-    free, moving = np.append(~toolpath.exact, False), toolpath.joint != Joint.STOP
-    half = 0.5 * toolpath.length[segment]
-    before = free[segment - 1] & moving[segment] & (_apart(q, toolpath.start[segment]) < half)
-    behind = free[segment + 1] & moving[segment + 1] & (_apart(q, toolpath.end[segment]) < half)
-    found: Array = before | behind
-    return found
-
-
-def _apart(q: FloatArray, p: FloatArray) -> FloatArray:
-    gap: FloatArray = np.linalg.norm(q - p, axis=1)
-    return gap
-
-
-def _distance(toolpath: Toolpath, q: FloatArray, segment: Array) -> FloatArray:
-    """(n,) distance of points q (n, A) from segments (n,)."""
-    found = np.full(len(q), np.inf)
-    lines, arcs = np.flatnonzero(toolpath.straight[segment]), np.flatnonzero(toolpath.arc[segment] >= 0)
-    start, length = toolpath.start[segment[lines]], toolpath.length[segment[lines]]
-    along = (toolpath.end[segment[lines]] - start) / length[:, None]
-    x = np.clip(np.einsum("na,na->n", q[lines] - start, along), 0.0, length)
-    found[lines] = np.linalg.norm(q[lines] - start - x[:, None] * along, axis=1)
-    for row in np.unique(segment[arcs]):
-        of_row = arcs[segment[arcs] == row]
-        found[of_row] = _from_arc(toolpath, q[of_row], int(row))
-    curves = np.flatnonzero(toolpath.curve[segment] >= 0)
-    if len(curves):
-        found[curves] = _from_curves(toolpath, q[curves], toolpath.curve[segment[curves]])
-    return found
-
-
-def _from_curves(toolpath: Toolpath, q: FloatArray, row: Array) -> FloatArray:
-    """(n,) distance of points q (n, A) from curves, by their rows (n,)."""
-    points, weights = toolpath.curves.points[row], toolpath.curves.weight[row]
-    best, u = np.full(len(q), np.inf), np.zeros(len(q))
-    for place in np.linspace(0.0, 1.0, STARTS):
-        apart = np.linalg.norm(curve_points(points, weights, np.full(len(q), place))[0] - q, axis=1)
-        u, best = np.where(apart < best, place, u), np.minimum(best, apart)
-    for _ in range(CURVE_STEPS):
-        point, rate = curve_points(points, weights, u)
-        step = np.einsum("na,na->n", point - q, rate) / np.einsum("na,na->n", rate, rate)
-        u = np.clip(u - step, 0.0, 1.0)
-    return np.linalg.norm(curve_points(points, weights, u)[0] - q, axis=1)
-
-
-def _from_arc(toolpath: Toolpath, q: FloatArray, segment: int) -> FloatArray:
-    """(n,) distance of points q (n, A) from an arc or helix."""
-    k, length = int(toolpath.arc[segment]), float(toolpath.length[segment])
-    centre, e1, e2 = toolpath.arcs.center[k], toolpath.arcs.e1[k], toolpath.arcs.e2[k]
-    drift, radius, rate = toolpath.arcs.drift[k], float(toolpath.arcs.radius[k]), float(toolpath.arcs.rate[k])
-    out = q - centre
-    turn = 2.0 * np.pi / abs(rate)
-    first = np.mod(np.arctan2(out @ e2, out @ e1) / rate, turn)
-    nearest = np.full(len(q), np.inf)
-    for n in range(-1, int(length / turn) + 2):
-        x = np.clip(first + n * turn, 0.0, length)
-        for step in range(NEWTON + 1):
-            cos, sin = np.cos(rate * x)[:, None], np.sin(rate * x)[:, None]
-            gap = radius * (cos * e1 + sin * e2) + drift * x[:, None] - out
-            if step == NEWTON:
-                break
-            slope = radius * rate * (cos * e2 - sin * e1) + drift
-            bend = -radius * rate**2 * (cos * e1 + sin * e2)
-            rise = np.einsum("na,na->n", slope, slope) + np.einsum("na,na->n", gap, bend)
-            along = np.einsum(
-                "na,na->n", gap, slope
-            )  # at the centre all points are as near, and none is better
-            x = np.clip(x - np.divide(along, rise, out=np.zeros_like(along), where=rise != 0.0), 0.0, length)
-        nearest = np.fmin(nearest, np.linalg.norm(gap, axis=1))
-    return nearest
+def _lost_at(look: Look, pieces: ProgramPieces) -> int | None:
+    """The first piece of those with these budgets that a motion is not seen to run along to its end; None if it runs along all."""
+    match = look.seen.match
+    allowed = pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+    missed = np.flatnonzero(match.passed["near"] > allowed)
+    found = [max(int(i) - 1, 0) for i in missed[:1]]
+    if match.tally[HELD]:
+        found.append(int(match.tally[LOST_AFTER]))
+    if match.tally[LAST] < len(pieces.piece) - 1:
+        found.append(int(match.tally[LAST]))
+    _, distance, budget, _, piece, _ = match.worst
+    if distance > budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
+        found.append(int(piece))
+    return min(found, default=None)

@@ -23,16 +23,14 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, findings
-from planner.verify import limits as rows
 from planner.verify.findings import Look
-from planner.verify.matching import AtStop, Located, match_samples, new_match
-from planner.verify.pieces import ProgramPieces, kernel, reach_piece
-from planner.verify.stream import Observed
+from planner.verify.follow import Each, follow
+from planner.verify.pieces import ProgramPieces
 from planner.verify.times import AnyMotion
 from planner.verify.verdict import AfterFilters
 
@@ -41,7 +39,6 @@ STEPS_PER_PERIOD, STEPS_PER_FILTER = 4, 8  # of the times at which filters are e
 CHUNK = 50_000  # times evaluated at once: 5 MB with three axes
 
 At = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # times (T,) -> position, velocity (T, A)
-Each = Callable[[FloatArray, FloatArray, Array], None]
 
 
 def filtered(
@@ -140,32 +137,7 @@ def look_behind(
 
     each : called with times (T,) [s], distance over budget (T,) and piece (T,) of every chunk
     """
-    axes = pieces.vertex.shape[1]
-    count = rows.GROUPS * axes + rows.ROWS_ALONE
-    seen = Observed(
-        worst=np.zeros((count, 4)),
-        time=np.zeros(count),
-        at=np.zeros((count, axes)),
-        piece=np.zeros(count, dtype=np.int64),
-        match=new_match(pieces),
-    )
-    anywhere = AtStop(np.full(axes, np.inf), np.zeros(axes))  # the filtered motion need not rest
-    carried_t, carried = np.empty(0), np.empty((0, axes))
-    for new_t, new in filtered(at, end, filters, dt):
-        t, position = np.concatenate([carried_t, new_t]), np.concatenate([carried, new])
-        skip = len(carried_t)
-        if not skip:
-            seen.first, seen.t_first = position[0].copy(), float(t[0])
-        piece, feed_max = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-        match_samples(pieces, seen.match, t, position, skip, False, anywhere, Located(piece, feed_max))
-        if each is not None:
-            ratio = np.empty(len(t))
-            _ratios(pieces, piece, position, ratio)
-            each(t[skip:], ratio[skip:], piece[skip:])
-        seen.samples += len(t) - skip
-        seen.last, seen.t_last = position[-1].copy(), float(t[-1])
-        carried_t, carried = t[-1:], position[-1:]
-    return Look(seen, NOTE)
+    return follow(filtered(at, end, filters, dt), pieces, NOTE, each=each)
 
 
 def after_filters(
@@ -200,11 +172,3 @@ def after_filters(
         vertex_error_mm=apart.vertex_error(),
         faults=tuple(faults),
     )
-
-
-@kernel()
-def _ratios(pieces: ProgramPieces, piece: Array, position: FloatArray, ratio: FloatArray) -> None:
-    """Distance of each position from its piece over the piece's budget, into `ratio` (n,)."""
-    for k in range(len(piece)):
-        _, _, distance = reach_piece(pieces, piece[k], position[k], 0.0)
-        ratio[k] = distance / pieces.piece[piece[k]]["budget"]

@@ -89,7 +89,7 @@ def verify(
     faults += apart.vertex_faults(toolpath)
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
-    faults += exact_faults(trajectory, looks, toolpath, pieces, limits.rounding)
+    faults += exact_faults(trajectory, looks, toolpath, limits)
     faults += held_faults(trajectory, looks, toolpath, pieces, machine)
     extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
     if toolpath.extrusion is not None:

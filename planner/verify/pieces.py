@@ -70,8 +70,10 @@ CENTER, E1, E2, DRIFT = range(4)  # in `frame`
 RADIUS, RATE = range(2)  # in `turn`
 
 
-def program_pieces(toolpath: Toolpath) -> ProgramPieces:
+def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPieces:
     """Cut the toolpath into pieces. A segment's budget is the larger of its two joints'.
+
+    halved : (M,) segments that are cut into an even number of pieces; None for none
 
     Raises ValueError if the toolpath contradicts itself: segments that do not meet, arcs that do not end where they say.
     """
@@ -80,6 +82,8 @@ def program_pieces(toolpath: Toolpath) -> ProgramPieces:
     angle = np.abs(arcs.rate[toolpath.arc[is_arc]]) * toolpath.length[is_arc]
     count[is_arc] = np.maximum(1, np.ceil(angle / PIECE_ANGLE - RATIO_ROUNDING)).astype(np.int64)
     count[is_curve] = curve_counts(curves.points, curves.weight, PIECE_ANGLE)[toolpath.curve[is_curve]]
+    if halved is not None:
+        count += halved & (count % 2 == 1)
     segment = np.repeat(np.arange(len(toolpath)), count)
     first = np.cumsum(count) - count  # first piece of each segment
     part = np.arange(len(segment)) - first[segment]
@@ -90,7 +94,9 @@ def program_pieces(toolpath: Toolpath) -> ProgramPieces:
     frame = np.concatenate([np.stack([arcs.center, arcs.e1, arcs.e2, arcs.drift], axis=1), curves.points])
     turn = np.concatenate([np.stack([arcs.radius, arcs.rate], axis=1), curves.weight])
 
-    vertex = np.vstack([toolpath.start[segment], toolpath.end[-1:]])
+    share = (part / count[segment])[:, None]
+    chord = toolpath.end[segment] - toolpath.start[segment]
+    vertex = np.vstack([toolpath.start[segment] + share * chord, toolpath.end[-1:]])
     on_arc = np.flatnonzero(arc >= 0)
     vertex[on_arc] = _arc_points(toolpath, arc[on_arc], x0[on_arc])
     on_curve = np.flatnonzero(arc < -1)

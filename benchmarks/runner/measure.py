@@ -5,13 +5,13 @@ repeats       at most `repeats` calls, no further one after `ENOUGH` processor s
 processor     seconds of this process and of children it has waited for (getrusage), the least of the repeats
 quiet         a fixed loop before and after the calls, over the fastest one that this process has seen
 limit         processor seconds of a single call; a call above it is ended (SIGPROF) and its row says so. Compiled code that does not
-              come back for `NATIVE` times the limit ends with its process (SIGXCPU)
+              come back for `NATIVE` times the limit and `LATE` more ends with its process (SIGVTALRM). RLIMIT_CPU is of no use here:
+              it counts ticks, which can differ from the time that a process knows of itself by half, from its start on
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import resource
 import signal
 import time
@@ -45,7 +45,7 @@ from planner.verify import Verdict
 REPEATS, ENOUGH = 3, 2.0  # calls, and the processor seconds after which none follows [s]
 LOOP = 60_000  # turns of the calibration loop: some 5 ms
 LOOPS = 5  # of which the fastest counts on either side of a measure
-NATIVE = 1.5  # of the limit after which the process is ended [-]
+NATIVE, LATE = 1.5, 1.0  # of the limit, and seconds, after which the process is ended [-], [s]
 FIRST_LOOPS = 40  # at the start, to know what a quiet core does
 
 
@@ -133,10 +133,7 @@ def _limited(way: Way, job: Job, blank: Row, limit: float | None) -> Row:
     if limit is None:
         return outcome(way, job, blank)
     was = signal.signal(signal.SIGPROF, _stop)
-    soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    own = resource.getrusage(resource.RUSAGE_SELF)
-    last = math.ceil(own.ru_utime + own.ru_stime + NATIVE * limit) + 1  # whole seconds
-    resource.setrlimit(resource.RLIMIT_CPU, (last, hard))
+    signal.setitimer(signal.ITIMER_VIRTUAL, NATIVE * limit + LATE)
     signal.setitimer(signal.ITIMER_PROF, limit, 1.0)
     try:
         try:
@@ -146,7 +143,7 @@ def _limited(way: Way, job: Job, blank: Row, limit: float | None) -> Row:
     except OverTheLimit:  # from within the call, or on its way to the timer's end
         return dataclasses.replace(blank, status=OVER_LIMIT, message=f"more than {limit:g} CPU s")
     finally:
-        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
         signal.signal(signal.SIGPROF, was)
 
 

@@ -194,7 +194,7 @@ class Worker:
         if line:
             return rows.row_of_line(json.loads(line), "worker")
         self.close()
-        spent = self._process.returncode == -signal.SIGXCPU
+        spent = self._process.returncode == -signal.SIGVTALRM
         blank = Row(
             suite=str(asked["suite"]), job=str(asked["job"]), way=self.way.name, kind=self.way.kind,
             status=OVER_LIMIT if line is None or spent else ERROR, commit=str(asked["commit"]),

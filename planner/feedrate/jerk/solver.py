@@ -176,7 +176,8 @@ class JerkLimited:
         solution = replace(
             known,
             status=Status.ACCEPTABLE if stops else known.status,
-            sentence=f"{known.sentence}; {len(whole)} pieces and {len(ranges)} ranges solved again, slowed by {most - 1.0:.1e}"
+            sentence=f"{known.sentence}; {len(whole)} pieces and {len(ranges)} ranges solved again"
+            + (f", slowed by {most - 1.0:.1e}" if most > 1.0 else "")
             + (f", with {stops} full stops where the method did not converge" if stops else ""),
             iterations=max(
                 [

@@ -114,7 +114,7 @@ def check_corners(
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
         miss, chord = reading.distance, reading.normal * trajectory.dt**2 / 8.0
         budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # next to no normal acceleration: no bound
+    with np.errstate(divide="ignore", invalid="ignore"):
         own = np.where(reading.normal > 0, reading.feed * np.sqrt(reading.allowed / reading.normal), np.inf)
 
     def known(values: FloatArray) -> FloatArray:

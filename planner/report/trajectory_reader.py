@@ -38,6 +38,7 @@ KNOWN = {"t", "s", "feed", "line", "block"} | {
 TIME_STEP_MIN = 1e-9
 # Largest magnitude of a value, whatever its unit: third derivatives of larger positions, squared, are no numbers any more.
 VALUE_MAX = 1e30
+NUMBER_MAX = 2.0**31 - 1.0  # of a line or a block
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -164,9 +165,10 @@ def _numbers(source: str, name: str, column: Any) -> Array:
             f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed",
             source=source,
         )
-    bad = np.flatnonzero(~(np.abs(column.astype(np.float64)) <= VALUE_MAX))
+    most = NUMBER_MAX if name.strip().lower() in ("line", "block") else VALUE_MAX
+    bad = np.flatnonzero(~(np.abs(column.astype(np.float64)) <= most))
     if len(bad):
-        needed = "between -1e30 and 1e30" if np.isfinite(column[bad[0]]) else "a finite number"
+        needed = f"between {-most:.10g} and {most:.10g}" if np.isfinite(column[bad[0]]) else "a finite number"
         raise InputError(
             f"column '{name}', row {bad[0] + 1}: {column[bad[0]]}; every value must be {needed}",
             source=source,

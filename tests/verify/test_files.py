@@ -152,3 +152,13 @@ def test_normal_acceleration_by_positions_is_never_above_the_true_one_and_an_exc
         check = verdict.limits["normal_acceleration"]
         assert check.value <= 250.0
         assert (check.ratio <= 1.0) is passes
+
+
+@pytest.mark.parametrize("name", ["line", "block"])
+def test_a_number_of_a_line_that_is_none_is_refused(tmp_path, name):
+    """Found by fuzzing: it overflowed, with a warning of numpy."""
+    given = columns()
+    number = np.zeros(len(given["t"]))
+    number[3] = 1e20
+    with pytest.raises(InputError, match=rf"column '{name}', row 4: 1e\+20; every value must be between"):
+        judged(tmp_path, program(), **given | {name: number})

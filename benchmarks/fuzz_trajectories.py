@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import warnings
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -62,14 +63,14 @@ def other_columns(rng: np.random.Generator, columns: dict[str, Any]) -> dict[str
             columns = {
                 key: each[: int(rng.integers(0, 4))] if change else each for key, each in columns.items()
             }
-        elif change == 4:
+        elif change == 4 and column.dtype.kind in "fiub":
             some = rng.integers(0, max(len(column), 1), 3)
             columns[name] = np.array(column, dtype=float)
             if len(column):
                 columns[name][some] = rng.choice(ODD_COLUMN, 3)
         elif change == 5:
             kinds = ["f2", "f4", "i1", "i4", "u8", "c8", "S3", "U5", "?", "M8[s]", "f8"]
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
                 try:
                     columns[name] = column.astype(str(rng.choice(kinds)))
                 except (ValueError, TypeError):

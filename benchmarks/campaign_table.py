@@ -24,7 +24,7 @@ REASONS = 40  # sentences at most
 WIDTH = 136  # characters of a line of the page
 WORDS = 200  # characters of what is said of a job
 PAGE = ROOT / "docs" / "benchmarks.md"
-BEGIN, END = "<!-- campaign: written by `python -m benchmarks campaign` -->\n\n", "\n<!-- end of campaign -->"
+BEGIN, END = "<!-- campaign: written by `python -m benchmarks campaign` -->", "<!-- end of campaign -->"
 
 
 def write_summary(tally: Tally) -> None:
@@ -50,8 +50,13 @@ def write_summary(tally: Tally) -> None:
     text += f"\n{len(tally.wrong)} jobs are not as they should be. Those that did not take too long:\n\n"
     text += markdown(["seed", "source", "way", "outcome", "what"], list(map(_wrong, _besides_long(tally))))
     write_results("campaign", tally.data(), text)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    PAGE.write_text(f"{before}{BEGIN}{paragraph(tally)}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+    PAGE.write_text(with_paragraph(PAGE.read_text(encoding="utf-8"), paragraph(tally)), encoding="utf-8")
+
+
+def with_paragraph(page: str, text: str) -> str:
+    """The page with this text between its marks. Raises ValueError where it has none."""
+    begin, end = page.index(BEGIN) + len(BEGIN), page.index(END)
+    return f"{page[:begin]}\n\n{text}\n\n{page[end:]}"
 
 
 def paragraph(tally: Tally) -> str:

@@ -18,7 +18,7 @@ from benchmarks.campaign_jobs import job, job_from
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
 from benchmarks.campaign_laws import ALLOWED, mirrored, reversed_program, scaled, scaled_machine, split
 from benchmarks.campaign_rows import blocks_of, motion_of, outcome, row_of
-from benchmarks.campaign_table import PAGE, paragraph
+from benchmarks.campaign_table import BEGIN, END, PAGE, paragraph, with_paragraph
 from benchmarks.campaign_tally import LEAST, Tally, wrongs
 from planner.job.plan import Plan
 from planner.machine import Axis, Machine
@@ -222,6 +222,13 @@ def test_the_committed_tally_is_read() -> None:
     assert len(tally) == kept["jobs"]
     assert dict(tally.outcomes()) == kept["outcomes"]
     assert paragraph(tally) in PAGE.read_text(encoding="utf-8")
+
+
+def test_the_paragraph_is_all_that_changes_on_its_page() -> None:
+    page = f"before\n{BEGIN}\n{END}\n## after\n"
+    once = with_paragraph(page, "one")
+    assert once == f"before\n{BEGIN}\n\none\n\n{END}\n## after\n"
+    assert with_paragraph(once, "two") == once.replace("one", "two")
 
 
 def test_a_run_keeps_its_rows_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

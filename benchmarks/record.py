@@ -30,11 +30,12 @@ def provenance() -> dict[str, Any]:
 
 
 def _git(*words: str) -> str:
-    """What git says, "" where it says nothing."""
-    done = subprocess.run(
-        ["git", *words], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
-    )
-    return done.stdout.strip()
+    """What git says, "" where it says nothing or is not installed."""
+    command, here = ["git", *words], Path(__file__).parent
+    try:
+        return subprocess.run(command, cwd=here, capture_output=True, text=True, check=False).stdout.strip()
+    except OSError:
+        return ""
 
 
 def write_results(name: str, data: dict[str, Any], table: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from results_rows import keyed, row
 
+from benchmarks.record import provenance
 from benchmarks.runner.rows import about_line, append, compact, line_of, read
 from planner.base.errors import InputError
 
@@ -65,3 +66,10 @@ def test_wrong_lines_are_named(line: str, said: str, tmp_path: Path) -> None:
     file.write_text(line_of(ROWS[0]) + "\n" + line)
     with pytest.raises(InputError, match=f"rows.jsonl, line 2: .*{said}"):
         read(file)
+
+
+def test_without_git_a_result_has_no_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    about = provenance()
+    assert about["commit"] == ""
+    assert about["date"]

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.machine.parts import MAGNITUDE_MIN
 from planner.nc.points import AXES, program_of_points
 from planner.nc.program import Program
 
@@ -20,7 +21,7 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
 
     `Program.line` counts the moves from 1.
 
-    Raises InputError for arrays of another shape, values that are not finite, and feeds or a tolerance that are not above 0.
+    Raises InputError for arrays of another shape, values that are not finite, feeds that are not above 0, and a tolerance below 1e-12.
 
     >>> import planner
     >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
@@ -31,8 +32,8 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
     """
     position = _points(points)
     moves = len(position) - 1
-    if tolerance is not None and not 0 < tolerance < np.inf:
-        raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
+    if tolerance is not None and not MAGNITUDE_MIN <= tolerance < np.inf:
+        raise InputError(f"tolerance {tolerance} mm; it must be {MAGNITUDE_MIN:g} or more, and finite")
     return program_of_points(
         position, np.full(moves, np.inf) if feed is None else _feeds(feed, moves), tolerance
     )
@@ -55,7 +56,12 @@ def _points(points: ArrayLike) -> FloatArray:
 
 def _feeds(feed: ArrayLike, moves: int) -> FloatArray:
     """(moves,) feeds [mm/s]. Raises InputError unless they are one number, or one above 0 for each move."""
-    given = np.asarray(feed, dtype=np.float64)
+    try:
+        given = np.asarray(feed, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(
+            "feed: not a number and not an array of numbers; give one, or one for each move"
+        ) from None
     if given.shape not in ((), (moves,)):
         raise InputError(f"feed: shape {given.shape}; give one number, or one for each of the {moves} moves")
     given = np.broadcast_to(given, (moves,))

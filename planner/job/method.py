@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from planner.base.names import KINEMATIC, OPTIMAL
 from planner.constraints.extruder import with_extruder_limit
 from planner.delivery import periods
 from planner.feedrate.solution import Status
@@ -21,15 +22,14 @@ from planner.job.trace import Log
 from planner.machine import Machine
 from planner.motion.timing import require_samples
 from planner.nc.program import Program
-from planner.verify import Verdict
-from planner.verify.held import FAULT
+from planner.verify import ThreadCheck, Verdict
 
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
 INSTEAD_POINTS = 50_000
-IN_STEP = "plan threads by method optimal or kinematic, without --shaped"
+IN_STEP = (OPTIMAL, KINEMATIC)  # methods for threads
 
 
 class Method(ABC):
@@ -70,8 +70,10 @@ class Method(ABC):
         require_samples(at_feed, machine.dt)
         stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
         made = self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
-        if lost := _out_of_step(made):  # it would be no thread
-            return _not_delivered(made, f"{lost}: the feed is reached behind the run-in; {IN_STEP}")
+        if (lost := _out_of_step(made)) is not None:  # it would be no thread
+            return _not_delivered(
+                made, f"{lost.sentence()}: the feed is reached behind the run-in; {self._in_step(made)}"
+            )
         if made.pricing is None:
             return made
         with stages.stage("report"):
@@ -157,6 +159,12 @@ class Method(ABC):
                 made = dataclasses.replace(rival, method=made.method, corner=made.corner, sentence=said)
         return made
 
+    def _in_step(self, made: Plan) -> str:
+        """What to do about a thread that this method does not keep in step."""
+        if getattr(self, "shaped", False):
+            return "plan threads without --shaped"
+        return f"plan threads by method {' or '.join(name for name in IN_STEP if name != made.method)}"
+
     @abstractmethod
     def plan_job(self, job: Job) -> Plan:
         """Plan a job whose toolpath is laid out. What a method has to provide."""
@@ -177,10 +185,11 @@ def _faster_than(plan: Plan, job: Job) -> Job:
     return dataclasses.replace(job, most=min(job.most, plan.cycle_time)) if passed else job
 
 
-def _out_of_step(plan: Plan) -> str:
-    """The verdict's sentence on the thread that is most out of step with the spindle; empty where none is."""
-    faults = plan.verdict.faults if plan.verdict is not None else ()
-    return next((fault for fault in faults if fault.startswith(FAULT)), "")
+def _out_of_step(plan: Plan) -> ThreadCheck | None:
+    """The thread that is most out of step with the spindle; None where none is."""
+    threads = plan.verdict.threads if plan.verdict is not None else ()
+    bad = [thread for thread in threads if thread.broken]
+    return max(bad, key=lambda thread: thread.ratio) if bad else None
 
 
 def _not_delivered(plan: Plan, why: str) -> Plan:

@@ -17,6 +17,10 @@ sharp each check is:
     error_allocation.py
                   eq. 18-20 at every programmed corner, on the motion's own curvature
     corners.py    the record of that
+    exact.py      blocks under G61: the samples run along the path itself
+    held.py       threads: moves in step with the spindle
+    extruder.py   what the extruder of a 3-D printer does
+    joints.py     setpoints of the joints, with the tool centre point on
     ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
     judge.py      `verify` itself
@@ -31,8 +35,17 @@ from planner.verify.corners import CornerCheck
 from planner.verify.given import Given
 from planner.verify.judge import verify
 from planner.verify.ringing import Ringing
-from planner.verify.verdict import AfterFilters, LimitCheck, Verdict
+from planner.verify.verdict import AfterFilters, LimitCheck, ThreadCheck, Verdict
 
-__all__ = ["AfterFilters", "CornerCheck", "Given", "LimitCheck", "Ringing", "Verdict", "verify"]
+__all__ = [
+    "AfterFilters",
+    "CornerCheck",
+    "Given",
+    "LimitCheck",
+    "Ringing",
+    "ThreadCheck",
+    "Verdict",
+    "verify",
+]
 
 call_like(__name__, "planner.interactive.given_motion:verify")

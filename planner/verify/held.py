@@ -21,29 +21,37 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, joint_times
-from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
+from planner.verify.pieces import CONTOUR_ROUNDING, ProgramPieces
+from planner.verify.verdict import ThreadCheck
 
-FAULT = "thread"  # what its faults begin with
 MORE = 0.02  # of d, by which a plan on a grid may take longer [-]
 
 
-def held_faults(
+def thread_checks(
     trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, machine: Machine
-) -> list[str]:
-    """Moves that are not in step with the spindle, in sentences; the largest errors first."""
+) -> tuple[ThreadCheck, ...]:
+    """How far each move in step with the spindle is out of step, in the order of the program."""
     held = np.flatnonzero(toolpath.held)
     if not len(held):
-        return []
+        return ()
     off = _out_of_step(trajectory, looks[0], toolpath, pieces, held, room_of(toolpath, machine, held))
     allowed = np.minimum(toolpath.tolerance[held], toolpath.tolerance[held + 1])
-    worst = np.argsort(-off / allowed)
-    bad = worst[off[worst] > allowed[worst] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING]
-    said = [
-        f"{FAULT}: {off[k]:.6g} mm out of step with the spindle, {allowed[k]:.6g} mm allowed, at the feed "
-        f"{toolpath.feed[held[k]]:.6g} mm/s, line {toolpath.line[held[k]]}"
-        for k in bad[:FAULTS_OF_A_KIND]
-    ]
-    return said + ([f"{FAULT}: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])
+    return tuple(
+        ThreadCheck(
+            line=int(toolpath.line[k]),
+            feed=float(toolpath.feed[k]),
+            error_mm=float(off[i]),
+            allowed_mm=float(allowed[i]),
+        )
+        for i, k in enumerate(held)
+    )
+
+
+def thread_faults(threads: tuple[ThreadCheck, ...]) -> list[str]:
+    """Moves that are not in step with the spindle, in sentences; the largest errors first."""
+    bad = sorted((thread for thread in threads if thread.broken), key=lambda thread: -thread.ratio)
+    said = [thread.sentence() for thread in bad[:FAULTS_OF_A_KIND]]
+    return said + ([f"thread: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])
 
 
 def room_of(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:

@@ -17,7 +17,7 @@ from planner.verify.extruder import extruder_seen
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES
 from planner.verify.given import DERIVATIVES, Given
-from planner.verify.held import held_faults
+from planner.verify.held import thread_checks, thread_faults
 from planner.verify.limits import NORMAL_NAME, normal_limit
 from planner.verify.pieces import program_pieces, widened
 from planner.verify.reading import Reader
@@ -90,7 +90,8 @@ def verify(
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
     faults += exact_faults(trajectory, looks, toolpath, limits)
-    faults += held_faults(trajectory, looks, toolpath, pieces, machine)
+    threads = thread_checks(trajectory, looks, toolpath, pieces, machine)
+    faults += thread_faults(threads)
     extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
     if toolpath.extrusion is not None:
         checks |= extruder.checks(toolpath.extrusion.limits, not_limited)
@@ -131,6 +132,7 @@ def verify(
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
         lost_after=contour.lost_after(looks, toolpath, pieces, complete=not len(lost)),
+        threads=threads,
         faults=tuple(faults),
         ringing=ringing_of(trajectory, machine),
         notes=tuple(notes),

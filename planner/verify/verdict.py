@@ -7,7 +7,7 @@ from typing import Any
 
 from planner.base.arrays import FloatArray, freeze
 from planner.verify.corners import CornerCheck
-from planner.verify.pieces import RATIO_ROUNDING
+from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verify.ringing import Ringing
 
 
@@ -53,6 +53,39 @@ class LimitCheck:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class ThreadCheck:
+    """How far one move in step with the spindle is from where the turns of the spindle want it (held.py).
+
+    line       : NC line
+    feed       : at which the move is to be cut [mm/s]
+    error_mm   : the largest distance from there, between run-in and run-out [mm]; 0 where there are no samples between them
+    allowed_mm : the contour tolerance [mm]
+    """
+
+    line: int
+    feed: float
+    error_mm: float
+    allowed_mm: float
+
+    @property
+    def ratio(self) -> float:
+        """The distance over what is allowed [-]."""
+        return self.error_mm / self.allowed_mm
+
+    @property
+    def broken(self) -> bool:
+        """True if the move is out of step."""
+        return self.error_mm > self.allowed_mm * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+
+    def sentence(self) -> str:
+        """Distance, what is allowed, feed and line."""
+        return (
+            f"thread: {self.error_mm:.6g} mm out of step with the spindle, {self.allowed_mm:.6g} mm allowed, at the feed "
+            f"{self.feed:.6g} mm/s, line {self.line}"
+        )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AfterFilters:
     """Errors behind the filters of the machine (filtered.py); fields as in `Verdict`."""
@@ -85,6 +118,7 @@ class Verdict:
     order            : True if the blocks are passed in the order of the program, and none is left out
     lost             : indices of blocks that the motion never visits
     lost_lines       : their NC lines
+    threads          : moves in step with the spindle, in the order of the program, each with how far it is out of step
     faults           : one sentence for each failure: what, by how much, when, where, NC line
     after_filters    : errors of the motion behind the filters of the machine; None for a machine without filters
     ringing          : what each vibration mode of the machine does; reported, not judged
@@ -109,6 +143,7 @@ class Verdict:
     after_filters: AfterFilters | None = None
     ringing: tuple[Ringing, ...] = ()
     lost_after: int | None = None
+    threads: tuple[ThreadCheck, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -132,6 +167,9 @@ class Verdict:
                 "linear_error_mm": self.linear_error_mm,
                 "angle_error_deg": self.angle_error_deg,
             }
+        if self.threads:
+            worst = max(self.threads, key=lambda thread: thread.ratio)
+            behind["thread_error_mm"] = worst.error_mm
         return behind | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},

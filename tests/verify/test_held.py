@@ -10,7 +10,9 @@ from motions import along, rest_to_rest
 from benchmarks import problems
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.run_in import run_in
+from planner.job.method import IN_STEP
 from planner.machine import Fir, Mode
+from planner.methods.kinematic import KinematicMethod
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
 from planner.verify.held import room_of
@@ -71,6 +73,20 @@ def test_a_thread_below_its_feed_falls_out_of_step(share: float) -> None:
     assert said.endswith("line 2")
 
 
+def test_the_verdict_has_a_field_for_threads() -> None:
+    """Nobody has to read its sentences."""
+    (kept,) = judge(down(FEED), toolpath()).threads
+    assert (kept.line, kept.feed, kept.allowed_mm, kept.broken) == (2, FEED, 0.05, False)
+    verdict = judge(down(0.9 * FEED), toolpath())
+    (lost,) = verdict.threads
+    assert lost.broken
+    assert lost.sentence() in verdict.faults
+    assert verdict.summary()["thread_error_mm"] == lost.error_mm == pytest.approx(lost.ratio * 0.05)
+    straight = toolpath_from_program(parse_program(f"G21 G90 F1500\nG1 Z-{LENGTH}\nM2"), M)
+    assert judge(down(FEED), straight).threads == ()
+    assert "thread_error_mm" not in judge(down(FEED), straight).summary()
+
+
 def test_a_thread_whose_speed_wavers_falls_out_of_step() -> None:
     """By wave / k with the wave number k."""
     said = fault(judge(down(FEED, 0.1), toolpath()), "thread")
@@ -111,5 +127,14 @@ def test_a_thread_that_cannot_be_kept_in_step_is_not_delivered():
     made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
     assert made.trajectory is None
     assert made.sentence.startswith("thread: ")
-    assert made.sentence.endswith("plan threads by method optimal or kinematic, without --shaped")
+    assert made.sentence.endswith("plan threads without --shaped")
     assert plan(parse_program(text, machine), machine, effort="quick").verdict.passed
+    made = plan(parse_program(text, machine), machine, method="fir")
+    assert made.sentence.endswith("plan threads by method optimal or kinematic")
+    assert plan(parse_program(text, machine), machine, method="kinematic").verdict.passed
+
+
+def test_the_remedy_is_never_the_method_that_was_asked() -> None:
+    made = plan(parse_program(f"G21 G90 M3 S{60 * FEED}\nG33 Z-{LENGTH} K1\nM2"), M, method="kinematic")
+    assert IN_STEP == ("optimal", "kinematic")
+    assert KinematicMethod()._in_step(made) == "plan threads by method optimal"

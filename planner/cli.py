@@ -1,7 +1,6 @@
 """The entry point of the command `planner`; the commands themselves are in `planner.commands.app`.
 
-Exit codes: 0 done and verified; 1 the verdict failed; 2 bad input; 3 not solved; 70 a bug of ours; 130
-interrupted; 141 nobody reads the output any more.
+Its exit codes are in `planner.commands.exit_codes`.
 
 Nothing is imported before Ctrl-C has its handler, so that an interrupt during the imports ends like any other.
 """
@@ -19,11 +18,11 @@ __all__ = ["app", "main"]
 
 # So many new objects before a collection of garbage; Python's 700 means 155 collections, 0.1 s of a plan of ten lines (now 10, 0.04 s).
 OBJECTS = 10_000
-NOT_SOLVED = 3  # exit code, as in commands/terminal.py
 
 
 def main() -> None:
     """Entry point of the command `planner`."""
+    from planner.commands.exit_codes import NOT_SOLVED
     from planner.commands.interrupt import end_at_interrupts, no_more_interrupts
     from planner.commands.memory import is_of_memory
 

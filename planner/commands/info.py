@@ -6,8 +6,9 @@ import json
 
 import typer
 
+from planner.commands.exit_codes import BAD_INPUT
 from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption, takes_reading
-from planner.commands.terminal import BAD_INPUT, guarded, say, show
+from planner.commands.terminal import guarded, say, show
 from planner.nc.reading import Reading
 
 

@@ -23,12 +23,19 @@ from typing import Any
 from planner.base.errors import InputError
 from planner.base.files import STDIN
 from planner.base.threads import cores
-from planner.commands.interrupt import INTERRUPTED, interrupts_raise
+from planner.commands.exit_codes import BAD_INPUT, BUG, FAILED, INTERRUPTED, NOT_SOLVED
+from planner.commands.interrupt import interrupts_raise
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import BUG, NOT_SOLVED, say, show
+from planner.commands.terminal import say, show
 
 # By the exit code of a program's process.
-OUTCOMES = {0: "passed", 1: "failed", 2: "refused", 3: "not solved", INTERRUPTED: "interrupted"}
+OUTCOMES = {
+    0: "passed",
+    FAILED: "failed",
+    BAD_INPUT: "refused",
+    NOT_SOLVED: "not solved",
+    INTERRUPTED: "interrupted",
+}
 CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
 # Signals that no fault of a process raises: of a system whose memory is used up, of a batch system, of `kill`.
 FROM_OUTSIDE = (signal.SIGTERM, 9)  # 9 is SIGKILL, which Windows does not have

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import typer
 
 from planner.base.errors import InputError
+from planner.commands.exit_codes import FAILED, NOT_SOLVED
 from planner.commands.options import (
     DEFAULT_MACHINE,
     Job,
@@ -18,7 +19,6 @@ from planner.commands.options import (
     takes_reading,
     taking,
 )
-from planner.commands.terminal import FAILED, NOT_SOLVED
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:

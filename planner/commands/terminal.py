@@ -1,4 +1,4 @@
-"""How a command reports: exit codes, messages, tables on standard output, progress on standard error."""
+"""How a command reports: messages, tables on standard output, progress on standard error."""
 
 from __future__ import annotations
 
@@ -16,13 +16,11 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.commands.interrupt import INTERRUPTED
+from planner.commands.exit_codes import BAD_INPUT, BROKEN_PIPE, BUG, INTERRUPTED, NOT_SOLVED
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-# Exit codes. The last two are those of sysexits.h (EX_SOFTWARE) and of a shell (128 + SIGPIPE).
-FAILED, BAD_INPUT, NOT_SOLVED, BUG, BROKEN_PIPE = 1, 2, 3, 70, 141
 # Columns where the output is no terminal: rows are for other programs there, and are not cut or folded.
 PIPE_WIDTH = 1000
 PLAIN = {"µ": "u", "²": "2", "³": "3", "°": "deg", "…": "..."}  # for encodings that lack them

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from planner.commands import memory
+from planner.commands.exit_codes import NOT_SOLVED
 from planner.commands.many import plan_many
-from planner.commands.terminal import NOT_SOLVED
 from tests.commands.command_line import run
 
 

@@ -163,7 +163,7 @@ def _read_back(text: bytes, plan: Plan, how: str) -> Program:
         read = parse_program(text, plan.machine, dataclasses.replace(planned.reading, dialect=AUTO))
     except InputError as fault:
         raise LeftOut(f"{planned.source} {how} does not read back: {fault.message}") from None
-    same = _same(read, planned, ("kind", "path_control", "arc_block", "arc_normal"))
+    same = _same(read, planned, ("kind", "path_control", "arc_block", "arc_normal"), within=SAME_PATH)
     if not same or not all(
         np.allclose(getattr(read, name), getattr(planned, name), rtol=0.0, atol=SAME_PATH)
         for name in ("end", "arc_center", "dwell")
@@ -189,10 +189,11 @@ def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
     return _same(program, plan.program, (*_MOTION, "feed") if feeds else _MOTION)
 
 
-def _same(one: Program, other: Program, names: tuple[str, ...]) -> bool:
-    splines = all(
-        np.array_equal(getattr(one.splines, n), getattr(other.splines, n))
-        for n in ("block", "points", "weights")
+def _same(one: Program, other: Program, names: tuple[str, ...], within: float = 0.0) -> bool:
+    """Whether two programs have the same blocks and splines; the latter's points [mm] and weights may be `within` of each other."""
+    splines = np.array_equal(one.splines.block, other.splines.block) and all(
+        np.allclose(getattr(one.splines, n), getattr(other.splines, n), rtol=0.0, atol=within)
+        for n in ("points", "weights")
     )
     return (
         splines

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hand_made import SQUARE, make_plan, trajectory_along
 
+import planner
 from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.nc.lexer import LINE_MAX
@@ -140,3 +141,13 @@ def test_of_a_program_that_computes_the_expanded_one_is_written(tmp_path: Path) 
     assert notes(tmp_path / "out") == [
         "planned.ngc is the expanded program: parameters, loops and calls are written out"
     ]
+
+
+def test_splines_with_computed_numbers_are_written_expanded_too(tmp_path: Path) -> None:
+    """Seven digits of a fraction: their points read back within the tolerance of the path, not to the last digit."""
+    job = tmp_path / "job.ngc"
+    job.write_text("G21 F9000\n#1=[2/7]\nG5.1 X3 Y[#1*2] I0 J#1\nM2\n")
+    machine = load_machine("mill")
+    write_plan(planner.plan(job, machine, method="stop"), tmp_path / "out")
+    lines = (tmp_path / "out" / "planned.ngc").read_text().splitlines()
+    assert lines[2].startswith("G5.1 X3 Y0.5714286 I0 J0.2857143")

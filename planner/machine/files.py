@@ -73,7 +73,7 @@ def builtin_text(name: str) -> str:
 def _read(path: Path) -> str:
     try:
         require_ending(path)
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # editors of Windows put a mark in front
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())
         there = [str(file) for file in path.parent.glob("*.toml")] if path.parent.is_dir() else []

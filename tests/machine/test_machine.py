@@ -68,6 +68,11 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
     assert "dt" in refusal(path)
 
 
+def test_a_machine_file_as_editors_of_windows_write_it(tmp_path: Path) -> None:
+    (tmp_path / "machine.toml").write_bytes(b"\xef\xbb\xbf" + TEMPLATE.read_bytes().replace(b"\n", b"\r\n"))
+    assert load_machine(tmp_path / "machine.toml").axes == load_machine(TEMPLATE).axes
+
+
 def test_a_machine_file_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "machine.toml").write_bytes(b"\xff\xfe\x00\x00")
     assert "cannot be read" in refusal(tmp_path / "machine.toml")

@@ -149,5 +149,6 @@ def _run(
         except MemoryError as fault:
             row = Row(method=method, outcome="not solved", sentence=memory_used_up(fault))
     took = "" if row.cycle_time is None else f" {row.cycle_time:.4f} s,"
-    say(f"{method}:{took} {row.outcome}", err=True)
+    if not quiet:
+        say(f"{method}:{took} {row.outcome}", err=True)
     return row

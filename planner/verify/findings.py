@@ -216,7 +216,7 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple
             said.append("order: " + look.noted(f"{len(here)} blocks are not run to their end, line {shown}"))
         if match.tally[HELD]:
             line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
-            held = f"lost after line {line}: {match.tally[HELD]} samples far from where the program should be"
+            held = f"lost after line {line}: {match.tally[HELD]} places looked at are far from where the program should be"
             said.append("order: " + look.noted(held))
         in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
     return np.unique(pieces.piece["segment"][lost]), in_order, said

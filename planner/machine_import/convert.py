@@ -94,7 +94,8 @@ def _settings_of(text: str, source: str, control: str | None) -> ControlSettings
         if control == name or (control is None and recognised(text)):
             return settings(text, source)
     raise InputError(
-        "no settings found of LinuxCNC (an INI file), grbl (what $$ prints), Klipper (printer.cfg) or Marlin (what M503 prints)",
+        "no settings found of LinuxCNC (an INI file), grbl (what $$ prints), Klipper (printer.cfg), Marlin (what M503 prints) "
+        "or RepRapFirmware (config.g)",
         source=source,
     )
 

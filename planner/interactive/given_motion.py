@@ -54,6 +54,7 @@ def verify(
     """
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    machine.check()
     for name in not_limited:
         if name not in NOT_LIMITED_NAMES:
             raise InputError(f"not_limited: no such limit '{name}'; there are {', '.join(NOT_LIMITED_NAMES)}")

@@ -167,6 +167,10 @@ class Machine(Record):
         """Limits beside those of a machine file (constraints/own.py)."""
         return self._own
 
+    def check(self) -> None:
+        """Raise InputError for keys and values that no machine file may have: `model_copy` takes any."""
+        Machine(**_tables(self))
+
     def with_own(self, limits: Sequence[OwnLimit]) -> Machine:
         """The machine with these limits of one's own, and no others.
 
@@ -176,6 +180,15 @@ class Machine(Record):
         machine = self.model_copy()
         machine._own = tuple(limits)
         return machine
+
+
+def _tables(value: Any) -> Any:
+    """A record as the nested tables that it could be made of, with the keys that were given."""
+    if isinstance(value, Record):
+        return {key: _tables(value.__dict__[key]) for key in sorted(value.model_fields_set)}
+    if isinstance(value, dict):
+        return {key: _tables(one) for key, one in value.items()}
+    return [_tables(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 # The keys of the machine, under "", and of each table, that an unknown one may be meant for.

@@ -85,8 +85,8 @@ def plan(
     Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status; `Plan.require` turns it into a
     NotSolvedError.
 
-    Raises InputError for a program or machine that cannot be read, naming file, line and column, for an unknown name, and for a setting
-    that the method does not use.
+    Raises InputError for a program or machine that cannot be read, naming file, line and column, for a machine with a value that no
+    machine file may have, for an unknown name, and for a setting that the method does not use.
     """
     given = check_settings(method, **settings)
     joints = not isinstance(method, str) or METHODS[method_name(method)].joints
@@ -94,6 +94,7 @@ def plan(
         method = make_method(method, **given)
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    machine.check()
     if not isinstance(limits, Sequence):
         limits = (limits,)
     if limits:

@@ -81,7 +81,7 @@ class Row:
 def compare(
     program: Program | str | Path,
     machine: Machine | str | Path | None = None,
-    methods: Sequence[str | Method] | None = None,
+    methods: str | Sequence[str | Method] | None = None,
     *,
     limits: Sequence[OwnLimit] = (),
     tolerance: float | None = None,
@@ -90,7 +90,7 @@ def compare(
 ) -> list[Row]:
     """Plan a program with several methods and put them side by side, judged by the same verifier.
 
-    methods   : names, or methods with settings of your own; None for all that have names
+    methods   : names, or methods with settings of your own, one name alone too; None for all that have names
     the others : as in `planner.plan`
 
     Raises InputError for a program or a machine that cannot be read, and for a name that is no method; what a method cannot do is its
@@ -100,13 +100,14 @@ def compare(
 
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    machine.check()
     if limits:
         machine = machine.with_own((*machine.own, *limits))
     if not isinstance(program, Program):
         program = read_program(program, machine, reading)
     elif reading != AS_USUAL:
         raise InputError("reading: the program is read already; give the settings to read_program")
-    chosen = METHODS if methods is None else methods
+    chosen = METHODS if methods is None else [methods] if isinstance(methods, str) else methods
     for name in chosen:
         if isinstance(name, str):
             method_name(name)

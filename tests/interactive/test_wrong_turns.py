@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 import planner
@@ -54,3 +55,31 @@ def test_a_wrong_turn_is_answered_with_the_right_one(
 def test_one_limit_of_ones_own_needs_no_list() -> None:
     made = planner.plan(corner(), "mill", method="second-order", limits=Slow())
     assert "velocity.slow" in made.require().verdict.limits  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"jerk": -5.0}, "axes.x.jerk: must be above 0, found -5.0"),
+        ({"jerk": "fast"}, "axes.x.jerk: must be a number, found 'fast'"),
+        ({"jrk": 5.0}, r"axes.x.jrk: unknown key \(did you mean 'jerk'\?\)"),
+        ({"velocity": np.inf}, "axes.x.velocity: must be a finite number"),
+    ],
+)
+def test_a_machine_changed_by_model_copy_is_checked(changed: dict[str, object], said: str) -> None:
+    """pydantic's model_copy takes anything: a misspelt jerk was left out without a word."""
+    mill = planner.load_machine("mill")
+    axes = {**mill.axes, "x": mill.axes["x"].model_copy(update=changed)}
+    machine = mill.model_copy(update={"axes": axes})
+    with pytest.raises(planner.InputError, match=said):
+        planner.plan(corner(), machine, method="stop")
+    with pytest.raises(planner.InputError, match=said):
+        planner.verify([0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]], corner(), machine)
+    with pytest.raises(planner.InputError, match="dt: must be above 0"):
+        planner.plan(corner(), mill.model_copy(update={"dt": 0.0}), method="stop")
+    with pytest.raises(planner.InputError, match=said):
+        planner.compare(corner(), machine, ["stop"])
+
+
+def test_one_name_is_a_method_and_no_sequence_of_letters() -> None:
+    assert [row.method for row in planner.compare(corner(), "mill", "stop")] == ["stop"]

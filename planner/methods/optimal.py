@@ -48,7 +48,7 @@ LEAST_STEPS = 2
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalMethod(Method):
-    """Time-optimal planning with jerk limits on rounded corners.
+    """The fastest motion under all limits, that of the jerk included: on splines first, then geometry and feed together.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver

@@ -24,7 +24,7 @@ from planner.optimal.shaped import shaped_plan
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrderMethod(Method):
-    """Second-order time-optimal planning on rounded corners.
+    """The fastest motion under all limits but jerk, on splines or rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver

@@ -153,9 +153,9 @@ def found_prices(
         name: priced.saving(at_feed if name == FEED.name else np.inf).widened(UNREST * cycle_time)
         for name, priced in more.items()
     }
-    saved = {name: saving.middle for name, saving in ranges.items()}
-    saved |= {name: min(middle, most) for name, middle in saved.items() if name != TOLERANCE}
-    ranges |= {name: saving.below(most) for name, saving in ranges.items() if name != TOLERANCE}
+    bound = {name: cycle_time if name == TOLERANCE else most for name in ranges}
+    saved = {name: min(saving.middle, bound[name]) for name, saving in ranges.items()}
+    ranges = {name: saving.below(bound[name]) for name, saving in ranges.items()}
     return PriceList(
         limits={name: slope[name] / limit[name] for name in limit},
         feed=slope[FEED.name],

@@ -109,7 +109,8 @@ def price_list(
         together = _by_joint(samples.path, by_site.place, by_site.now)
         tolerance = float(together.sum())
         wider = _by_joint(samples.path, by_site.place, by_site.wider)
-        dear = _dearest(samples.path, together, -0.5 * MORE_TOLERANCE * (together + wider))
+        saved = np.minimum(-0.5 * MORE_TOLERANCE * (together + wider), solution.cycle_time)
+        dear = _dearest(samples.path, together, saved)
     elif isinstance(samples.path, SmoothPath) and not len(samples.path.spline):
         corners = corner_prices(samples.path, samples, problem, solution, machine, now)
         for axis in problem.axes[: problem.machine_axes]:
@@ -128,7 +129,10 @@ def price_list(
     unrest = 0.0 if corners is not None else UNREST * solution.cycle_time
     found = {name: saving.widened(unrest) for name, saving in found.items()}
     most = solution.cycle_time * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-    found = {name: saving if name == "tolerance" else saving.below(most) for name, saving in found.items()}
+    found = {
+        name: saving.below(solution.cycle_time if name == "tolerance" else most)
+        for name, saving in found.items()
+    }
     return PriceList(
         limits={name: by_share[name] / limit[name] for name in limit},
         feed=by_share[FEED.name],

@@ -316,3 +316,16 @@ def test_splines_price_their_tolerance(name):
     assert 0 < len(dear) <= 10
     assert (np.diff(dear.saved) <= 0.0).all()
     assert dear.price.sum() >= plan.prices.tolerance * (1 + 1e-9)  # part of the whole, all negative
+
+
+def test_no_tolerance_saves_more_than_the_motion_takes():
+    """A straight line over 10 um says 5 s of 0.7 s where the tolerance is 1 nm."""
+    program = parse_program("G21 G90 G64\nF2000\nG1 X10\nY10\nM2\n")
+    plan = planner.plan(program, "mill", tolerance=1e-6, effort="quick")
+    told, most = (
+        plan.prices,
+        1.001 * plan.cycle_time,
+    )  # that of a stop, which is a little faster than what is priced
+    assert told.ranges["tolerance"][1] <= most
+    assert told.saved["tolerance"] <= most
+    assert (told.corners.saved <= most).all()

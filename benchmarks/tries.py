@@ -1,5 +1,5 @@
 """What the trace of a plan (planner/job/trace.py) tells of every heuristic that was tried, and the files that keep traces, one plan
-a line: for benchmarks/ablation.py and benchmarks/retries.py."""
+a line: for benchmarks/retries.py."""
 
 from __future__ import annotations
 

@@ -128,7 +128,8 @@ def _table(rows: dict[str, Any]) -> str:
     for name in STARTS:
         columns += [f"`optimal`, {name} [s]", "tube [s]", "start kept on", "CPU [s]"]
     text = "Cycle times of the start and of what method `tube` (solver own) finds from it; * the verdict failed. CPU seconds are of\n"
-    return text + "the whole plan.\n\n" + markdown(columns, [[name, *_cells(row)] for name, row in rows.items()])
+    text += "the whole plan.\n\n"
+    return text + markdown(columns, [[name, *_cells(row)] for name, row in rows.items()])
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

@@ -134,7 +134,7 @@ SWITCHES: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
     ),
     "all candidates but two behind a shaper": (
         ("shaped:",),
-        _set(shaped, "CANDIDATES", (shaped.CANDIDATES[0], shaped.CANDIDATES[2])),
+        _set(shaped.shaped, "__defaults__", ((shaped.CANDIDATES[0], shaped.CANDIDATES[2]),)),
     ),
 }
 

@@ -134,7 +134,7 @@ def write_stale(folder: Path) -> list[Path]:
         ]
         for age in old
     ]
-    table = markdown(["result", "made at", "on", "commits since", "quoted in"], rows)
+    table = markdown(["result", "made at", "on", "commits since", "quoted in"], rows) if rows else "None.\n"
     PAGE.write_text(f"{head}{BEGIN}\n\n{table}\n{END}{tail}", encoding="utf-8")
     return [PAGE]
 

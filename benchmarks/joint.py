@@ -1,18 +1,14 @@
-"""Geometry and feed together: what method `tube` with its own solver finds beyond `optimal`, on real programs and random jobs.
+"""Geometry and feed together: what method `tube` with its own solver finds beyond rounds of reshaping, and whether its start matters.
 
-    python -m benchmarks.joint [--random 20] [--only NAME ..]
+    python -m benchmarks.joint
 
-The named jobs are those of issue trackers and papers that the other benchmarks use: pentagon, zig-zag, circle and star spiral of
+The jobs are those of issue trackers and papers that the other benchmarks use: pentagon, zig-zag, circle and star spiral of
 problems.py on the built-in `mill` and on the machine of problems.py, the bracket, and windows of real programs of ../shared where
-these are there. `--random N`: the jobs 0 to N-1 of random_lines.py.
-
-Results: benchmarks/results/joint.json and .md, as far as they have come.
+these are there; random jobs are those of joint_campaign.py. Results: benchmarks/results/joint.json and .md.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 import time
 from collections.abc import Callable
@@ -22,8 +18,8 @@ from typing import Any
 import numpy as np
 
 import planner
-from benchmarks import problems, random_lines
-from benchmarks.record import RESULTS, markdown, write_results
+from benchmarks import problems
+from benchmarks.record import markdown, write_results
 from planner.base.errors import PlannerError
 from planner.base.names import NORMAL
 from planner.machine import Machine
@@ -117,47 +113,23 @@ def measured(program: Program, machine: Machine) -> dict[str, Any]:
 
 def main() -> None:
     """Run the jobs and write the table."""
-    parser = argparse.ArgumentParser(description="geometry and feed together, against optimal")
-    parser.add_argument("--random", type=int, default=0, help="random jobs")
-    parser.add_argument("--only", nargs="*", help="names that contain one of these")
-    asked = parser.parse_args()
-    file = RESULTS / "joint.json"
-    rows: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))["jobs"] if file.exists() else {}
-    todo = {
-        name: pair for name, pair in jobs().items() if not asked.only or any(p in name for p in asked.only)
-    }
-    if asked.only == []:
-        todo = {}
-    for name, (make, machine) in todo.items():
+    made = jobs()
+    first, machine = next(iter(made.values()))
+    measured(first(), machine)  # kernels are loaded
+    rows: dict[str, Any] = {}
+    for name, (make, machine) in made.items():
         rows[name] = measured(make(), machine)
         print(name, rows[name], flush=True)
-        write_results("joint", {"jobs": rows}, _table(rows))
-    for seed in range(asked.random):
-        program, machine = random_lines.job(seed)
-        rows[f"random {seed}"] = measured(program, machine)
-        write_results("joint", {"jobs": rows}, _table(rows))
+    write_results("joint", {"jobs": rows}, _table(rows))
 
 
 def _table(rows: dict[str, Any]) -> str:
-    named = [[name, *_cells(row)] for name, row in rows.items() if not name.startswith("random")]
     columns = ["job", "blocks"]
     for name in STARTS:
         columns += [f"`optimal`, {name} [s]", "tube [s]", "start kept on", "CPU [s]"]
     text = "Cycle times of the start and of what method `tube` (solver own) finds from it; * the verdict failed. CPU seconds are of\n"
-    text += "the whole plan.\n\n" + markdown(columns, named)
-    random = [
-        row["reshaped"]
-        for name, row in rows.items()
-        if name.startswith("random") and "start_s" in row["reshaped"]
-    ]
-    if random:
-        gain = np.array([1.0 - row["cycle_time_s"] / row["start_s"] for row in random if row["cycle_time_s"]])
-        text += (
-            f"\n{len(random)} random jobs from reshaped splines: {sum(row['passed'] for row in random)} passed, faster by "
-            f"{np.mean(gain):.2%} on the mean and {gain.max():.2%} at most, slower on {(gain < -1e-5).sum()}; the start stays whole "
-            f"on {sum(row['kept'] == 1.0 for row in random)} and in part on {sum(0 < row['kept'] < 1 for row in random)}.\n"
-        )
-    return text
+    text += "the whole plan.\n\n"
+    return text + markdown(columns, [[name, *_cells(row)] for name, row in rows.items()])
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

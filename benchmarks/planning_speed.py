@@ -1,10 +1,12 @@
-"""How long the motion takes and how long planning takes, for jobs of several kinds and every effort, next to earlier commits.
+"""How long the motion takes and how long planning takes, for three jobs and every effort, next to earlier commits.
 
 Every plan is made in a process of its own, twice: the first time kernels are loaded or compiled, the second time counts. Processor
 seconds are those of the whole process in the second plan, on all cores; peak memory is that of both. Earlier commits are checked out
 beside the project and run in the same environment, one plan after the other.
 
-    python -m benchmarks.planning_speed [COMMIT ...] [--job NAME] [--machine FILE] [--threads N] [--name FILE]
+    python -m benchmarks.planning_speed [COMMIT ...] [--job NAME ...] [--threads N]   into results/planning-speed.json and .md
+
+What every effort of today brings on other jobs is in the reports of the suites ("Motion against planning time").
 """
 
 from __future__ import annotations
@@ -21,7 +23,13 @@ from benchmarks import record
 from planner.base.names import EFFORTS
 
 ROOT = Path(__file__).resolve().parents[1]
-BRACKET = ROOT / "planner" / "examples" / "bracket.ngc"
+PEERS = ROOT.parent / "shared" / "machines" / "peers.toml"
+PROGRAMS = ROOT.parent / "shared" / "peers" / "programs"
+JOBS = {  # programs and their machines
+    "bracket": (ROOT / "planner" / "examples" / "bracket.ngc", "mill"),
+    "star and spiral": (PROGRAMS / "d_starspiral.ngc", str(PEERS)),
+    "chips": (PROGRAMS / "e_chips.ngc", str(PEERS)),
+}
 
 CHILD = """
 import json, resource, sys, time
@@ -70,13 +78,9 @@ def measured(tree: Path, job: Path, machine: str, effort: str, threads: int) -> 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("commits", nargs="*", metavar="COMMIT")
-    parser.add_argument("--job", action="append", type=Path, metavar="FILE", help="default: the bracket")
-    parser.add_argument("--machine", default="mill")
-    parser.add_argument("--effort", action="append", choices=EFFORTS, help="default: all")
+    parser.add_argument("--job", nargs="+", choices=tuple(JOBS), default=tuple(JOBS))
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--name", default="planning-speed")
     given = parser.parse_args()
-    machine = str(Path(given.machine).resolve()) if Path(given.machine).exists() else given.machine
     rows = []
     with tempfile.TemporaryDirectory() as place:
         trees = {}
@@ -86,18 +90,21 @@ def main() -> None:
                 ["git", "worktree", "add", "-q", "--detach", trees[commit], commit], cwd=ROOT, check=True
             )
         try:
-            for job in given.job or [BRACKET]:
+            for job in given.job:
+                program, machine = JOBS[job]
                 ways = [(commit, tree, "-", 0) for commit, tree in trees.items()]
-                ways += [("now", ROOT, effort, given.threads) for effort in given.effort or EFFORTS]
+                ways += [("now", ROOT, effort, given.threads) for effort in EFFORTS]
                 for name, tree, effort, threads in ways:
-                    row = measured(tree, job.resolve(), machine, effort, threads)
-                    rows.append({"job": job.stem, "version": name, "effort": effort} | row)
+                    row = measured(tree, program, machine, effort, threads)
+                    known = {"job": job, "machine": Path(machine).stem, "version": name, "effort": effort}
+                    rows.append(known | row)
                     print(rows[-1], flush=True)
         finally:
             for tree in trees.values():
                 subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=False)
     columns = [
         "job",
+        "machine",
         "version",
         "effort",
         "motion [s]",
@@ -107,15 +114,14 @@ def main() -> None:
         "grid points",
         "peak [GB]",
     ]
-    note = f"Machine `{given.machine}`, {given.threads} thread(s) now. The second plan in a process of its own.\n\n"
-    record.write_results(
-        given.name, {"rows": rows}, note + record.markdown(columns, [_cells(row) for row in rows])
-    )
+    note = f"{given.threads} thread(s) now. The second plan in a process of its own.\n\n"
+    table = note + record.markdown(columns, [_cells(row) for row in rows])
+    record.write_results("planning-speed", {"rows": rows}, table)
 
 
 def _cells(row: dict[str, object]) -> list[str]:
     """A row of the table."""
-    start = [str(row[name]) for name in ("job", "version", "effort")]
+    start = [str(row[name]) for name in ("job", "machine", "version", "effort")]
     if "failed" in row:
         return [*start, str(row["failed"]), "", "", "", "", ""]
     cpu = float(str(row["cpu_s"]))

@@ -70,6 +70,12 @@ def pentagon(side: float = 15.782) -> Program:
     return polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), source="pentagon")
 
 
+def corner(turn: float, leg: float = 20.0) -> Program:
+    """Two legs of so many mm that turn by `turn` [rad], the first along x."""
+    steps = leg * np.array([[1.0, 0.0], [np.cos(turn), np.sin(turn)]])
+    return polyline(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), source="corner")
+
+
 def zigzag(count: int = 50, side: float = 2.0, half_turn: float = 30.0) -> Program:
     """Segments of `side` [mm] that turn by twice `half_turn` [deg], left and right in turn."""
     angle = np.deg2rad(half_turn) * np.where(np.arange(count) % 2 == 0, 1.0, -1.0)

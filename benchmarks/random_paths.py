@@ -33,7 +33,6 @@ LONG_FINE = 4  # like FINE, for memory's sake
 
 COPP_AXES, COPP_WAYPOINTS, COPP_POINTS = 7, 50, 1001
 COPP_LIMITS = {"velocity": 1.0, "acceleration": 5.0, "jerk": 50.0}  # of each axis, times 0.9 to 1.1
-COPP_TIME = 41.4186  # mean cycle time that copp publishes for TOPP3-SOCP on 100 such splines [s]; standard deviation 1.38 s
 
 CURVES = json.loads((Path(__file__).parent / "curves.json").read_text(encoding="utf-8"))
 CURVE_LIMITS = {"velocity": 100.0, "acceleration": 2000.0, "jerk": 2e5}  # of the shared machine [mm, s]

@@ -2,8 +2,9 @@
 
     python -m benchmarks.random_programs [--count N] [--seed S] [--kinds cycles offsets ...]
 
-The programs and the comparison are those of tests/nc/test_random_agreement.py, which reads some hundreds. It needs rs274 and the
-module gcode (Debian package linuxcnc-uspace) and ../shared/peers. Writes results/random-programs.json and .md.
+The programs and the comparison are those of tests/nc/test_random_agreement.py, which reads some hundreds; those of kind "language"
+compute (tests/nc/language/language_programs.py). It needs rs274 and the module gcode (Debian package linuxcnc-uspace) and
+../shared/peers. Writes results/random-programs.json and .md.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ AT_ONCE = 500  # programs that one run of the oracle reads
 
 def main() -> None:
     """Read the programs and write what became of them."""
-    sys.path.insert(0, str(TESTS))
+    sys.path[:0] = [str(TESTS), str(TESTS / "language")]
     agreement = importlib.import_module("test_random_agreement")
+    generator = importlib.import_module("language_programs").Generator
+    agreement.KINDS["language"] = lambda rng: generator(rng).text()
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=1000, help="programs of each kind")

@@ -27,8 +27,7 @@ import numpy as np
 
 from benchmarks import random_lines
 from benchmarks.record import markdown, write_results
-from benchmarks.retry_counts import count_steps, counts, watch
-from benchmarks.tries import add_row, programs, read_rows, summed
+from benchmarks.retry_counts import add_row, count_steps, counts, programs, read_rows, summed, watch
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
 from planner.feedrate.jerk import window
@@ -135,7 +134,7 @@ SWITCHES: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
     ),
     "all candidates but two behind a shaper": (
         ("shaped:",),
-        _set(shaped, "CANDIDATES", (shaped.CANDIDATES[0], shaped.CANDIDATES[2])),
+        _set(shaped.shaped, "__defaults__", ((shaped.CANDIDATES[0], shaped.CANDIDATES[2]),)),
     ),
 }
 
@@ -157,7 +156,10 @@ def report(rows: list[Planned]) -> tuple[dict[str, Any], str]:
         times.update(row["counts"])
         jobs.update(name for name, count in row["counts"].items() if count)
     tries = summed(list(usual.values()), total)
-    text = f"{len(usual)} plans, {sum(row['time'] is not None for row in usual.values())} pass, {total:.0f} s of computing.\n\n"
+    kinds = Counter(row["job"].split()[0] if " " in row["job"] else "programs" for row in usual.values())
+    passed = sum(row["time"] is not None for row in usual.values())
+    text = f"{len(usual)} plans ({', '.join(f'{kind} {count}' for kind, count in kinds.items())}), {passed} pass, "
+    text += f"{total:.0f} s of computing.\n\n"
     text += "What the trace tells; gains are shares of the cycle time, mean over all plans and the largest one.\n\n"
     text += markdown(
         ["retry", "plans", "ran", "kept", "gain", "most", "share of computing time"],

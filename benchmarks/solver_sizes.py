@@ -14,6 +14,7 @@ import dataclasses
 import time
 from typing import Any
 
+from benchmarks import copp_solver
 from benchmarks.random_paths import long_path
 from benchmarks.record import markdown, write_results
 from planner.feedrate.reference.exact_motion import ExactMotion
@@ -30,11 +31,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--solvers", nargs="*", choices=tuple(THIRD_ORDER), default=tuple(THIRD_ORDER))
+    every = _solvers()
+    parser.add_argument("--solvers", nargs="*", choices=tuple(every), default=tuple(every))
     parser.add_argument("--sizes", nargs="*", type=int, default=SIZES)
     parser.add_argument("--most", type=float, default=MOST, help="seconds after which no larger path follows")
     options = parser.parse_args()
-    solvers = {name: _unlimited(THIRD_ORDER[name]) for name in (OWN, *options.solvers)}
+    solvers = {name: every[name] for name in (OWN, *options.solvers)}
     for solver in solvers.values():
         solver.solve(long_path(WARM_UP))
     rows: list[dict[str, Any]] = []
@@ -62,6 +64,15 @@ def main() -> None:
             if took > options.most:
                 del solvers[name]
         write_results("solver-sizes", {"rows": rows}, _table(rows))
+
+
+def _solvers() -> dict[str, ThirdOrderSolver]:
+    """The planner's, and where it is installed the package copp."""
+    found = {name: _unlimited(solver) for name, solver in THIRD_ORDER.items()}
+    if copp_solver.copp() is None:
+        print(copp_solver.INSTALL, flush=True)
+        return found
+    return found | {"copp": copp_solver.CoppSocp(), "copp, LP": copp_solver.CoppSocp(linear=True)}
 
 
 def _unlimited(solver: ThirdOrderSolver) -> ThirdOrderSolver:

@@ -1,5 +1,5 @@
 """How old results are: each results/NAME.md begins with "Made by COMMAND at COMMIT on DATE", and its age is the number of commits that
-changed the planner since.
+changed the planner since; of a suite's report, since the oldest of its rows ("Rows of planner COMMIT, ...").
 
 A figure that README.md quotes may be `README_LIMIT` commits old. The pages of docs/ quote measurements that take hours, and may quote
 older ones; those above `STALE` are listed in docs/benchmarks.md, which `python -m benchmarks report` writes.
@@ -22,16 +22,18 @@ STALE = 200  # of the same, from which a result of docs/ is listed
 _MADE = re.compile(
     r"Made by (?P<by>.+?) at (?:commit )?(?P<commit>[0-9a-f]{7,40})\+?,?(?: written)? on (?P<date>\d{4}-\d\d-\d\d)"
 )
+_ROWS = re.compile(r"Rows of planner ([0-9a-f+, ]+)\.")
 _QUOTED = re.compile(r"\b([A-Za-z0-9_-]+\.md)\b")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """Where a result comes from: command, commit and date, from its first line."""
+    """Where a result comes from, from its first line: command, commit and date, and the planners of a suite's rows."""
 
     by: str
     commit: str
     date: str
+    planners: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +52,11 @@ class Age:
 
 def made_of(first_line: str) -> Made | None:
     """What a result's first line says, or None where it says it not."""
-    found = _MADE.match(first_line)
-    return None if found is None else Made(**found.groupdict())
+    found, rows = _MADE.match(first_line), _ROWS.search(first_line)
+    if found is None:
+        return None
+    planners = tuple(one.rstrip("+") for one in rows[1].split(", ")) if rows else ()
+    return Made(**found.groupdict(), planners=planners)
 
 
 def quoted(text: str, results: Path = RESULTS) -> list[str]:
@@ -66,9 +71,10 @@ def _only_there(name: str, results: Path) -> bool:
 
 
 def pages() -> dict[str, str]:
-    """README.md and the pages of docs/ by name, without the page that lists ages."""
+    """README.md and the pages of docs/ by name, without the list of ages itself."""
     files = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    return {str(file.relative_to(ROOT)): file.read_text(encoding="utf-8") for file in files if file != PAGE}
+    texts = {file: file.read_text(encoding="utf-8") for file in files}
+    return {str(file.relative_to(ROOT)): text.partition(BEGIN)[0] for file, text in texts.items()}
 
 
 def has_history() -> bool:
@@ -98,7 +104,10 @@ def ages() -> list[Age]:
         file = RESULTS / name
         made = made_of(file.read_text(encoding="utf-8").split("\n")[0]) if file.is_file() else None
         if made is not None:
-            found.append(Age(name=name, pages=tuple(of_pages), made=made, commits=commits_since(made.commit)))
+            since = [commits_since(commit) for commit in (made.commit, *made.planners)]
+            known = [count for count in since if count is not None]
+            commits = max(known) if len(known) == len(since) else None
+            found.append(Age(name=name, pages=tuple(of_pages), made=made, commits=commits))
     return sorted(found, key=lambda age: -(age.commits or 0))
 
 
@@ -125,7 +134,7 @@ def write_stale(folder: Path) -> list[Path]:
         ]
         for age in old
     ]
-    table = markdown(["result", "made at", "on", "commits since", "quoted in"], rows)
+    table = markdown(["result", "made at", "on", "commits since", "quoted in"], rows) if rows else "None.\n"
     PAGE.write_text(f"{head}{BEGIN}\n\n{table}\n{END}{tail}", encoding="utf-8")
     return [PAGE]
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import axes_campaign, five_axis, growth, long_jobs, planned_ngc, problems, random_lines
-from benchmarks.corner_shapes import corner
 from benchmarks.random_paths import COPP_LIMITS, CURVES, copp_spline
 from benchmarks.runner import grids, nasty
 from planner.base.names import METHODS
@@ -138,7 +137,7 @@ def papers() -> list[Job]:
 def corners() -> list[Job]:
     """Two legs of 20 mm, the first along x."""
     return [
-        Job(name=f"{degrees} degrees", program=made(partial(corner, np.deg2rad(degrees), 0.0)))
+        Job(name=f"{degrees} degrees", program=made(partial(problems.corner, np.deg2rad(degrees))))
         for degrees in CORNER_ANGLES
     ]
 

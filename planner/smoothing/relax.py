@@ -40,7 +40,7 @@ FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no ene
 USED = 0.9995
 TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
 # Of tightening, in windows around the sites that need it; 2 are the rule. With 3, a run of each of 10 plans that need
-# more gets no spline; 7 of them take longer, up to 2.7e-2 (benchmarks/results/ablation-retries.md).
+# more gets no spline; 7 of them take longer, up to 2.7e-2 (benchmarks/retries.py at 2ad8a9c).
 ROUNDS = 20
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it

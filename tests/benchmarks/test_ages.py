@@ -71,6 +71,12 @@ def test_first_lines_are_read() -> None:
     assert made_of("# A title") is None
 
 
+def test_a_report_is_as_old_as_its_oldest_rows() -> None:
+    found = made_of("Made by `c` at 1234567+ on 2026-01-01 (x86_64). Rows of planner abcdef0+, 1234567.")
+    assert found is not None
+    assert found.planners == ("abcdef0", "1234567")
+
+
 def test_names_are_found_with_and_without_their_folder(tmp_path: Path) -> None:
     (tmp_path / "there.md").write_text("")
     text = (

@@ -29,7 +29,9 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.optimal.tighten import within_limits
 
-ROUNDS = 10  # at most
+ROUNDS = (
+    16  # at most; on five random jobs behind filters motions take 0.94 of the time that they take with 10 [-]
+)
 # The feed is limited this far on both sides of a corner [tolerances]: the shorter, the more it is like waiting at the vertex. Where
 # the least feed is not enough there, because grid points are far apart, a point more on each side.
 REACH = 0.3
@@ -64,7 +66,7 @@ def within_filters(
         return planned, motion
     behind, plain = Behind(toolpath, machine), planned.problem
     of_path = behind.errors(motion, ())
-    corners = _Corners(plain, motion, behind, of_path)
+    corners = CornerFeeds(plain, motion, behind, of_path)
     contour = _Contour(corners, behind, of_path)
     best, fastest = planned, np.inf
     for _ in range(ROUNDS):
@@ -93,7 +95,7 @@ def within_filters(
     return best, kept(motion, toolpath, machine)
 
 
-class _Corners:
+class CornerFeeds:
     """The squares of the feeds that the corners allow, of N+1 vertices on P grid points.
 
     zone  : grid points [a, b) that each bound is for
@@ -136,13 +138,17 @@ class _Corners:
         now = np.array([feed_sq[a:b].max() for a, b in self.zone])
         moving = np.array([feed_sq[a:b].min() for a, b in self.zone]) > 0.0  # a full stop is not made slower
         now = np.where(moving, now, 1.0)
-        to = self._secant(now, np.maximum((near - self.path) / self.room, ROOM_LEAST))
+        to = self.secant(now, np.maximum((near - self.path) / self.room, ROOM_LEAST))
         held = moving & (self.bound < np.inf) & (now > self.bound * (1.0 - HELD))
         self.bound = np.where((moving & missed) | held, to, self.bound)
         return float((to[held] / now[held]).max(initial=1.0))
 
-    def _secant(self, now: FloatArray, error: FloatArray) -> FloatArray:
-        """(N+1,) the squares of the feeds at which the errors would be 1, from those now."""
+    def secant(self, now: FloatArray, error: FloatArray) -> FloatArray:
+        """(N+1,) the squares of the feeds at which the errors would be 1.
+
+        now   : (N+1,) those of a motion [mm2/s2]
+        error : (N+1,) its errors, over what they may be [-]
+        """
         x, y = np.log(now), np.log(error)
         run, rise = x - self.before[0], y - self.before[1]
         power = np.divide(rise, run, out=self.power.copy(), where=np.abs(run) > HELD)
@@ -167,7 +173,7 @@ class _Contour:
     """The squares of the feeds (P,) that grid points allow where the filtered motion leaves the contour away from corners: less while
     it does, and more while the whole piece of the path has room, up to halfway to what was too fast, in logarithms."""
 
-    def __init__(self, corners: _Corners, behind: Behind, of_path: Errors):
+    def __init__(self, corners: CornerFeeds, behind: Behind, of_path: Errors):
         points = len(corners.least)
         self.behind, self.path = behind, of_path.worst
         self.room = np.maximum(1.0 - AIM - self.path, ROOM_LEAST)

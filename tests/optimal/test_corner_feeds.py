@@ -11,7 +11,7 @@ from planner.job.trace import Trace
 from planner.machine import Axis, Fir, Machine
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
-from planner.optimal.behind_filters import ROUNDS, _Corners
+from planner.optimal.behind_filters import ROUNDS, CornerFeeds
 
 MACHINE = problems.machine(fir=Fir(time_constants=(0.02, 0.013)))
 JOB = parse_program("G21 F6000\nG1 X6\nX9 Y4\nX3 Y5\nY9\n", source="corners of 53, 137 and 100 degrees")
@@ -68,10 +68,10 @@ def test_corners_that_were_too_slow_get_faster_again(change):
 
 @pytest.mark.parametrize("power", [0.3, 1.0, 3.0, 6.0])
 def test_a_corner_finds_the_root_of_its_error(power):
-    corner = object.__new__(_Corners)
+    corner = object.__new__(CornerFeeds)
     corner.fast, corner.slow = np.full(1, np.inf), np.zeros(1)
     corner.power, corner.before = np.ones(1), np.full((2, 1), np.nan)
     feed_sq = np.array([300.0])
     for _ in range(ROUNDS - 2):
-        feed_sq = corner._secant(feed_sq, (feed_sq / 7.0) ** power)
+        feed_sq = corner.secant(feed_sq, (feed_sq / 7.0) ** power)
     assert feed_sq[0] == pytest.approx(7.0, rel=0.02)

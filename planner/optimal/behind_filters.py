@@ -29,19 +29,13 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.optimal.tighten import within_limits
 
-ROUNDS = (
-    16  # at most; on five random jobs behind filters motions take 0.94 of the time that they take with 10 [-]
-)
+ROUNDS = 16  # at most; on hard jobs motions become 1 to 10 % shorter from the tenth on
 # The feed is limited this far on both sides of a corner [tolerances]: the shorter, the more it is like waiting at the vertex. Where
 # the least feed is not enough there, because grid points are far apart, a point more on each side.
 REACH = 0.3
-SHARP = float(
-    np.deg2rad(20.0)
-)  # vertices that turn by more are corners [rad]; others are places of the contour
-POWER = (
-    0.5,
-    4.0,
-)  # of the feed squared with which an error is taken to rise, at least and at most [-]; at first 1
+# Vertices that turn by more are corners [rad], others are places of the contour.
+SHARP = float(np.deg2rad(20.0))
+POWER = (0.5, 4.0)  # of the feed squared with which an error is taken to rise, least and most [-]; at first 1
 CHANGE = 10.0  # by what the square of a feed changes in a round at most [-]
 EDGE = 0.1  # of the way from too slow to too fast that a secant keeps from both, in logarithms [-]
 AIM = 0.01  # of the tolerance: what the search leaves unused [-]; it ends where no feed squared may grow by more than WORTH [-]

@@ -56,6 +56,7 @@ class Violations:
     vertex    : (n,) index of the vertex that is missed, -1 for places off the contour
     near      : (N+1,) error over tolerance at every vertex [-]
     near_time : (N+1,) when the filtered motion is nearest to the vertex [s]
+    worst     : (N,) largest error over tolerance of the contour on every piece [-]
     """
 
     time: FloatArray
@@ -64,6 +65,7 @@ class Violations:
     vertex: Array
     near: FloatArray
     near_time: FloatArray
+    worst: FloatArray
 
     @property
     def less(self) -> FloatArray:
@@ -146,25 +148,21 @@ class Behind:
         t, ratio, piece = (np.concatenate(column) for column in zip(*kept, strict=True))
         return Errors(t, ratio, piece, near, near_time, worst)
 
-    def path_shares(self, motion: Timed) -> tuple[FloatArray, FloatArray]:
-        """Ratios of the path itself, without filters: the largest on each piece (N,), and at the vertices (N+1,) [-]."""
-        of_path = self.errors(motion, ())
-        return of_path.worst, of_path.near
-
-    def places(self, motion: Timed, path: tuple[FloatArray, FloatArray]) -> Violations:
+    def places(self, motion: Timed, of_path: Errors) -> Violations:
         """Where a motion leaves the tolerance behind the filters.
 
-        path : `path_shares` (N,), (N+1,) of any motion along the same path
+        of_path : `errors` without filters, of any motion along the same path
         """
         found = self.errors(motion, self.filters.times)
         missed = np.flatnonzero(found.near > 1.0 - SPARE)
         return Violations(
             time=np.concatenate([found.time, found.near_time[missed]]),
             ratio=np.concatenate([found.ratio, found.near[missed]]),
-            path=np.concatenate([path[0][found.piece], path[1][missed]]),
+            path=np.concatenate([of_path.worst[found.piece], of_path.near[missed]]),
             vertex=np.concatenate([np.full(len(found.time), -1), missed]),
             near=found.near,
             near_time=found.near_time,
+            worst=found.worst,
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
@@ -246,7 +244,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     behind, runs = Behind(toolpath, machine), runs_of(motion)
     if not len(runs):
         return motion
-    path = behind.path_shares(motion)
+    of_path = behind.errors(motion, ())
     delay, least = behind.filters.delay, np.zeros(len(runs))
     factor, again = np.ones(len(runs)), np.zeros(len(runs))
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
@@ -257,7 +255,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         rest = np.maximum(behind.rests(slower, timed), least)
         longer = np.maximum(rest - gap, 0.0)
         made = standing_longer(slower, runs, longer)
-        places = behind.places(made, path)
+        places = behind.places(made, of_path)
         if not len(places.time):
             break
         early, late = behind.runs_within(*timed.behind(longer), places.time)

@@ -28,7 +28,7 @@ What is tried more than once:
   path without added stops       "auto", a bound on its time is lower      1                 solve         the faster one
   final grid                     rounds of reshaping are on a coarse one   1                 finer solve   that of the plan
   tighter limits in places       excess above 1e-5 between points          2, long jobs 4    ranges        runs slower by the rest
-  less feed in places            filters leave the tolerance               10                solve         waiting, slower runs
+  less feed in places            filters leave the tolerance               16                solve         waiting, slower runs
   the whole slower               excess below 0.5 % in the verdict         2                 verdict       the verdict stands
   another plan                   "auto", a bound on its time is lower, or  4                 a plan        the fastest that passes
                                    the plan fails its verdict

@@ -27,7 +27,7 @@ from planner.geometry.extrusion import Laid, Waits, extruder_limits, extrusion_o
 from planner.geometry.run_in import require_room
 from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
-from planner.machine.parts import MAGNITUDE_MIN
+from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.bezier import homogeneous
 from planner.nc.program import MOVES, Kind, PathControl, Program
 
@@ -53,9 +53,9 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     """
     if isinstance(tolerance, str):
         raise InputError(f"tolerance '{tolerance}'; give a number, in mm")
-    if tolerance is not None and not (MAGNITUDE_MIN <= tolerance <= COORDINATE_MAX):
+    if tolerance is not None and not (TOLERANCE_MIN <= tolerance <= COORDINATE_MAX):
         raise InputError(
-            f"tolerance {tolerance} mm; it must be above 0 and at most {COORDINATE_MAX:g}, and not below {MAGNITUDE_MIN:g}"
+            f"tolerance {tolerance} mm; it must be above 0 and at most {COORDINATE_MAX:g}, and not below {TOLERANCE_MIN:g}"
         )
     program = _measured(program, machine.radius)
     axis = _axes_in_use(program, machine)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.machine.parts import MAGNITUDE_MIN
+from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.points import AXES, program_of_points
 from planner.nc.program import Program
 
@@ -21,7 +21,7 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
 
     `Program.line` counts the moves from 1.
 
-    Raises InputError for arrays of another shape, values that are not finite, feeds that are not above 0, and a tolerance below 1e-12.
+    Raises InputError for arrays of another shape, values that are not finite, feeds that are not above 0, and a tolerance below 1e-5.
 
     >>> import planner
     >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
@@ -32,8 +32,8 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
     """
     position = _points(points)
     moves = len(position) - 1
-    if tolerance is not None and not MAGNITUDE_MIN <= tolerance < np.inf:
-        raise InputError(f"tolerance {tolerance} mm; it must be {MAGNITUDE_MIN:g} or more, and finite")
+    if tolerance is not None and not TOLERANCE_MIN <= tolerance < np.inf:
+        raise InputError(f"tolerance {tolerance} mm; it must be {TOLERANCE_MIN:g} or more, and finite")
     return program_of_points(
         position, np.full(moves, np.inf) if feed is None else _feeds(feed, moves), tolerance
     )

@@ -25,6 +25,7 @@ from planner.machine.parts import (
     Positive,
     Record,
     Times,
+    Tolerance,
     ToolData,
 )
 
@@ -59,7 +60,7 @@ class Machine(Record):
 
     name: str
     dt: Positive
-    tolerance: Positive
+    tolerance: Tolerance
     path_control: Literal["blend", "exact_path", "exact_stop"] = "blend"
     axes: dict[str, Axis]
     feed_max: Positive | None = None

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.units import MILLISECOND
-from planner.machine.parts import MAGNITUDE_MIN
+from planner.machine.parts import TOLERANCE_MIN
 from planner.nc import codes, signals
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block
@@ -88,9 +88,10 @@ def path_control(state: State, block: Block, note: Note) -> None:
         tolerance = block.value["P"]
         if tolerance < 0:
             raise WordFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
-        if tolerance > 0 and tolerance * state.unit < MAGNITUDE_MIN:
+        if tolerance > 0 and tolerance * state.unit < TOLERANCE_MIN:
             raise WordFault(
-                block.at["P"], f"a tolerance must not be below {MAGNITUDE_MIN:g} mm; write G64 P0.05"
+                block.at["P"],
+                f"a tolerance must not be below {TOLERANCE_MIN:g} mm; write G64 P0.05, or G61 for the path itself",
             )
         if tolerance > 0:
             state.tolerance = tolerance * state.unit

@@ -10,6 +10,7 @@ import dataclasses
 import json
 import math
 import os
+import tokenize
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -151,10 +152,13 @@ def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
         file = np.load(stream, allow_pickle=False)
         if not isinstance(file, np.lib.npyio.NpzFile):
             raise ValueError("a single array (.npy), not a .npz file")
-        with file:
-            return {name: file[name] for name in file.files if name != "metadata"}, (
-                str(file["metadata"]) if "metadata" in file.files else ""
-            )
+        try:
+            with file:
+                return {name: file[name] for name in file.files if name != "metadata"}, (
+                    str(file["metadata"]) if "metadata" in file.files else ""
+                )
+        except (SyntaxError, tokenize.TokenError) as fault:  # numpy reads a header as Python's words
+            raise ValueError("the header of an array is damaged") from fault
 
 
 def _numbers(source: str, name: str, column: Any) -> Array:

@@ -55,7 +55,7 @@ def test_points_in_space_their_feeds_and_tolerance() -> None:
         ([[0, 0], [1, 1]], {"feed": [1.0, 2.0]}, "one for each of the 1 moves"),
         ([[0, 0], [1, 1]], {"feed": "fast"}, "feed: not a number"),
         ([[0, 0], [1, 1]], {"tolerance": -1.0}, "tolerance -1.0 mm"),
-        ([[0, 0], [1, 1]], {"tolerance": 1e-300}, "tolerance 1e-300 mm; it must be 1e-12 or more"),
+        ([[0, 0], [1, 1]], {"tolerance": 1e-300}, "tolerance 1e-300 mm; it must be 1e-05 or more"),
     ],
 )
 def test_other_points_are_refused(points: object, settings: dict, said: str) -> None:

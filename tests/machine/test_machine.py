@@ -152,7 +152,7 @@ def test_linuxcncs_own_configurations_say_the_same(name: str, file: str) -> None
     ("key", "value", "said"),
     [
         ("dt", 5e-324, "dt: must be of a magnitude between 1e-12 and 1e+12, found 4.94066e-324"),
-        ("tolerance", 1e300, "tolerance: must be of a magnitude between 1e-12 and 1e+12, found 1e+300"),
+        ("tolerance", 1e300, "tolerance: must be of a magnitude between 1e-05 and 1e+12, found 1e+300"),
         ("velocity", 1e12, "axes.x.velocity: must be of a magnitude between 1e-12 and 1e+09, found 1e+12"),
         ("jerk", 1e13, "axes.x.jerk: must be of a magnitude between 1e-12 and 1e+12, found 1e+13"),
         ("length", -1e300, "tools.1.length: must be of a magnitude between 1e-12 and 1e+12, found -1e+300"),

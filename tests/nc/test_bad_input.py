@@ -93,8 +93,8 @@ REFUSED = [
     ("G4", 1, 1, ["G4", "P word"]),
     ("G4 P-1", 1, 4, ["P-1", "P word"]),
     ("G64 P-1", 1, 5, ["P-1", "negative"]),
-    ("G64 P1e-300", 1, 5, ["P1e-300", "below 1e-12 mm"]),
-    ("G20\nG64 P3e-14", 2, 5, ["P3e-14", "below 1e-12 mm"]),
+    ("G64 P1e-300", 1, 5, ["P1e-300", "below 1e-05 mm"]),
+    ("G20\nG64 P3e-14", 2, 5, ["P3e-14", "below 1e-05 mm"]),
     # arcs
     ("F1\nG2 X1", 2, 1, ["G2", "needs a centre or a radius", "I and J"]),
     ("F1 G18\nG2 X1", 2, 1, ["K and I"]),

@@ -159,6 +159,17 @@ def test_a_damaged_archive_is_closed_again(tmp_path: Path) -> None:
     gc.collect()  # a file that is left open warns here, and warnings are errors
 
 
+@pytest.mark.parametrize("damage", [b"(", b")"])
+def test_a_damaged_header_is_told(tmp_path: Path, damage: bytes) -> None:
+    path = tmp_path / "header.npz"
+    np.savez(
+        path, t=np.arange(2000.0)
+    )  # more than is read at once, or the checksum is wrong before the header is
+    path.write_bytes(path.read_bytes().replace(b"}", damage, 1))
+    with pytest.raises(InputError, match="cannot be read: .*header"):
+        read_trajectory(path)
+
+
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.parametrize("content", [b"", b"\x00\x01garbage\xff" * 10])
 def test_files_that_are_none(tmp_path: Path, suffix: str, content: bytes) -> None:

@@ -166,7 +166,7 @@ def test_a_damaged_header_is_told(tmp_path: Path, damage: bytes) -> None:
         path, t=np.arange(2000.0)
     )  # more than is read at once, or the checksum is wrong before the header is
     path.write_bytes(path.read_bytes().replace(b"}", damage, 1))
-    with pytest.raises(InputError, match="cannot be read: .*header"):
+    with pytest.raises(InputError, match=r"cannot be read: .*header"):
         read_trajectory(path)
 
 

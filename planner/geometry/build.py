@@ -55,7 +55,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         raise InputError(f"tolerance '{tolerance}'; give a number, in mm")
     if tolerance is not None and not (TOLERANCE_MIN <= tolerance <= COORDINATE_MAX):
         raise InputError(
-            f"tolerance {tolerance} mm; it must be above 0 and at most {COORDINATE_MAX:g}, and not below {TOLERANCE_MIN:g}"
+            f"tolerance {tolerance} mm; it must be between {TOLERANCE_MIN:g} and {COORDINATE_MAX:g}"
         )
     program = _measured(program, machine.radius)
     axis = _axes_in_use(program, machine)

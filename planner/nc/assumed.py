@@ -23,7 +23,7 @@ from planner.nc.settings import EXTRUDER_ZERO, TOOL_POINT_M
 # How a letter is treated whatever stands beside it, in `Assumed.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
 
-LEFT_OUT_BY_USER = Assumption("word", "words", "left out with what belongs to them, as --ignore says")
+LEFT_OUT_BY_USER = Assumption("word", "words", "left out, as --ignore says")
 
 
 @dataclass(slots=True)

@@ -52,6 +52,11 @@ def test_what_more_saves() -> None:
     ]
 
 
+def test_corners_that_a_loop_passes_again_are_added_up() -> None:
+    again = dataclasses.replace(PRICES, corners=dataclasses.replace(DEAR, line=np.full(len(DEAR), 7)))
+    assert price_rows(again, 0.8)[-1] == ("10 µm more at line", "saves, in ms, 7: 6.6 at 2 corners")
+
+
 def test_a_hint_is_told_as_its_range() -> None:
     hints = dataclasses.replace(PRICES, hints=("feed", "tolerance"))
     assert price_rows(hints, 0.8)[:2] == [

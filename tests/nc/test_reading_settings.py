@@ -20,8 +20,7 @@ def test_ignored_codes_are_left_out_with_what_belongs_to_them() -> None:
     assert program.end[:, 0].tolist() == [1, 3]
     assert program.kind.tolist() == [Kind.RAPID, Kind.RAPID]
     assert any(
-        note.startswith("4 words: left out, as --ignore says; first M6 line 2")
-        for note in program.notes
+        note.startswith("4 words: left out, as --ignore says; first M6 line 2") for note in program.notes
     )
     assert program.reading == reading
 

@@ -48,8 +48,8 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
 
     tolerance : contour tolerance [mm] that takes precedence over G64 P of the program and over the machine; None to use those
 
-    Raises InputError for a program that moves nowhere, a tolerance that is not positive, an axis that moves and that the machine lacks,
-    and coordinates beyond `COORDINATE_MAX`.
+    Raises InputError for a program that moves nowhere, a tolerance below `TOLERANCE_MIN` or beyond `COORDINATE_MAX`, an axis that moves
+    and that the machine lacks, and coordinates beyond `COORDINATE_MAX`.
     """
     if isinstance(tolerance, str):
         raise InputError(f"tolerance '{tolerance}'; give a number, in mm")

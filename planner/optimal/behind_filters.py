@@ -29,7 +29,8 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.optimal.tighten import within_limits
 
-ROUNDS = 16  # at most; on hard jobs motions become 1 to 10 % shorter from the tenth on
+# At most. In 23 calls of five hard jobs, picked for it, motions took 0.94 of the time on the mean that they take with 10.
+ROUNDS = 16
 # The feed is limited this far on both sides of a corner [tolerances]: the shorter, the more it is like waiting at the vertex. Where
 # the least feed is not enough there, because grid points are far apart, a point more on each side.
 REACH = 0.3

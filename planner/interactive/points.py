@@ -41,12 +41,7 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
 
 def _points(points: ArrayLike) -> FloatArray:
     """(n, 3) the points. Raises InputError unless they are (n, 2) or (n, 3) finite numbers, n > 1."""
-    try:
-        given = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(
-            "points: not an array of numbers; give (n, 2) or (n, 3), one row for each point"
-        ) from None
+    given = _numbers(points, "points: not an array of numbers; give (n, 2) or (n, 3), one row for each point")
     if given.ndim != 2 or given.shape[1] not in (2, 3) or len(given) < 2:
         raise InputError(f"points: shape {given.shape}; it must be (n, 2) or (n, 3) with at least two points")
     bad = np.logical_not(np.isfinite(given).all(axis=1))
@@ -56,18 +51,21 @@ def _points(points: ArrayLike) -> FloatArray:
 
 def _feeds(feed: ArrayLike, moves: int) -> FloatArray:
     """(moves,) feeds [mm/s]. Raises InputError unless they are one number, or one above 0 for each move."""
-    try:
-        given = np.asarray(feed, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(
-            "feed: not a number and not an array of numbers; give one, or one for each move"
-        ) from None
+    given = _numbers(feed, "feed: not a number and not an array of numbers; give one, or one for each move")
     if given.shape not in ((), (moves,)):
         raise InputError(f"feed: shape {given.shape}; give one number, or one for each of the {moves} moves")
     given = np.broadcast_to(given, (moves,))
     bad = np.logical_not(np.isfinite(given) & (given > 0))
     _refuse("feed: move", bad, given, "every feed must be above 0 mm/s, and finite")
     return given
+
+
+def _numbers(given: ArrayLike, otherwise: str) -> FloatArray:
+    """The array of what was given. Raises InputError, saying `otherwise`, if it is none."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(otherwise) from None
 
 
 def _refuse(what: str, bad: NDArray[np.bool_], given: FloatArray, needed: str) -> None:

@@ -116,6 +116,12 @@ class Job:
         machine, toolpath = self.real
         return stop_time(toolpath, machine)
 
+    @cached_property
+    def line_stop_time(self) -> float:
+        """The same with no stops between lines that go straight on [s]."""
+        machine, toolpath = self.real
+        return stop_time(toolpath, machine, join_lines=True)
+
     def behind_filters(self, motion: TimedT) -> TimedT:
         """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""
         with self.stage("filters"):

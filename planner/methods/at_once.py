@@ -61,7 +61,7 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
     made = job.deliver(Spliced(runs=tuple(parts)))
     trajectory, verdict = made
     job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)
-    if not verdict.passed or trajectory.cycle_time > job.stop_time:
+    if not verdict.passed or trajectory.cycle_time > job.line_stop_time:
         return AtOnce(None, steps)
     job.note(*path_notes(job.toolpath, planned))
     status, sentence = said(job, start, found, [], "", "a path first, then its feed")

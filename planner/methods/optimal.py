@@ -72,7 +72,7 @@ class OptimalMethod(Method):
         if self.corner != AUTO or self.shaped:
             return ()
         corners = (dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
-        return (*corners, KinematicMethod(), StopMethod())
+        return (*corners, KinematicMethod(), StopMethod(join_lines=True))
 
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(

@@ -13,7 +13,7 @@ from planner.geometry.toolpath import Joint
 from planner.job.job import Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.lookahead.stop_moves import block_moves, stop_phases
+from planner.lookahead.stop_moves import parts_of, stop_phases
 from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion
 from planner.path.samples import sample_path
@@ -21,20 +21,25 @@ from planner.path.samples import sample_path
 
 @dataclass(frozen=True, kw_only=True)
 class StopMethod(Method):
-    """A full stop at the end of every block, and where a spline has a kink or a jump of its curvature."""
+    """A full stop at the end of every block, and where a spline has a kink or a jump of its curvature.
+
+    join_lines : none between lines that go straight on at the same feed
+    """
+
+    join_lines: bool = False
 
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
         with job.stage("geometry"):
-            moves = block_moves(job.toolpath)
-            exact = job.toolpath.with_joints(moves, Joint.STOP)
+            parts = parts_of(job.toolpath, self.join_lines)
+            exact = job.toolpath.with_joints(parts.first[parts.still], Joint.STOP)
             samples = sample_path(round_corners(exact, machine, BezierCorner()), machine)
         with job.stage("solve"):
             interval = samples.intervals
             interval = interval[np.searchsorted(samples.segment[interval], np.arange(len(exact)))]
-            at = np.append(samples.s[interval], samples.s[-1])  # where segments begin
-            run = np.repeat(np.arange(len(moves) - 1), np.diff(moves))
-            law = law_of_moves(samples, run, at[:-1], *stop_phases(exact, machine, np.diff(at)))
+            at = np.append(samples.s[interval], samples.s[-1])[parts.first]  # where parts begin
+            run = np.cumsum(parts.still[:-1]) - 1
+            law = law_of_moves(samples, run, at[:-1], *stop_phases(exact, machine, parts, np.diff(at)))
             motion = Motion(samples=samples, law=law)
         made = job.deliver(job.behind_filters(motion))
         return job.plan(
@@ -43,6 +48,6 @@ class StopMethod(Method):
             corner=None,
             solver="closed form",
             status=Status.OPTIMAL,
-            sentence="every block runs from rest to rest in the shortest time",
+            sentence=f"every {'straight way' if self.join_lines else 'block'} runs from rest to rest in the shortest time",
             grid_points=len(samples),
         )

@@ -4,7 +4,7 @@ A smooth path is not always the fastest. If every corner is sharp and the legs a
 no grid. Other corner shapes use the tolerance in another way. And if a plan fails its verdict at a long interpolation period, another
 plan may pass.
 
-stop         its time is known before it is planned, as the sum of closed forms over the blocks
+stop         its time is known before it is planned, as the sum of closed forms over the blocks; lines that go straight on are one
 fir corners  their time without jerk limits on a coarse grid is a lower bound; if that is short enough, their time with jerk limits on a
              coarse grid is an upper bound, to the share `CHANCE`
 kinematic    uses the corners of its own shape with less freedom, so it is tried where these have a chance. Time-optimal motions on
@@ -45,7 +45,8 @@ FASTER = 1e-4  # less is the same time [-]: the solver's own gap
 
 
 class Stopped:
-    """The plan with full stops at all blocks, made when it is asked for; the least that it takes is known before."""
+    """The plan with full stops at the ends of all blocks, but of lines that go straight on, made when it is asked for; the least that
+    it takes is known before."""
 
     def __init__(self, job: Job):
         self._job = job
@@ -53,11 +54,11 @@ class Stopped:
     @cached_property
     def plan(self) -> Plan:
         """That plan, made when it is first asked for."""
-        return StopMethod().plan_job(self._job.afresh())
+        return StopMethod(join_lines=True).plan_job(self._job.afresh())
 
     def sooner_than(self, time: float) -> bool:
         """Whether it takes less time [s]."""
-        return self._job.stop_time < time and counted_time(self.plan) < time
+        return self._job.line_stop_time < time and counted_time(self.plan) < time
 
 
 def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:

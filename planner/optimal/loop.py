@@ -118,7 +118,7 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
     stopped = Stopped(job)
     smooth = best = plan_on_path(job, settings, stopped)
     if stopped.sooner_than(min(counted_time(best), job.most)):
-        best = better(best, stopped.plan, "full stops at all blocks take less time", job.tell)
+        best = better(best, stopped.plan, "full stops take less time", job.tell)
     if smooth.grid_points <= RIVAL_POINTS:
         for name in chances(best, job, settings.order):
             rival = dataclasses.replace(job.afresh(), most=min(counted_time(best), job.most))
@@ -141,7 +141,7 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
 
 def plan_on_path(job: Job, settings: Settings, stopped: Stopped | None = None) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered; without a trajectory
-    if it takes longer than `job.most`, or than full stops at all blocks."""
+    if it takes longer than `job.most`, or than full stops."""
 
     def useless(time: float) -> bool:
         return time > job.most or (stopped is not None and stopped.sooner_than(time / (1.0 + SAME_MOTION)))

@@ -81,7 +81,7 @@ class _Search:
         self.best: Shaped | None = None
         self._stopping = dataclasses.replace(job, toolpath=_stopping(job.toolpath, 0.0, 1.0))
         stops = int((self._stopping.toolpath.joint[1:] == Joint.STOP).sum())
-        self._least = job.stop_time + self.shaper.length * stops
+        self._least = job.line_stop_time + self.shaper.length * stops
 
     @cached_property
     def _stopped(self) -> Shaped | None:

@@ -15,7 +15,7 @@ from planner.geometry.curves import PLACES, UNEVEN, CurveSegments, curve_segment
 from planner.geometry.legs import leg_point, leg_tangent, legs_of
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.lookahead.stop_moves import block_moves
+from planner.lookahead.stop_moves import parts_of
 from planner.machine import load_machine
 from planner.nc.bezier import at, cubic_pieces, homogeneous
 from planner.nc.reader import parse_program
@@ -128,15 +128,17 @@ def test_a_spline_goes_on_smoothly_inside_and_turns_at_its_kinks(mode: str, how:
     assert (inner == how).sum() == 1
     assert (inner == Joint.SMOOTH).sum() == len(inner) - 1 > 0
     assert toolpath.theta[1:-1][inner == Joint.SMOOTH].max() < 1e-10
-    assert len(block_moves(toolpath)) == 3  # two moves from rest to rest
+    assert parts_of(toolpath).still.sum() == 3  # two moves from rest to rest
 
 
 def test_a_jump_of_the_curvature_parts_the_moves_of_stop() -> None:
     even = "\n".join(["G5.2 X1 Y6 L3", "X8 Y0", "X9 Y5", "X12 Y0", "G5.3"])
     toolpath = toolpath_of(even)
     assert (toolpath.joint[1:-1] == Joint.SMOOTH).all()
-    assert len(block_moves(toolpath)) == 4  # three parabolas
-    assert len(block_moves(toolpath_of(even.replace("L3", "L4")))) == 2  # cubics meet with their curvature
+    assert parts_of(toolpath).still.sum() == 4  # three parabolas
+    assert (
+        parts_of(toolpath_of(even.replace("L3", "L4"))).still.sum() == 2
+    )  # cubics meet with their curvature
 
 
 def test_straight_splines_are_lines_whatever_their_control_points() -> None:

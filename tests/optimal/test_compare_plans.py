@@ -16,7 +16,10 @@ from benchmarks.runner.suites import RANDOM_RIVALS, Job
 from benchmarks.runner.ways import way_of
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import Status
+from planner.geometry.build import toolpath_from_program
+from planner.lookahead.stop_moves import parts_of
 from planner.methods.optimal import OptimalMethod
+from planner.methods.stop import StopMethod
 from planner.nc.reader import parse_program
 from planner.optimal import loop
 from planner.optimal.order import ThirdOrder
@@ -43,10 +46,24 @@ def test_the_plan_says_when_full_stops_take_its_place():
     machine = job(17)[1]
     plan = OptimalMethod().plan(parse_program("G21 G1 X10 F3000\n", machine), machine)
     assert (plan.method, plan.corner) == ("optimal", "auto")
-    assert plan.sentence.startswith("full stops at all blocks take less time than splines; ")
+    assert plan.sentence.startswith("full stops take less time than splines; ")
     assert plan.trajectory.cycle_time == pytest.approx(plan.stop_time, rel=1e-6)
     assert plan.verdict.passed
     assert plan.prices is not None
+
+
+def test_where_a_line_is_cut_into_blocks_does_not_matter_to_full_stops():
+    machine = job(17)[1]
+    whole = "G21 G1 X3 F3000\nX3.1 Y2\nX1 Y2.2\n"
+    cut = "G21 G1 X1.25 F3000\nX3\nX3.1 Y2\nX2.05 Y2.1\nX1 Y2.2\n"
+    method = StopMethod(join_lines=True)
+    plans = [method.plan(parse_program(text, machine), machine) for text in (whole, cut)]
+    assert all(plan.verdict.passed for plan in plans)
+    assert plans[1].cycle_time == pytest.approx(plans[0].cycle_time, rel=1e-12)
+    assert plans[0].cycle_time == pytest.approx(plans[0].stop_time, rel=1e-6)
+    assert plans[1].stop_time > 1.1 * plans[1].cycle_time
+    other_feed = cut.replace("X3\n", "X3 F2900\n")  # such lines are parts of their own
+    assert parts_of(toolpath_from_program(parse_program(other_feed, machine), machine), True).still.sum() == 5
 
 
 def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):
@@ -55,7 +72,7 @@ def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):
     assert plan.status is Status.OPTIMAL
 
     class Asked:
-        stop_time = 1.01 * plan.trajectory.cycle_time
+        line_stop_time = 1.01 * plan.trajectory.cycle_time
         most = np.inf
 
     settings = loop.Settings(method="optimal", corner="auto", order=ThirdOrder(JerkLimited()))

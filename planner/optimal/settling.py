@@ -6,6 +6,7 @@ The delivered motion D and what p may do that D must not are in shaped.py.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,12 +30,31 @@ ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 EXCESS, SPARE = 2e-7, 1e-5
 # Of the tolerance, what looking at other times may find more [-].
 SPARE_ERROR = 2e-3
-# What path and samples leave of the tolerance counts as this share at least [-]: in one step the speed falls by at most
-# sqrt(1/ROOM_LEAST) times the square root of the excess.
-ROOM_LEAST = 0.1
+ROOM = 1.0 - SPARE_ERROR
+AIM = 1.0 - 2.0 * SPARE_ERROR  # what errors are brought to [-]
+MOST_SLOWER = 2.0  # of a run, in one round [-] ...
+SHORT_RUN = (
+    0.25  # ... but of one to which that was no help, which takes at least so much of what D is made of [-]
+)
 # Steps of the shaper's length in which rests are sought: with one mode each is less than 4 degrees of it, and straight lines
 # between them miss 1e-3 of the amplitude. Rests are found to 2^-HALVINGS of the length: 10 us of 40 ms.
 STEPS, HALVINGS = 96, 12
+# Of what D is made of, back from a time: by so much a rest grows that was too short, twice as much each time again [-].
+FIRST_REST = 1.0 / 32.0
+
+
+class Over(NamedTuple):
+    """What D exceeds, put down to the L pieces of p's law and its G runs."""
+
+    factor: FloatArray  # (L,) by what p has to be slower there [-]
+    limit: FloatArray  # (G,) by what runs have to be slower to keep their limits [-]
+    error: FloatArray  # (G,) error over tolerance where D is made of one run; 0 where the tolerance is kept
+    short: Array  # (G,) True for runs behind which D leaves the tolerance where it is made of two: there a longer rest helps
+
+    @property
+    def kept(self) -> bool:
+        """Whether D keeps everything."""
+        return bool(self.limit.max() <= 1.0 + EXCESS and not self.error.any() and not self.short.any())
 
 
 class Settling:
@@ -45,10 +65,7 @@ class Settling:
         machine = job.real[0]
         self.behind = Behind(job.toolpath, machine)
         self.filters = machine.fir.time_constants if machine.fir else ()
-        # Between two samples D bows by up to this [mm], which the path between the samples does not have.
-        self.bow = (
-            job.machine.dt**2 / 8.0 * np.linalg.norm(job.machine.limits("acceleration", job.toolpath.axes))
-        )
+        self.seen = self.shaper.length + sum(self.filters)  # what D is made of, back from a time [s]
         self.limits = {
             "velocity": job.machine.limits("velocity", job.toolpath.axes),
             "acceleration": job.machine.limits("acceleration", job.toolpath.axes),
@@ -89,24 +106,34 @@ class Settling:
         and what p as planned exceeds (P,)."""
         plain = planned.motion()
         runs = runs_of(plain)
-        slower, first = np.ones(len(runs)), np.ones(len(planned.problem))
+        first = np.ones(len(planned.problem))
+        slower, least = np.ones(len(runs)), np.zeros(len(runs))
+        longer, before = np.full(len(runs), FIRST_REST * self.seen), (slower, np.zeros(len(runs)))
         for n in range(ROUNDS):
             motion = slower_runs(plain, runs, slower)
-            motion = standing_longer(motion, runs_of(motion), self._rests(motion, planned))
+            timed = runs_of(motion)
+            rest = np.maximum(self._rests(motion, planned), least)
+            motion = standing_longer(motion, timed, rest)
             delivered = ShapedMotion(motion, self.shaper)
             if n and late(delivered.end):
                 break
-            factor = self._factor(motion, delivered)
+            over = self._over(motion, delivered, *timed.behind(rest))
             if n == 0:
-                first = factor
-            if factor.max() <= 1.0 + EXCESS:
+                first = over.factor
+            if over.kept:
                 return None if late(delivered.end) else (planned, motion, delivered), first
-            worst = np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(len(runs))))
-            slower = slower * np.where(worst > 1.0 + EXCESS, worst * (1.0 + SPARE), 1.0)
+            least[over.short] = np.minimum(rest + longer, self.seen)[over.short]
+            longer[over.short] *= 2.0
+            now = (slower, over.error)
+            slower = np.maximum(
+                np.where(over.limit > 1.0 + EXCESS, slower * over.limit * (1.0 + SPARE), slower),
+                _slower(now, before, SHORT_RUN * self.seen / (runs.end - runs.begin)),
+            )
+            before = now
         return None, first
 
-    def _factor(self, motion: Motion, delivered: ShapedMotion) -> FloatArray:
-        """(L,) by what factor p has to be slower on each piece of its law for D to keep everything."""
+    def _over(self, motion: Motion, delivered: ShapedMotion, begin: FloatArray, end: FloatArray) -> Over:
+        """What has to change for D to keep everything; p's runs begin and end at these times (G,) [s]."""
         factor = np.ones(len(motion.law.t))
         peaks = np.add.outer(fastest_inside(motion.law), self.shaper.delay)
         times = np.append(inside_pieces(delivered)[1], peaks)
@@ -125,18 +152,22 @@ class Settling:
             for delay in self.shaper.delay:
                 np.maximum.at(factor, self._piece(motion, chunk.t[over] - delay), worst[over])
         off = self.behind.errors(delivered, self.filters)
-        room = 1.0 - SPARE_ERROR - self.bow / self.job.toolpath.tolerance.min()
-        missed = off.near > room
+        missed = off.near > ROOM
         # a contour error above WIDER is the distance from a piece that D is not on: the match was lost before
         ratio = np.append(np.minimum(off.ratio, WIDER), off.near[missed])
         t = np.append(off.time, off.near_time[missed])
-        # at long periods the bow leaves less room than the path may use: nothing is gained there by going slower
-        slower = np.sqrt(np.maximum(ratio - OF_PATH, 0.0) / max(room - OF_PATH, ROOM_LEAST))
-        seen = self.shaper.length + sum(self.filters)  # what D is made of, back from t
-        first, last = self._piece(motion, t - seen), self._piece(motion, t)
-        for begin, end, by in zip(first, last, slower, strict=True):
-            factor[begin : end + 1] = np.maximum(factor[begin : end + 1], by)
-        return factor
+        slower = np.sqrt(np.maximum(ratio - OF_PATH, 0.0) / (ROOM - OF_PATH))
+        limit = np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(len(begin))))
+        first, last = self._piece(motion, t - self.seen), self._piece(motion, t)
+        for a, b, by in zip(first, last, slower, strict=True):
+            factor[a : b + 1] = np.maximum(factor[a : b + 1], by)
+        early = np.searchsorted(end, t - self.seen, side="right")
+        late = np.maximum(np.searchsorted(begin, t) - 1, 0)
+        own, error, short = early >= late, np.zeros(len(begin)), np.zeros(len(begin), bool)
+        np.maximum.at(error, late[own], ratio[own])
+        for a, b in set(zip(early[~own].tolist(), late[~own].tolist(), strict=True)):
+            short[a:b] = True
+        return Over(factor, limit, error, short)
 
     def _piece(self, motion: Motion, times: FloatArray) -> Array:
         return np.clip(np.searchsorted(motion.law.t, times, side="right") - 1, 0, len(motion.law.t) - 1)
@@ -151,7 +182,7 @@ class Settling:
             return rest
         joint = samples.path.legs.first[samples.stop][1:-1]
         end, begin = runs.end[:-1], runs.begin[1:]
-        budget = toolpath.tolerance[joint] * (1.0 - SPARE_ERROR) - self.bow
+        budget = toolpath.tolerance[joint] * ROOM
         at = np.linspace(0.0, self.shaper.length, STEPS + 1)
         into = self._seen(motion, end[:, None] - at) - toolpath.start[joint][:, None]
         out = self._seen(motion, begin[:, None] + at) - toolpath.start[joint][:, None]
@@ -172,6 +203,28 @@ class Settling:
     def _seen(self, motion: Motion, times: FloatArray) -> FloatArray:
         place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
         return motion.at(place, self.job.machine.dt).position[of].reshape(*times.shape, -1)
+
+
+def _slower(
+    now: tuple[FloatArray, FloatArray], before: tuple[FloatArray, FloatArray], least: FloatArray
+) -> FloatArray:
+    """(G,) how much slower than planned runs have to be for their errors to come to `AIM` [-].
+
+    now, before : how much slower they were (G,) [-], and the error over tolerance with that (G,), 0 where it is none
+    least       : (G,) how much slower they are at least when that was in vain [-]
+
+    The error is e = path + dynamic/slower^2. Two rounds tell both; before that the path is taken to use what it may. A run that takes
+    less time than the shaper is long is as far off however fast it is: D is then between its ends. Where the second round was no
+    better, or not even a standing run would be near enough, a run is made `MOST_SLOWER` times as slow.
+    """
+    (s, e), (s0, e0) = now, before
+    known = (e0 > 0.0) & (s > s0)
+    dynamic = np.where(known, e0 - e, e - OF_PATH) / np.where(known, s0**-2.0 - s**-2.0, s**-2.0)
+    left = AIM - e + dynamic / s**2
+    vain = (dynamic <= 0.0) | (left <= 0.0)
+    to = np.sqrt(np.where(vain, 1.0, dynamic) / np.where(vain, 1.0, left))
+    to = np.where(vain, np.maximum(MOST_SLOWER * s, least), np.clip(to, s, MOST_SLOWER * s))
+    return np.where(e > 0.0, to, s)
 
 
 def _miss(into: FloatArray, out: FloatArray, rest: FloatArray, shaper: Shaper) -> FloatArray:

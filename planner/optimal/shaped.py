@@ -20,9 +20,7 @@ one takes longer than that, and no candidate is pursued that takes longer than w
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -68,7 +66,7 @@ def shaped(
         toolpath = _stopping(job.toolpath, sharp)
         stops = int((toolpath.joint == Joint.STOP).sum())
         if (stops, more) not in seen:  # a corner is between the angles
-            search.best = search.tried(job, toolpath, more, search.useless) or search.best
+            search.best = search.tried(job, toolpath, more) or search.best
         seen.add((stops, more))
     return search.fastest()
 
@@ -83,32 +81,17 @@ class _Search:
         stops = int((self._stopping.toolpath.joint[1:] == Joint.STOP).sum())
         self._least = job.line_stop_time + self.shaper.length * stops
 
-    @cached_property
-    def _stopped(self) -> Shaped | None:
-        return self.tried(
-            self._stopping, _stopping(self.job.toolpath, 0.0), 1.0, lambda time: time >= self.job.most
-        )
-
-    def _stopped_before(self, time: float) -> bool:
-        """Whether the motion with stops at all corners takes less time [s]; it is not made where it cannot."""
-        return self._least < time and self._stopped is not None and self._stopped.delivered.end < time
-
     def useless(self, time: float) -> bool:
         """Whether a motion that takes so long [s] is no faster than what is there."""
-        most = self.best.delivered.end if self.best else np.inf
-        return time >= min(most, self.job.most) or self._stopped_before(time)
+        return time >= min(self.best.delivered.end if self.best else np.inf, self.job.most)
 
     def fastest(self) -> Shaped | None:
-        """The best of the candidates, or the motion with stops at all corners if it is faster."""
-        return (
-            self._stopped
-            if self._stopped_before(self.best.delivered.end if self.best else np.inf)
-            else self.best
-        )
+        """The best of the candidates, or the motion with stops at all corners if it is faster; that is not made where it cannot be."""
+        if self.useless(self._least):
+            return self.best
+        return self.tried(self._stopping, _stopping(self.job.toolpath, 0.0), 1.0) or self.best
 
-    def tried(
-        self, job: Job, toolpath: Toolpath, more: float, useless: Callable[[float], bool]
-    ) -> Shaped | None:
+    def tried(self, job: Job, toolpath: Toolpath, more: float) -> Shaped | None:
         """The shaped motion of a job on a path with stops, planned with `more` times the accelerations; None if it is useless."""
         candidate = dataclasses.replace(job, machine=_faster(job.machine, more), toolpath=toolpath)
         try:
@@ -117,7 +100,7 @@ class _Search:
             return None
         if not planned.solution.solved:
             return None
-        made = Settling(job, self.shaper, self.settings.order).settled(planned, useless)
+        made = Settling(job, self.shaper, self.settings.order).settled(planned, self.useless)
         stops = int((toolpath.joint == Joint.STOP).sum())
         job.tell(
             "shaped",

@@ -10,6 +10,7 @@ from planner.base.errors import InputError, NotSolvedError
 from planner.machine import Axis, Fir, Machine, Mode
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
+from planner.optimal.settling import AIM, MOST_SLOWER, OF_PATH, _slower
 
 SHAKEN = problems.machine(modes=(Mode(frequency=18.0),))
 LEFT = 1e-3  # [mm] what may ring on
@@ -144,3 +145,32 @@ def test_a_narrow_peak_of_the_normal_acceleration_where_the_motion_nearly_turns_
     made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
     assert made.verdict.passed, made.verdict.faults
     assert made.verdict.limits["normal_acceleration"].ratio > 0.5
+
+
+def test_two_rounds_tell_how_much_slower_a_run_has_to_be():
+    path, dynamic = 0.7, np.array([0.5, 4.0, 40.0])
+    before = (np.ones(3), path + dynamic)
+    s = np.array([1.2, 2.0, 2.0])
+    now = (s, path + dynamic / s**2)
+    to = _slower(now, before, np.full(3, 50.0))
+    np.testing.assert_allclose((path + dynamic / to**2)[:2], AIM)
+    assert to[2] == MOST_SLOWER * s[2]
+    # the first round: the path uses what it may
+    np.testing.assert_allclose(
+        OF_PATH
+        + 0.6 / _slower((np.ones(1), np.array([OF_PATH + 0.6])), (np.ones(1), np.zeros(1)), np.ones(1)) ** 2,
+        AIM,
+    )
+    # in vain, kept, and a path that is too far off itself
+    error, was = np.array([1.3, 0.0, 1.05]), np.array([1.3, 1.2, 1.08])
+    to = _slower((np.full(3, 2.0), error), (np.ones(3), was), np.array([9.0, 9.0, 3.0]))
+    np.testing.assert_allclose(to, [9.0, 2.0, 4.0])
+
+
+def test_a_run_shorter_than_the_shaper_is_left_by_slowing_down():
+    """Between the copies D stands beside an arc of 3 ms, as far off however fast the arc is: the sagitta."""
+    machine = problems.machine(modes=(Mode(frequency=8.0, damping=0.1),))
+    text = "G21 G64 P0.01 F6000\nG1 X20\nG3 X20.4 Y0.4 I0 J0.4\nG1 X0.4 Y0.4\n"
+    made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
+    assert made.verdict.passed
+    assert left(made) < LEFT

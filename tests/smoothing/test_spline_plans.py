@@ -49,17 +49,28 @@ def test_turned_and_mirrored_jobs_take_the_same_time(seed):
 def test_scaled_jobs_take_the_same_time(seed):
     """Inches or metres: lengths and limits by k keep the time."""
     points, k = random_polyline(np.random.default_rng(seed), 8), 25.4
-    expected = time_of(problems.polyline(points))
+    program = problems.polyline(points)
+    assert time_of(*larger(program, k)) == pytest.approx(time_of(program), rel=1e-6)
+
+
+@pytest.mark.parametrize("k", [0.1, 3.0, 25.4])
+def test_a_job_with_a_straight_way_inside_the_tolerance_is_the_same_in_all_units(k):
+    """The third derivatives of its spline fall to rounding; minimised further, rounding decides."""
+    program = parse_program("G21 G64 P0.04 F6000\nG1 X0.34 Y0.09\nX0.3375 Y0.0905\n", MACHINE)
+    method = OptimalMethod(corner="spline", effort="quick")
+    expected = time_of(program, method=method)
+    assert time_of(*larger(program, k), method=method) == pytest.approx(expected, rel=1e-6)
+
+
+def larger(program, k):
+    """A program and `MACHINE` with all lengths times k, of the limits too."""
     axes = {
         name: axis.model_copy(update={q: getattr(axis, q) * k for q in ("velocity", "acceleration", "jerk")})
         for name, axis in MACHINE.axes.items()
     }
-    larger = MACHINE.model_copy(update={"axes": axes, "tolerance": MACHINE.tolerance * k})
-    program = problems.polyline(points)
-    program = dataclasses.replace(
-        program, start=program.start * k, end=program.end * k, feed=program.feed * k
-    )
-    assert time_of(program, larger) == pytest.approx(expected, rel=1e-6)
+    machine = MACHINE.model_copy(update={"axes": axes, "tolerance": MACHINE.tolerance * k})
+    lengths = {name: getattr(program, name) * k for name in ("start", "end", "feed", "tolerance")}
+    return dataclasses.replace(program, **lengths), machine
 
 
 @pytest.mark.slow

@@ -127,7 +127,7 @@ class Settling:
             now = (slower, over.error)
             slower = np.maximum(
                 np.where(over.limit > 1.0 + EXCESS, slower * over.limit * (1.0 + SPARE), slower),
-                _slower(now, before, SHORT_RUN * self.seen / (runs.end - runs.begin)),
+                slower_by_errors(now, before, SHORT_RUN * self.seen / (runs.end - runs.begin)),
             )
             before = now
         return None, first
@@ -205,7 +205,7 @@ class Settling:
         return motion.at(place, self.job.machine.dt).position[of].reshape(*times.shape, -1)
 
 
-def _slower(
+def slower_by_errors(
     now: tuple[FloatArray, FloatArray], before: tuple[FloatArray, FloatArray], least: FloatArray
 ) -> FloatArray:
     """(G,) how much slower than planned runs have to be for their errors to come to `AIM` [-].

@@ -23,7 +23,7 @@ from planner.optimal.geometry import splined_with_stops
 from planner.smoothing import initial as lay
 from planner.smoothing import spline_path
 from planner.smoothing.initial import greville_control
-from planner.smoothing.relax import OVERLAP, ControlWindow, Relaxed, relax, tighten_window
+from planner.smoothing.relax import OVERLAP, WIDER, ControlWindow, Relaxed, relax, tighten_window
 from planner.smoothing.sites import site_distance, used_share, with_radius
 from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
 
@@ -270,7 +270,7 @@ def test_feed_changes_on_a_straight_leg_keep_their_place():
     assert plan.verdict.passed, plan.verdict.faults
 
 
-def test_tightening_leaves_every_site_inside_and_widens_none():
+def test_tightening_leaves_every_site_inside_and_widens_those_that_the_taper_pushes_out():
     _, shape = splined(problems.zigzag())
     sites, control = shape.splines.sites, shape.splines.control.copy()
     middle = greville_control(shape.corridor, shape.splines.breaks)
@@ -291,7 +291,9 @@ def test_tightening_leaves_every_site_inside_and_widens_none():
         window, with_radius(sites, given), control, middle, ratio
     )
     assert (distances() < used).all()
-    assert (used <= given).all()
+    wider = used > given
+    np.testing.assert_allclose(used[wider], WIDER * distances()[wider])
+    assert wider.sum() <= 1
     assert used[worst] < 0.995 * given[worst]
 
 

@@ -142,6 +142,6 @@ def known_name(kind: str, name: str, names: Iterable[str], aliases: Iterable[str
     """The name, as it is. Raises InputError if it is none of `names`, with one that is near among them and their aliases."""
     if name in (known := tuple(names)):
         return name
-    near = difflib.get_close_matches(name, (*known, *aliases), n=1)
+    near = difflib.get_close_matches(str(name), (*known, *aliases), n=1)
     hint = f" (did you mean '{near[0]}'?)" if near else ""
     raise InputError(f"no {kind} '{name}'; there are {', '.join(known)}{hint}")

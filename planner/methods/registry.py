@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 from collections.abc import Sequence
 from importlib import import_module
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
 
@@ -88,6 +89,8 @@ def plan(
     Raises InputError for a program or machine that cannot be read, naming file, line and column, for a machine with a value that no
     machine file may have, for an unknown name, and for a setting that the method does not use.
     """
+    if not isinstance(method, str | Method):
+        raise InputError(f"method = {method}: give a name, {', '.join(METHODS)}, or a method")
     given = check_settings(method, **settings)
     joints = not isinstance(method, str) or METHODS[method_name(method)].joints
     if isinstance(method, str):
@@ -124,10 +127,7 @@ def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
     made: dict[str, Any] = dict(entry.settings)
     if entry.shapes:
         kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
-        rounds = given.get("rounds")
-        if rounds is not None and rounds < 0:
-            raise InputError(f"{rounds} rounds; it must be 0 or more")
-        made |= {"corner": shape or kind, "rounds": rounds, "shaped": bool(given.get("shaped"))}
+        made |= {"corner": shape or kind, "rounds": given.get("rounds"), "shaped": bool(given.get("shaped"))}
         if (effort := given.get("effort")) is not None:
             made["effort"] = effort_name(effort)
     if entry.solvers and (solver := given.get("solver")) is not None:
@@ -146,7 +146,8 @@ def check_settings(method: str | Method = "optimal", **settings: Unpack[MethodSe
 
 
 def _given(settings: MethodSettings) -> MethodSettings:
-    """The settings that are set. Raises TypeError for others than those of `MethodSettings`."""
+    """The settings that are set. Raises TypeError for others than those of `MethodSettings`, and InputError for values that are none of
+    theirs, in as far as names do not say it."""
     unknown = settings.keys() - MethodSettings.__annotations__.keys()
     if unknown:
         wrong, allowed = min(unknown), (*MethodSettings.__annotations__, "tolerance", "limits", "reading")
@@ -154,6 +155,13 @@ def _given(settings: MethodSettings) -> MethodSettings:
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise TypeError(f"unexpected keyword argument '{wrong}'; settings are {', '.join(allowed)}{hint}")
     given = {name: value for name, value in settings.items() if value is not None and value is not False}
+    rounds, corner, shaped = (given.get(name) for name in ("rounds", "corner", "shaped"))
+    if "rounds" in given and not (isinstance(rounds, Integral) and int(rounds) >= 0):
+        raise InputError(f"{rounds} rounds; it must be 0 or more, a whole number")
+    if "corner" in given and not (isinstance(corner, str) or hasattr(corner, "at")):
+        raise InputError(f"corner = {corner}: give the name of a shape, or a shape of your own")
+    if "shaped" in given and shaped is not True:
+        raise InputError(f"shaped = {shaped!r}: it is True or False")
     return cast(MethodSettings, given)
 
 

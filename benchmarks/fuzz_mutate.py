@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
-# Numbers that are none, too large, too small, or written as only some programs do. None between 1e-12 and 1e-5: a machine file may have
+# Numbers that are none, too large, too small, or written as only some programs do. None between 1e-12 and 1e-3: a machine file may have
 # them, and with a jerk of 1e-9 mm/s3 a motion takes two hours, and its verdict more than `SECONDS`.
 ODD_NUMBERS = (
-    *b"0 -0 -1 1 0.5 2 3 7 1e-5 1e-300 5e-324 1e9 1e30 1e300 1.8e308 1e999 -1e300 nan inf -inf NaN +1 .5 5.".split(),
+    *b"0 -0 -1 1 0.5 2 3 7 1e-3 1e-300 5e-324 1e9 1e30 1e300 1.8e308 1e999 -1e300 nan inf -inf NaN +1 .5 5.".split(),
     *b"1_000 0x10 0b1 1,5 1e 1e+ -- 9223372036854775808 340282366920938463463374607431768211456".split(),
     *b"1.0000000000000001 '1' \"1\" true false [] {} [1] 1979-05-27 \xd9\xa3".split(),
     b"",

@@ -22,9 +22,6 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.optimal.tighten import beside_axes, fastest_inside, tightened
 
-# Share of the tolerance that the path of p may use; the rest is for the shaper [-]. A pentagon, a zig-zag and a spiral take the same
-# time with 0.3; with 0.7 the spiral takes 6 % longer: there the corners that are no stops leave too little.
-OF_PATH = 0.5
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 # D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
 EXCESS, SPARE = 2e-7, 1e-5
@@ -60,8 +57,9 @@ class Over(NamedTuple):
 class Settling:
     """Makes p gentler, or rest longer, until D keeps everything."""
 
-    def __init__(self, job: Job, shaper: Shaper, order: Order):
-        self.job, self.shaper, self.order = job, shaper, order
+    def __init__(self, job: Job, shaper: Shaper, order: Order, share: float):
+        """share : of the tolerance, for the path of p [-]"""
+        self.job, self.shaper, self.order, self.share = job, shaper, order, share
         machine = job.real[0]
         self.behind = Behind(job.toolpath, machine)
         self.filters = machine.fir.time_constants if machine.fir else ()
@@ -127,7 +125,7 @@ class Settling:
             now = (slower, over.error)
             slower = np.maximum(
                 np.where(over.limit > 1.0 + EXCESS, slower * over.limit * (1.0 + SPARE), slower),
-                slower_by_errors(now, before, SHORT_RUN * self.seen / (runs.end - runs.begin)),
+                slower_by_errors(now, before, self.share, SHORT_RUN * self.seen / (runs.end - runs.begin)),
             )
             before = now
         return None, first
@@ -156,7 +154,7 @@ class Settling:
         # a contour error above WIDER is the distance from a piece that D is not on: the match was lost before
         ratio = np.append(np.minimum(off.ratio, WIDER), off.near[missed])
         t = np.append(off.time, off.near_time[missed])
-        slower = np.sqrt(np.maximum(ratio - OF_PATH, 0.0) / (ROOM - OF_PATH))
+        slower = np.sqrt(np.maximum(ratio - self.share, 0.0) / (ROOM - self.share))
         limit = np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(len(begin))))
         first, last = self._piece(motion, t - self.seen), self._piece(motion, t)
         for a, b, by in zip(first, last, slower, strict=True):
@@ -206,11 +204,12 @@ class Settling:
 
 
 def slower_by_errors(
-    now: tuple[FloatArray, FloatArray], before: tuple[FloatArray, FloatArray], least: FloatArray
+    now: tuple[FloatArray, FloatArray], before: tuple[FloatArray, FloatArray], share: float, least: FloatArray
 ) -> FloatArray:
     """(G,) how much slower than planned runs have to be for their errors to come to `AIM` [-].
 
     now, before : how much slower they were (G,) [-], and the error over tolerance with that (G,), 0 where it is none
+    share       : of the tolerance, that the path may use [-]
     least       : (G,) how much slower they are at least when that was in vain [-]
 
     The error is e = path + dynamic/slower^2. Two rounds tell both; before that the path is taken to use what it may. A run that takes
@@ -219,7 +218,7 @@ def slower_by_errors(
     """
     (s, e), (s0, e0) = now, before
     known = (e0 > 0.0) & (s > s0)
-    dynamic = np.where(known, e0 - e, e - OF_PATH) / np.where(known, s0**-2.0 - s**-2.0, s**-2.0)
+    dynamic = np.where(known, e0 - e, e - share) / np.where(known, s0**-2.0 - s**-2.0, s**-2.0)
     left = AIM - e + dynamic / s**2
     vain = (dynamic <= 0.0) | (left <= 0.0)
     to = np.sqrt(np.where(vain, 1.0, dynamic) / np.where(vain, 1.0, left))

@@ -51,8 +51,8 @@ class Candidate(NamedTuple):
     share: float
 
 
-# The last one leaves nearly all of the tolerance to the shaper: a spiral of 300 chords takes 0.73 of the time. Of 18 random jobs 5 change,
-# 0.987 in the mean, for a fifth more processor time.
+# The last one leaves nearly all of the tolerance to the shaper: a spiral of 300 chords takes 0.73 of the time. Of 18 random jobs 5
+# change, 0.987 in the mean, for a fifth more processor time.
 CANDIDATES = (
     Candidate(SHARP, 1.0, 0.5),
     Candidate(SHARP, 1.5, 0.5),

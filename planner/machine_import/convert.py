@@ -155,7 +155,7 @@ def _text(
     said: Sequence[str],
 ) -> str:
     """The text of the machine file."""
-    name = "".join(c if c.isprintable() and c not in '"\\' else "-" for c in path.stem) or "machine"
+    name = "".join(c if c not in '"\\' else "-" for c in path.stem) or "machine"
     lines = [f"# From the settings of {found.control}. Lengths in mm, rotary axes in degrees, times in s."]
     lines += [f"# Note: {sentence}." for sentence in said]
     lines += ["", f'name = "{name}"', _line("dt", dt), _line("tolerance", tolerance)]
@@ -171,7 +171,12 @@ def _text(
             f"frequency = {mode.frequency!r}  # {mode.place}",
             f"damping = {mode.damping!r}",
         ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(_printable(line) for line in lines) + "\n"
+
+
+def _printable(text: str) -> str:
+    """The text without what TOML does not take in names and comments: settings may have any character in a value that is quoted."""
+    return "".join(c if c.isprintable() else "-" for c in text)
 
 
 def _line(key: str, found: Sourced) -> str:

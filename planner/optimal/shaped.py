@@ -33,6 +33,7 @@ from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion, shaper_of
 from planner.motion.timing import Motion
+from planner.optimal.compare_plans import counted_time
 from planner.optimal.loop import Settings, judged, time_optimal
 from planner.optimal.on_path import OnPath
 from planner.optimal.result import plan_of_solution
@@ -161,12 +162,12 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
     # reshaping makes paths for the motion as it is planned, not for the one behind the shaper
     settings = dataclasses.replace(settings, rounds=settings.rounds or 0)
     plan = _plan_of(job, settings, shaped(job, settings))
-    if plan.verdict is None or plan.verdict.passed:
+    if plan.verdict is None or counted_time(plan) < np.inf:
         return plan
     # what is slower is not gentler everywhere behind a shaper, whose copies then meet elsewhere; with the limits as they are D is
     again = job.afresh()
     gentle = _plan_of(again, settings, shaped(again, settings, CANDIDATES[:1]))
-    kept = gentle.verdict is not None and gentle.verdict.passed
+    kept = counted_time(gentle) < np.inf
     job.tell(
         "shaped, limits as they are",
         found=gentle.cycle_time if gentle.solved else np.nan,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from planner.base.errors import InputError
-from planner.machine import load_machine
+from planner.machine import load_machine, machine_from_dict
 from planner.machine_import.convert import RAMP_TIME, Imported, import_machine
 from tests.commands.command_line import run
 
@@ -205,3 +206,11 @@ def test_linuxcnc_samples_are_read(name: str) -> None:
     found = import_machine(SAMPLES / f"{name}.ini")
     assert {"x", "y", "z"} <= found.machine.axes.keys()
     assert found.machine.dt == pytest.approx(0.001)
+
+
+def test_a_control_character_in_a_value_that_a_note_quotes_is_not_in_the_machine_file(tmp_path: Path) -> None:
+    """Found by fuzzing: TOML takes none in a comment, and the written file could not be read."""
+    found = imported(tmp_path, LINUXCNC.replace("trivkins", "tr\x1bvkins"))
+    assert any("\x1b" in sentence for sentence in found.assumed)
+    assert "tr-vkins" in found.text
+    assert machine_from_dict(tomllib.loads(found.text)) == found.machine

@@ -168,14 +168,8 @@ class Behind:
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
         """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a longer rest is enough."""
         runs = runs_of(motion)
-        early, late = self.runs_within(runs.begin, runs.end, time)
+        early, late = runs_within(runs.begin, runs.end, time, self.filters.delay)
         return early < late
-
-    def runs_within(self, begin: FloatArray, end: FloatArray, time: FloatArray) -> tuple[Array, Array]:
-        """First and last (n,) of the runs from `begin` to `end` (G,) of which the filters hold something at `time` (n,) [s]."""
-        early = np.searchsorted(end, time - self.filters.delay, side="right")
-        late = np.maximum(np.searchsorted(begin, time) - 1, 0)
-        return np.minimum(early, late), late
 
     def rests(self, motion: Timed, runs: MotionRuns) -> FloatArray:
         """(G,) the shortest rest behind each run with which the filtered motion keeps the tolerance [s]; 0 behind the last run."""
@@ -227,6 +221,21 @@ class Behind:
         return np.where(nearer == 0, path.tolerance[first], path.tolerance[segment + 1])
 
 
+def runs_within(begin: FloatArray, end: FloatArray, time: FloatArray, delay: float) -> tuple[Array, Array]:
+    """First and last (n,) of the runs from `begin` to `end` (G,) that have a share in what is delivered at `time` (n,) [s]."""
+    early = np.searchsorted(end, time - delay, side="right")
+    late = np.maximum(np.searchsorted(begin, time) - 1, 0)
+    return np.minimum(early, late), late
+
+
+def stops_between(early: Array, late: Array, count: int) -> Array:
+    """(count,) True for runs behind which there is a stop between the runs `early` and `late` (n,)."""
+    short = np.zeros(count, bool)
+    for a, b in set(zip(early.tolist(), late.tolist(), strict=True)):
+        short[a:b] = True
+    return short
+
+
 def rested(behind: Behind, motion: TimedT) -> TimedT:
     """The motion with the shortest rests at its full stops behind which the filtered motion keeps the tolerance, no run slowed down."""
     runs = runs_of(motion)
@@ -258,7 +267,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         places = behind.places(made, of_path)
         if not len(places.time):
             break
-        early, late = behind.runs_within(*timed.behind(longer), places.time)
+        early, late = runs_within(*timed.behind(longer), places.time, delay)
         own = early == late
         more = np.clip(
             1.0 / np.sqrt(places.less[own]), min(FACTOR_LEAST ** (n + 1), FACTOR_MOST), FACTOR_MOST
@@ -266,9 +275,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         worst = np.ones(len(runs))
         np.maximum.at(worst, late[own], more)
         factor = factor * worst
-        short = np.zeros(len(runs), bool)
-        for a, b in set(zip(early[~own].tolist(), late[~own].tolist(), strict=True)):
-            short[a:b] = True
+        short = stops_between(early, late, len(runs))
         least[short] = np.minimum(
             np.maximum(rest, gap)[short] + FLOOR_STEP * delay * 2.0 ** again[short], delay
         )

@@ -67,7 +67,7 @@ def stop_phases(
 
 
 def stop_time(toolpath: Toolpath, machine: Machine, join_lines: bool = False) -> float:
-    """Time of all moves, dwells included [s]."""
+    """Time of all moves (`parts_of`), dwells included [s]."""
     parts = parts_of(toolpath, join_lines)
     length = np.add.reduceat(toolpath.length, parts.first[:-1])
     if parts.still.all():

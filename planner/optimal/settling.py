@@ -12,7 +12,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.constraints.normal_limit import slowest
-from planner.delivery.filters import WIDER, Behind
+from planner.delivery.filters import FLOOR_STEP, WIDER, Behind, runs_within, stops_between
+from planner.delivery.filters import SPARE as SPARE_ERROR
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.geometry.toolpath import Joint
 from planner.job.job import Job
@@ -25,10 +26,8 @@ from planner.optimal.tighten import beside_axes, fastest_inside, tightened
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 # D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
 EXCESS, SPARE = 2e-7, 1e-5
-# Of the tolerance, what looking at other times may find more [-].
-SPARE_ERROR = 2e-3
-ROOM = 1.0 - SPARE_ERROR
-AIM = 1.0 - 2.0 * SPARE_ERROR  # what errors are brought to [-]
+# What the path and the shaper may use of the tolerance, and what errors are brought to [-].
+ROOM, AIM = 1.0 - SPARE_ERROR, 1.0 - 2.0 * SPARE_ERROR
 MOST_SLOWER = 2.0  # of a run, in one round [-] ...
 SHORT_RUN = (
     0.25  # ... but of one to which that was no help, which takes at least so much of what D is made of [-]
@@ -36,8 +35,6 @@ SHORT_RUN = (
 # Steps of the shaper's length in which rests are sought: with one mode each is less than 4 degrees of it, and straight lines
 # between them miss 1e-3 of the amplitude. Rests are found to 2^-HALVINGS of the length: 10 us of 40 ms.
 STEPS, HALVINGS = 96, 12
-# Of what D is made of, back from a time: by so much a rest grows that was too short, twice as much each time again [-].
-FIRST_REST = 1.0 / 32.0
 
 
 class Over(NamedTuple):
@@ -106,7 +103,7 @@ class Settling:
         runs = runs_of(plain)
         first = np.ones(len(planned.problem))
         slower, least = np.ones(len(runs)), np.zeros(len(runs))
-        longer, before = np.full(len(runs), FIRST_REST * self.seen), (slower, np.zeros(len(runs)))
+        longer, before = np.full(len(runs), FLOOR_STEP * self.seen), (slower, np.zeros(len(runs)))
         for n in range(ROUNDS):
             motion = slower_runs(plain, runs, slower)
             timed = runs_of(motion)
@@ -159,13 +156,10 @@ class Settling:
         first, last = self._piece(motion, t - self.seen), self._piece(motion, t)
         for a, b, by in zip(first, last, slower, strict=True):
             factor[a : b + 1] = np.maximum(factor[a : b + 1], by)
-        early = np.searchsorted(end, t - self.seen, side="right")
-        late = np.maximum(np.searchsorted(begin, t) - 1, 0)
-        own, error, short = early >= late, np.zeros(len(begin)), np.zeros(len(begin), bool)
+        early, late = runs_within(begin, end, t, self.seen)
+        own, error = early == late, np.zeros(len(begin))
         np.maximum.at(error, late[own], ratio[own])
-        for a, b in set(zip(early[~own].tolist(), late[~own].tolist(), strict=True)):
-            short[a:b] = True
-        return Over(factor, limit, error, short)
+        return Over(factor, limit, error, stops_between(early, late, len(begin)))
 
     def _piece(self, motion: Motion, times: FloatArray) -> Array:
         return np.clip(np.searchsorted(motion.law.t, times, side="right") - 1, 0, len(motion.law.t) - 1)

@@ -3,7 +3,7 @@
   geometry  round the corners; lay splines over the runs between full stops                       corners/, smoothing/
   solve     the time-optimal feed on that path, all limits at grid points                         order.py, feedrate/
   reshape   path and feed improved together, all limits linearised, inside the
-            tolerance; solve on the new path; in turns                                            reshape.py, smoothing/
+            tolerance; solve on the new path; in turns                                 rounds.py, reshape.py, smoothing/
   compare   single corners between the full stops, where they may be faster                       compare_corners.py
   tighten   where the motion exceeds a limit between grid points, allow less and solve again      tighten.py
   filters   the same where it leaves the tolerance behind the machine's own filters               behind_filters.py
@@ -66,22 +66,12 @@ from planner.optimal.geometry import corner_shape, lost_joints, splined_with_sto
 from planner.optimal.notes import no_spline_note, not_compared_note
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order
-from planner.optimal.reshape import chosen, reshape, run_times
 from planner.optimal.result import plan_of_solution, pricing_of
+from planner.optimal.rounds import reshaped, tell_of
 from planner.optimal.tighten import SEEN_EXCESS_MAX, within_limits, without_seen_excess
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
 
-# A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
-# than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
-QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
-# Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
-# same time within 1e-4.
-FIRST_PULL, LEAST_PULL = 0.5, 1e-3
-# Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of it [-].
-GOOD, POOR, LESS, MORE = 0.5, 0.1, 0.3, 4.0
-# Gap of the first convex problem, that of the others as a share of what the round before promised, and the least [-].
-FIRST_GAP, GAP_SHARE, LAST_GAP = 1e-3, 0.1, 1e-5
 # Of 345 plans 9 exceeded a limit between the places looked at, and one of these once more (benchmarks/retries.py); each time with ten
 # times the margin.
 SEEN_ROUNDS = 2
@@ -223,7 +213,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         small = of_given.points.sum() <= COMPARED_POINTS
         if rounded is not given and small and of_given.time.sum() < best.solution.cycle_time:
             without = order.solve(given, job, grids.final, [best])
-            _tell_of(job, "no added stops", without, best)
+            tell_of(job, "no added stops", without, best)
             if without.faster_than(best):
                 return without
 
@@ -266,60 +256,6 @@ def _rounded(job: Job, settings: Settings) -> SmoothPath:
         return round_corners(job.toolpath, job.machine, shape, blend_tangents=settings.order.jerk_limited)
 
 
-def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, resolution: float) -> OnPath:
-    """The motion on splines after the best of some rounds of reshaping (reshape.py).
-
-    rounded    : the path with the corners that the splines replace
-    best       : the motion on the first splines
-    resolution : of the grid
-    """
-
-    def solve(shape: SplineShape, *known: OnPath) -> OnPath:
-        planned = settings.order.solve(with_spline(rounded, shape), job, resolution, known)
-        return dataclasses.replace(planned, shape=shape)
-
-    shape = best.shape
-    assert shape is not None
-    if not best.solution.solved or best.solution.multipliers is None or not len(best.path.spline):
-        return best
-    rounds = settings.rounds
-    if rounds is None:
-        rounds = min(settings.effort.work // len(best.samples), settings.effort.rounds)
-    pull, gap = np.full(len(shape.splines.fits), FIRST_PULL), FIRST_GAP
-    quiet, done = np.zeros(len(pull)), ~shape.splines.fits
-    for n in range(1, rounds + 1):
-        with job.stage("geometry"):
-            shape, promised = reshape(best, np.where(done, np.inf, pull), gap)
-        before, tried = best, solve(shape, best)
-        _tell_of(job, f"reshape {n}", tried, best, of=int((~done).sum()))
-        if not tried.solution.solved:
-            break
-        time = run_times(before)
-        gained = time - run_times(tried)
-        faster = gained > 0.0
-        if tried.faster_than(best):
-            best = tried
-        if faster.any() and not (faster | done).all():
-            mixed = solve(chosen(before, shape, faster), before, tried)
-            _tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=int((~done).sum()))
-            if mixed.faster_than(best):
-                best = mixed
-        # a promise of nothing or less is none: the convex problem was not solved to the end, and the run is pulled more
-        sound = promised > 0.0
-        little = (gained < QUIET_GAIN * time) & (promised < QUIET_PROMISE * time)
-        quiet = np.where(sound & little, quiet + 1.0, 0.0)
-        change = np.where(gained > GOOD * promised, LESS, np.where(gained > POOR * promised, 1.0, MORE))
-        pull = np.maximum(np.where(sound, change, MORE) * pull, LEAST_PULL)
-        left = float(promised[sound].sum()) / best.solution.cycle_time
-        if left < settings.effort.left and (sound | done).all():
-            break
-        done |= (quiet >= QUIET_ROUNDS) | (pull > MOST_PULL)
-        if done.all():
-            break
-        gap = min(FIRST_GAP, max(GAP_SHARE * left, LAST_GAP))
-    return best
-
-
 def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
     """The motion on the first splines, the grids, and the resolution of the one that it is on."""
     spans, effort = len(path.spline.spans), settings.effort  # a grid has a point for each span at least
@@ -344,12 +280,6 @@ def grids_for(path: SmoothPath, job: Job, settings: Settings) -> tuple[Grids, Pa
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
     return settings.effort.grids(len(coarse)), coarse
-
-
-def _tell_of(job: Job, name: str, tried: OnPath, best: OnPath, **facts: int) -> None:
-    """Tell of a motion that was tried, and competes with the best."""
-    before = best.solution.cycle_time
-    job.tell(name, found=tried.solution.cycle_time, before=before, kept=tried.faster_than(best), **facts)
 
 
 def judged(

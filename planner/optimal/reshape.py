@@ -3,7 +3,7 @@
 Along the time-optimal motion of the present path all limits are linearised in the control points and in the time that every part of it
 takes; smoothing/combined.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem
 is then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of
-the promised gain came true; the others keep their old shape and are pulled more (optimal/loop.py). Where nothing can be gained to first
+the promised gain came true; the others keep their old shape and are pulled more (rounds.py). Where nothing can be gained to first
 order, shape and feed satisfy the optimality conditions of the combined problem, minimum time inside the tolerance.
 
 What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the parameter of the spline is

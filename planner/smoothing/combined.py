@@ -43,10 +43,11 @@ from planner.smoothing.combined_rows import rows_of_window
 from planner.smoothing.combined_solver import CombinedProblem, improve_window
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.relax import TIGHTENED, next_window, shares
+from planner.smoothing.relax import shares
 from planner.smoothing.runs import SplineRuns
 from planner.smoothing.sites import Sites, with_radius
 from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
+from planner.smoothing.windows import TIGHTENED, next_window
 
 WINDOW = 400  # control points improved at a time ...
 OVERLAP = 40  # ... and of them again with the next window

@@ -21,7 +21,6 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.base.search import first_not_before
 from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
@@ -30,8 +29,9 @@ from planner.smoothing.forms import third_derivative_energy
 from planner.smoothing.initial import greville_control
 from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor
 from planner.smoothing.runs import SplineRuns
-from planner.smoothing.sites import Sites, site_distance, with_radius
+from planner.smoothing.sites import Sites, with_radius
 from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
+from planner.smoothing.windows import AGAIN, WINDOW, next_window, tighten_window, window_of
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
@@ -41,16 +41,9 @@ STRAIGHT = 1e-4
 # Of the tolerance that sites may use at first [-]. With 0.99 six random jobs end 2e-4 to 2e-3 slower after three rounds of
 # reshaping; with 0.9999 one ends 3e-3 slower, and the others change by at most 2.4e-4.
 USED = 0.9995
-TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
 # Of tightening, in windows around the sites that need it; 2 are the rule. With 3, a run of each of 10 plans that need
 # more gets no spline; 7 of them take longer, up to 2.7e-2 (benchmarks/retries.py at 2ad8a9c).
 ROUNDS = 20
-AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
-WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it
-# On those six jobs windows of 120 and 480 end up to 2e-4 and 5e-4 later; overlaps of 15 and 60 change them by -2e-4 to 1e-3 and by
-# -7e-4 to 3e-3, and FIRST_GAP = 10 and 100 by up to 2e-3 and 3e-5.
-WINDOW = 240  # control points relaxed at a time ...
-OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
 SPANS_SHARED = 2_000  # fewer are relaxed by one thread: threads take 1 ms to begin, a span some 20 us
 # Control points of a range of a long run; a window more for each of them: 6 % of the work. Runs of fewer than two are relaxed as one.
 RANGE = 4_000
@@ -89,70 +82,6 @@ class Run(NamedTuple):
     middle: FloatArray  # (n, A) a spline well inside the corridor
     fixed_first: int
     fixed_last: int
-
-
-class ControlWindow(NamedTuple):
-    """The control points lo .. hi - 1 of a run and the sites site .. site_end - 1 that they move."""
-
-    lo: int
-    hi: int
-    site: int
-    site_end: int
-
-
-@njit(cache=True, error_model="numpy")
-def next_window(attempt, done, site, fixed_first, end, span, ratio_site):
-    """Control points lo, hi of the next window to relax, and the first site after those that it is for; lo = end if there is none.
-    At first windows of `WINDOW` after each other, the last of which ended at `done`; then around sites from `site` on whose bound is
-    too large."""
-    if attempt == 0:
-        lo = max(done - OVERLAP, fixed_first)
-        hi = min(lo + WINDOW, end)
-        if end - hi < OVERLAP:
-            hi = end
-        return (lo, hi, site) if done < end else (end, end, site)
-    lo = hi = end
-    for j in range(site, len(span)):
-        if ratio_site[j] <= 1.0:
-            continue
-        first, last = max(span[j] - OVERLAP, fixed_first), min(span[j] + ORDER + OVERLAP, end)
-        if lo == end:
-            lo = first
-        elif first > hi or last - lo > WINDOW:
-            return lo, hi, j
-        hi = last
-    return lo, hi, len(span)
-
-
-@njit(cache=True, error_model="numpy")
-def _window(run, lo, hi):
-    """The window of the control points lo .. hi - 1."""
-    span, spans = run.sites.span, len(run.knots.breaks) - 1
-    return ControlWindow(
-        lo, hi, first_not_before(span, max(lo - DEGREE, 0)), first_not_before(span, min(hi, spans))
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def tighten_window(window, sites, control, middle, ratio_site):
-    """Smaller radii for a window's sites whose bound is too large, and its control points a little closer to the spline `middle`, which
-    is well inside, so that they are inside again: control points (hi - lo, A) and radii (site_end - site,)."""
-    axes, (lo, hi, site, site_end) = control.shape[1], window
-    begin = max(lo - DEGREE, 0)
-    near, e = control[begin : hi + DEGREE].copy(), np.empty(axes)
-    for i in range(lo, hi):
-        taper = min(min(i - lo + 1, hi - i) / OVERLAP, 1.0)
-        for k in range(axes):
-            near[i - begin, k] += (1.0 - AGAIN) * taper * (middle[i, k] - control[i, k])
-    radius = sites.radius[site:site_end].copy()
-    for j in range(site, site_end):
-        used = sites.radius[j]
-        needs = WIDER * site_distance(sites, j, near, begin, e)
-        if needs >= WIDER * used:  # pushed out by the taper
-            radius[j - site] = needs
-        elif ratio_site[j] > 1.0:
-            radius[j - site] = max(TIGHTENED / ratio_site[j] * used, min(needs, used))
-    return near[lo - begin : hi - begin], radius
 
 
 @njit(cache=True, error_model="numpy")
@@ -212,7 +141,7 @@ def relax_range(run, goal, gap, begin, end, control, multiplier):
     done = begin
     while done < end:
         lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier)
-        window = _window(run, lo, hi)
+        window = window_of(run, lo, hi)
         moved, prices = _relaxed_window(window, run, control, run.sites.radius, goal, gap)
         _put_points(moved, lo, control)
         _put(prices, window.site, multiplier)
@@ -239,7 +168,7 @@ def _relax_run(run, start, prices, goal, gap, only_outside):
             lo, hi, site = next_window(attempt, done, site, run.fixed_first, end, run.sites.span, ratio_site)
             if lo == end:
                 break
-            window = _window(run, lo, hi)
+            window = window_of(run, lo, hi)
             if attempt > 0:
                 sites = with_radius(run.sites, radius)
                 closer, smaller = tighten_window(window, sites, control, run.middle, ratio_site)

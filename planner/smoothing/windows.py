@@ -1,0 +1,84 @@
+"""Windows of a long spline: which of its control points are relaxed at a time, and how those around a site are tightened (relax.py)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.kernels import njit
+from planner.base.search import first_not_before
+from planner.smoothing.basis import DEGREE, ORDER
+from planner.smoothing.sites import site_distance
+
+TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
+AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
+WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it
+# On those six jobs windows of 120 and 480 end up to 2e-4 and 5e-4 later; overlaps of 15 and 60 change them by -2e-4 to 1e-3 and by
+# -7e-4 to 3e-3, and FIRST_GAP = 10 and 100 by up to 2e-3 and 3e-5.
+WINDOW = 240  # control points relaxed at a time ...
+OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
+
+
+class ControlWindow(NamedTuple):
+    """The control points lo .. hi - 1 of a run and the sites site .. site_end - 1 that they move."""
+
+    lo: int
+    hi: int
+    site: int
+    site_end: int
+
+
+@njit(cache=True, error_model="numpy")
+def next_window(attempt, done, site, fixed_first, end, span, ratio_site):
+    """Control points lo, hi of the next window to relax, and the first site after those that it is for; lo = end if there is none.
+    At first windows of `WINDOW` after each other, the last of which ended at `done`; then around sites from `site` on whose bound is
+    too large."""
+    if attempt == 0:
+        lo = max(done - OVERLAP, fixed_first)
+        hi = min(lo + WINDOW, end)
+        if end - hi < OVERLAP:
+            hi = end
+        return (lo, hi, site) if done < end else (end, end, site)
+    lo = hi = end
+    for j in range(site, len(span)):
+        if ratio_site[j] <= 1.0:
+            continue
+        first, last = max(span[j] - OVERLAP, fixed_first), min(span[j] + ORDER + OVERLAP, end)
+        if lo == end:
+            lo = first
+        elif first > hi or last - lo > WINDOW:
+            return lo, hi, j
+        hi = last
+    return lo, hi, len(span)
+
+
+@njit(cache=True, error_model="numpy")
+def window_of(run, lo, hi):
+    """The window of the control points lo .. hi - 1."""
+    span, spans = run.sites.span, len(run.knots.breaks) - 1
+    return ControlWindow(
+        lo, hi, first_not_before(span, max(lo - DEGREE, 0)), first_not_before(span, min(hi, spans))
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def tighten_window(window, sites, control, middle, ratio_site):
+    """Smaller radii for a window's sites whose bound is too large, and its control points a little closer to the spline `middle`, which
+    is well inside, so that they are inside again: control points (hi - lo, A) and radii (site_end - site,)."""
+    axes, (lo, hi, site, site_end) = control.shape[1], window
+    begin = max(lo - DEGREE, 0)
+    near, e = control[begin : hi + DEGREE].copy(), np.empty(axes)
+    for i in range(lo, hi):
+        taper = min(min(i - lo + 1, hi - i) / OVERLAP, 1.0)
+        for k in range(axes):
+            near[i - begin, k] += (1.0 - AGAIN) * taper * (middle[i, k] - control[i, k])
+    radius = sites.radius[site:site_end].copy()
+    for j in range(site, site_end):
+        used = sites.radius[j]
+        needs = WIDER * site_distance(sites, j, near, begin, e)
+        if needs >= WIDER * used:  # pushed out by the taper
+            radius[j - site] = needs
+        elif ratio_site[j] > 1.0:
+            radius[j - site] = max(TIGHTENED / ratio_site[j] * used, min(needs, used))
+    return near[lo - begin : hi - begin], radius

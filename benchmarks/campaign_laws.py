@@ -6,7 +6,8 @@
     split      a line as two: the same time
     looser     one limit of the machine, the feed or the tolerance larger: no more time
 
-Each is allowed `ALLOWED` of the time, and for the periods that the delivered samples are rounded to, one for each full stop.
+Each is allowed `ALLOWED` of the time, and for the periods that the delivered samples are rounded to, one for each full stop. Not every
+method promises every law (`BREAKS`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,13 @@ from planner.nc.program import Kind, PathControl, Program, SplineTable
 ALLOWED = 1e-3  # of the time [-]
 LAWS = ("scale", "mirror", "reverse", "split", "looser")
 LOOSER = ("velocity", "acceleration", "jerk", "tolerance", "feed")
+# What a method does not promise. `stop` stops where a line is split; the papers' methods as they are filter by V/A and A/J whatever
+# that costs (fir-plain by twice sqrt(V/J), which is less, where A is large).
+BREAKS = {
+    "stop": ("split",),
+    "fir-plain": ("looser velocity", "looser feed"),
+    "fir-spline-plain": ("looser velocity", "looser feed", "looser acceleration"),
+}
 LINEAR, ROTARY = "xyzuvw", "abc"
 Rng = np.random.Generator
 
@@ -68,6 +76,11 @@ def broken(changed: Changed, before: float, after: float, slack: float) -> float
         after - before if changed.law.startswith("looser") or changed.law == "split" else abs(after - before)
     )
     return max(0.0, (off - slack) / before - ALLOWED)
+
+
+def holds(law: str, method: str) -> bool:
+    """Whether a method promises a law: all but those of `BREAKS`."""
+    return law not in BREAKS.get(method, ())
 
 
 def scaled(program: Program, k: float) -> Program:

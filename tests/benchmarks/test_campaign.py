@@ -16,7 +16,17 @@ from benchmarks.campaign import SUMMARY, kept_rows, rows_of
 from benchmarks.campaign_course import course
 from benchmarks.campaign_jobs import job, job_from
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
-from benchmarks.campaign_laws import ALLOWED, mirrored, reversed_program, scaled, scaled_machine, split
+from benchmarks.campaign_laws import (
+    ALLOWED,
+    broken,
+    holds,
+    looser,
+    mirrored,
+    reversed_program,
+    scaled,
+    scaled_machine,
+    split,
+)
 from benchmarks.campaign_rows import blocks_of, motion_of, outcome, row_of
 from benchmarks.campaign_table import BEGIN, END, PAGE, paragraph, with_paragraph
 from benchmarks.campaign_tally import LEAST, Tally, wrongs
@@ -170,6 +180,19 @@ def test_laws_keep_the_time_of_full_stops(change: str) -> None:
     assert after.verdict is not None
     assert after.verdict.passed
     assert after.cycle_time == pytest.approx(before, abs=10 * machine.dt)
+
+
+@pytest.mark.parametrize("law", ["looser feed", "looser velocity", "looser acceleration", "looser jerk"])
+@pytest.mark.parametrize("method", ["fir-plain", "fir-spline-plain", "fir", "fir-spline"])
+def test_only_filters_as_in_the_papers_get_longer_with_a_limit(method: str, law: str) -> None:
+    """Short blocks that reach no limit but that of the filters: what a larger V or A does to V/A and A/J is all that it does."""
+    feed = 60000 if law == "looser velocity" else 3000
+    text = f"G1 X0.3 Y0.1 F{feed}\nG1 X0.6 Y0\nG1 X0.9 Y0.1\nM2\n"
+    program, machine = parse_program(text, MACHINE), MACHINE
+    before = plan(program, machine, method=method).cycle_time
+    other = looser(program, machine, None, law.removeprefix("looser "), 2.0)
+    after = plan(other.program, other.machine, method=method).cycle_time
+    assert holds(law, method) == (broken(other, before, after, machine.dt) == 0)
 
 
 @pytest.mark.parametrize("seed", range(3))

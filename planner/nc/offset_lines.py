@@ -42,6 +42,8 @@ def meeting(before: OffsetMove, after: OffsetMove, sense: float) -> complex | No
 def _crossings(one: OffsetMove, other: OffsetMove) -> Sequence[complex]:
     if not one.turning and not other.turning:
         slope = cross(one.first, other.first)
+        if slope == 0.0:
+            return []
         along = cross(other.end - one.end, other.first) / slope
         return [one.end + along * one.first]
     if one.turning and other.turning:

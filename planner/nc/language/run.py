@@ -86,6 +86,15 @@ class ProgramRun:
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
+        stopped = self._run(main)
+        left = None if self._lathe is None else self._lathe.leave()
+        if stopped is None and left is not None:
+            return ProgramFault(
+                left, "the program ends inside the profile of this cycle; end it behind the cycles"
+            )
+        return stopped
+
+    def _run(self, main: str) -> ProgramFault | None:
         try:
             self.functions[main](self, {})
             self.flush()

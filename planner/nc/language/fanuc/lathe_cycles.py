@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.language.tree import SourcePlace
 from planner.nc.lathe_cuts import Pecking, pecked, single_cut, single_thread
 from planner.nc.lathe_thread import LatheThread, Pass, ThreadFault, thread_passes
 from planner.nc.lexer import Words as LexedWords
@@ -51,7 +52,7 @@ class LatheCycles:
         self.run = run
         self._start = np.zeros(3)
         self._aside: tuple[State, Store, Callable[[LexedWords], None]] | None = None
-        self._line = 0  # of the cycle
+        self._place = SourcePlace(0, 0, 0)  # of the cycle
 
     def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
         """Do a part of a cycle; its values by letter stand in the run's shared names. Raises ValueError.
@@ -60,7 +61,7 @@ class LatheCycles:
                  the name of a cycle makes its passes
         """
         self.run.flush()
-        self._line = place[1]
+        self._place = SourcePlace(*place)
         given = {letter: float(self.run.shared[name_of(letter)]) for letter in letters}
         if action == "start":
             self._start = self.run.interpreter.state.programmed().copy()
@@ -77,6 +78,8 @@ class LatheCycles:
     # --- the profile --------------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
+        if self._aside is not None:
+            raise ValueError("a cycle stands in the profile of another one; write it behind that")
         interpreter = self.run.interpreter
         state = interpreter.state
         if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
@@ -90,14 +93,21 @@ class LatheCycles:
             1.0,
         )  # any feed does: moves whose feed depends on the diameter are divided
 
+    def leave(self) -> SourcePlace | None:
+        """Go back to what was set aside for a profile that was not read to its end; returns where its cycle stands, None for no such
+        profile."""
+        if self._aside is None:
+            return None
+        state, store, self.run.tee = self._aside
+        self.run.interpreter.go_on_with(state, store)
+        self._aside = None
+        return self._place
+
     def _contour(self) -> Contour:
         """The blocks that were executed aside as a profile; the state is again what it was before them. Raises ValueError."""
-        interpreter, kept = self.run.interpreter, self._aside
-        assert kept is not None
+        interpreter = self.run.interpreter
         program, offset = interpreter.store.finish("", ()), interpreter.state.offset.copy()
-        interpreter.go_on_with(kept[0], kept[1])
-        self.run.tee = kept[2]
-        self._aside = None
+        self.leave()
         if (offset != interpreter.state.offset).any():
             raise ValueError("the profile changes an offset; write it before the cycle")
         return _contour_of(program, offset, self._point(self._start))
@@ -112,7 +122,7 @@ class LatheCycles:
         contour, unit = self._contour(), self._unit
         if "R" not in given:
             self.run.interpreter.note(
-                f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", self._line
+                f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", self._place.line
             )
         roughing = Roughing(
             depth=abs(given["D"]) * unit,
@@ -165,7 +175,7 @@ class LatheCycles:
         start = self._here()
         if "K" in given and "R" not in given:
             self.run.interpreter.note(
-                f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", self._line
+                f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", self._place.line
             )
         pecking = Pecking(
             start=start,

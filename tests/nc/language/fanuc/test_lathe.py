@@ -14,7 +14,7 @@ from planner.base.errors import InputError
 from planner.machine import DialectData, Machine
 from planner.nc.language.flat import flat_program
 from planner.nc.program import Kind, Program
-from planner.nc.reader import parse_program
+from planner.nc.reader import interpret, parse_program
 from planner.nc.reading import AS_USUAL
 
 HEAD = "G21 G98 F100\nG0 X40 Z2\n"
@@ -146,7 +146,13 @@ def test_a_feed_per_turn_at_a_constant_surface_speed() -> None:
     assert arc.feed[arc.kind == Kind.ARC] == pytest.approx(0.2 * 100e3 / (2 * np.pi * 20) / 60)
 
 
+END_INSIDE = "G71 P10 Q20 D1.\nN10 G0 X20\nM30\nN20 G1 Z-5\nM30"
 REFUSED = {
+    # all found by benchmarks/fuzz.py: on a machine with further axes they were a bug, and a program that ended there was lost
+    "an end in the profile": (END_INSIDE, "ends inside the profile"),
+    "the end of the file in the profile": (END_INSIDE.replace("M30", "%", 1), "ends inside the profile"),
+    "a fault in the profile": ("G71 P10 Q20 D1.\nN10 G0 X20\n#1=[1/0]\nN20 G1 Z-5\nM30", "division by zero"),
+    "a cycle in its profile": ("N10 G0 X20\nG73 P10 Q20 D3\nN20 G1 Z-5\nM30", "in the profile of another"),
     "pocket": ("G71 P10 Q20 D1.\nN10 G0 X20\nG1 Z-5\nX16 Z-8\nN20 X30 Z-20\nM30", "x turns back"),
     "no profile": ("G71 P10 Q30 D1.\nN10 G0 X20\nN20 G1 Z-5 U0\nM30", "no profile from N10 to N30"),
     "no depth": ("G71 P10 Q20 U1.\nN10 G0 X20\nN20 G1 Z-5\nM30", "depth of a pass is not given"),
@@ -179,11 +185,20 @@ REFUSED = {
 }
 
 
+@pytest.mark.parametrize("axes", ["xyz", "xyza"])
 @pytest.mark.parametrize("name", REFUSED)
-def test_refused(name: str) -> None:
+def test_refused(name: str, axes: str) -> None:
     text, said = REFUSED[name]
+    machine = MACHINE.model_copy(update={"axes": dict.fromkeys(axes, MACHINE.axes["x"])})
     with pytest.raises(InputError, match=said):
-        read(text if "F1\n" in text or "a lead" in name else HEAD + text)
+        read(text if "F1\n" in text or "a lead" in name else HEAD + text, machine)
+
+
+def test_what_was_read_before_a_profile_stays() -> None:
+    """The program of a run that ends inside a profile was the profile."""
+    program, faults = interpret(HEAD + END_INSIDE, None)
+    assert [fault.line for fault in faults] == [3]
+    assert program.end.tolist() == [[20.0, 0.0, 2.0]]
 
 
 def test_the_machine_says_whether_it_is_a_lathe() -> None:

@@ -170,6 +170,10 @@ def test_exact_stops_and_units() -> None:
         ("G0 X0\nSCALE X0", "a scale of 0"),
         ("SCALE X2\nG1 X1 F100\nG2 X3 I1", "<text>:3:1: .*scales unevenly"),
         ("G1 X1 F100 RND=2\nM30", "<text>:2:1: .*rounding or chamfer of line 1 needs"),
+        (
+            "G1 X9 F100 RND=2\nX5",
+            "<text>:2:1: .*takes more of a move than there is",
+        ),  # benchmarks/fuzz.py: a bug
         ("G1 X1 F100 RND=2\nY1", "<text>:2:1: .*takes more of a move than there is"),
         ("CIP X1 Y1 I1=2 J1=2", "points of CIP lie on a line"),
         ("G1 X1 F100\nCT X3", "lies straight ahead"),

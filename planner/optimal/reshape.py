@@ -27,7 +27,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.limits import FEED, VELOCITY
+from planner.constraints.limits import CHORD_ERROR, FEED, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.optimal.on_path import OnPath
@@ -37,6 +37,7 @@ from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
+BOUND = 0.98  # of what bounds the square of the feed: from there on it does [-]
 DEAR = 0.95  # of what the tolerance costs: the runs on which a wider one is solved for [-]
 PRICED = 100_000  # points of the grid whose prices are made at a time: half a kilobyte each
 FORCE = 0.5  # of the pull in `corridor_prices`
@@ -51,12 +52,25 @@ UNBOUNDED = 1e12  # stands for a feed or an acceleration that nothing bounds [mm
 
 def run_times(planned: OnPath) -> FloatArray:
     """(Q,) time on each run of splines [s]; 0 for runs that have none."""
+    return _on_runs(planned, planned.solution.duration)
+
+
+def times_on_chords(planned: OnPath) -> FloatArray:
+    """(Q,) time on each run for which the chord error bounds the feed [s]."""
+    problem, solution = planned.problem, planned.solution
+    chords = np.array([name == CHORD_ERROR.name for name in problem.bound_names])[problem.feed_sq_bound]
+    held = chords & (solution.feed_sq > BOUND * problem.feed_sq_limit)
+    return _on_runs(planned, np.where(held, solution.duration, 0.0))
+
+
+def _on_runs(planned: OnPath, values: FloatArray) -> FloatArray:
+    """(Q,) sums of values (P,) of the grid's intervals on each run of splines."""
     splines = _shape(planned).splines
     span = planned.samples.element - len(planned.samples.table.legs)
     on = np.flatnonzero(span >= 0)
     kept = np.flatnonzero(splines.fits)
     run = kept[np.searchsorted(planned.path.spline.first, span[on], side="right") - 1]
-    return np.asarray(np.bincount(run, planned.solution.duration[on], len(splines.fits)), dtype=np.float64)
+    return np.asarray(np.bincount(run, values[on], len(splines.fits)), dtype=np.float64)
 
 
 def chosen(planned: OnPath, new: SplineShape, better: Array) -> SplineShape:

@@ -10,7 +10,7 @@ import numpy as np
 from planner.corners.smooth import SmoothPath
 from planner.job.job import Job
 from planner.optimal.on_path import OnPath
-from planner.optimal.reshape import chosen, reshape, run_times
+from planner.optimal.reshape import chosen, reshape, run_times, times_on_chords
 from planner.smoothing.spline_path import SplineShape, with_spline
 
 if TYPE_CHECKING:
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 # A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
 # than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
 QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
+# A run that a round made slower is not pulled more, but done, where the chord error bounds the feed for more than this share of its
+# time [-]: a step does not know that the farther the curve is from the path, the less is left to chords. Fifty such random jobs take
+# the same time, and 10 % less computing.
+ON_CHORDS = 0.1
 # Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
 # same time within 1e-4.
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
@@ -49,6 +53,7 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
         rounds = min(settings.effort.work // len(best.samples), settings.effort.rounds)
     pull, gap = np.full(len(shape.splines.fits), FIRST_PULL), FIRST_GAP
     quiet, done = np.zeros(len(pull)), ~shape.splines.fits
+    on_chords = times_on_chords(best) > ON_CHORDS * run_times(best)
     for n in range(1, rounds + 1):
         with job.stage("geometry"):
             shape, promised = reshape(best, np.where(done, np.inf, pull), gap)
@@ -75,7 +80,7 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
         left = float(promised[sound].sum()) / best.solution.cycle_time
         if left < settings.effort.left and (sound | done).all():
             break
-        done |= (quiet >= QUIET_ROUNDS) | (pull > MOST_PULL)
+        done |= (quiet >= QUIET_ROUNDS) | (pull > MOST_PULL) | (on_chords & ~faster)
         if done.all():
             break
         gap = min(FIRST_GAP, max(GAP_SHARE * left, LAST_GAP))

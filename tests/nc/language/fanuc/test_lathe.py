@@ -196,7 +196,7 @@ def test_refused(name: str, axes: str) -> None:
 
 def test_what_was_read_before_a_profile_stays() -> None:
     """The program of a run that ends inside a profile was the profile."""
-    program, faults = interpret(HEAD + END_INSIDE, None)
+    program, faults = interpret(HEAD + END_INSIDE, None, source="a.nc")
     assert [fault.line for fault in faults] == [3]
     assert program.end.tolist() == [[20.0, 0.0, 2.0]]
 

@@ -43,6 +43,9 @@ PER_PERIOD = 8
 LEAST_REST = 1e-6
 # Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases and places above.
 USED = 0.99
+# Above that by so little they need no other round [-]: what is left of an excess gets less with every one, and another place, where it
+# is the verdict that finds too much, waits until there is none.
+ABOVE = 2e-3
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
@@ -200,7 +203,7 @@ def with_less_tolerance(
     """
     allowed = USED * programmed.tolerance
     # where the path turns slowly chords have all of the tolerance, eq. (20): what is too much there, the verdict says
-    over = (far > allowed) & (programmed.joint != Joint.SMOOTH)
+    over = (far > allowed + ABOVE * programmed.tolerance) & (programmed.joint != Joint.SMOOTH)
     if not over.any():
         return None
     tolerance = planned.tolerance - REDUCED_BY * np.where(over, far - allowed, 0.0)

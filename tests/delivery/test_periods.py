@@ -9,7 +9,7 @@ import pytest
 from quick import slow_but
 
 from benchmarks import problems
-from planner.delivery.periods import USED, missed, with_less_tolerance
+from planner.delivery.periods import ABOVE, USED, missed, with_less_tolerance
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.job import job as jobs
@@ -64,7 +64,7 @@ def test_chords_leave_a_parabola_by_its_bow():
 def test_corners_over_their_tolerance_get_less_and_hopeless_ones_are_stopped_at():
     path = toolpath_from_program(problems.zigzag(4), problems.machine())
     eps = path.tolerance[0]
-    assert with_less_tolerance(path, path, np.zeros(5), np.full(5, USED * eps)) is None
+    assert with_less_tolerance(path, path, np.zeros(5), np.full(5, (USED + ABOVE) * eps)) is None
     near, far = (np.array(x) * eps for x in ([0, 0.5, 0.5, 0.5, 0], [0, 0.9, 1.1, 1.6, 0]))
     less = with_less_tolerance(path, path, near, far)
     assert list(less.joint) == [Joint.STOP, Joint.CORNER, Joint.CORNER, Joint.STOP, Joint.STOP]

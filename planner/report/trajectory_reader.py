@@ -12,6 +12,7 @@ import math
 import os
 import tokenize
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -149,16 +150,25 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
     with open(path, "rb") as stream:  # numpy leaves a file open that is damaged
-        file = np.load(stream, allow_pickle=False)
-        if not isinstance(file, np.lib.npyio.NpzFile):
-            raise ValueError("a single array (.npy), not a .npz file")
         try:
+            file = np.load(stream, allow_pickle=False)
+            if not isinstance(file, np.lib.npyio.NpzFile):
+                raise ValueError("a single array (.npy), not a .npz file")
             with file:
                 return {name: file[name] for name in file.files if name != "metadata"}, (
                     str(file["metadata"]) if "metadata" in file.files else ""
                 )
-        except (SyntaxError, tokenize.TokenError) as fault:  # numpy reads a header as Python's words
+        except (
+            SyntaxError,
+            RecursionError,
+            tokenize.TokenError,
+        ) as fault:  # numpy reads a header as Python's words
             raise ValueError("the header of an array is damaged") from fault
+        except (
+            RuntimeError,
+            zlib.error,
+        ) as fault:  # an archive that is damaged, encrypted, or packed in another way
+            raise ValueError(f"the archive: {fault}") from fault
 
 
 def _numbers(source: str, name: str, column: Any) -> Array:

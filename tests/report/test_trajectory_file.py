@@ -159,6 +159,36 @@ def test_a_damaged_archive_is_closed_again(tmp_path: Path) -> None:
     gc.collect()  # a file that is left open warns here, and warnings are errors
 
 
+@pytest.mark.parametrize(
+    ("at", "damage", "said"),
+    [
+        (6, b"\xcf", "zip file version 20.7"),  # found by benchmarks/fuzz.py: a bug
+        (8, b"\x01", "encrypted"),
+        (10, b"\x63", "compression"),
+    ],
+)
+def test_an_archive_that_is_none_of_numpy_is_told(tmp_path: Path, at: int, damage: bytes, said: str) -> None:
+    path = tmp_path / "other.npz"
+    np.savez(path, **columns())  # type: ignore[arg-type]
+    data = bytearray(path.read_bytes())
+    begin = data.index(b"PK\x01\x02") + at  # the first file in the directory
+    data[begin : begin + 1] = damage
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=f"cannot be read: the archive: .*{said}"):
+        read_trajectory(path)
+
+
+def test_damaged_packed_columns_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "packed.npz"
+    np.savez_compressed(path, **columns())  # type: ignore[arg-type]
+    data = bytearray(path.read_bytes())
+    begin = 30 + data[26] + data[28]  # behind the first local header: its name and extra field
+    data[begin : begin + 4] = b"\xff" * 4
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_trajectory(path)
+
+
 @pytest.mark.parametrize("damage", [b"(", b")"])
 def test_a_damaged_header_is_told(tmp_path: Path, damage: bytes) -> None:
     path = tmp_path / "header.npz"

@@ -194,19 +194,21 @@ def _looks(motion: MotionInTime, step: float, dt: float) -> Iterator[Trajectory]
 
 
 def with_less_tolerance(
-    planned: Toolpath, programmed: Toolpath, near: FloatArray, far: FloatArray
+    planned: Toolpath, programmed: Toolpath, near: FloatArray, far: FloatArray, times: float = 1.0
 ) -> Toolpath | None:
     """The path to be planned so that the chords stay within the tolerance of the programmed path; None if they do already.
 
     planned   : the path that the motion was planned on
     near, far : by how much motion and chords miss the vertices (M+1,) [mm], from `missed`
+    times     : how often what is too much is subtracted [-]: more than once where that changed nothing before, because the motion did
+                not use what was taken from it
     """
     allowed = USED * programmed.tolerance
     # where the path turns slowly chords have all of the tolerance, eq. (20): what is too much there, the verdict says
     over = (far > allowed + ABOVE * programmed.tolerance) & (programmed.joint != Joint.SMOOTH)
     if not over.any():
         return None
-    tolerance = planned.tolerance - REDUCED_BY * np.where(over, far - allowed, 0.0)
+    tolerance = planned.tolerance - times * REDUCED_BY * np.where(over, far - allowed, 0.0)
     hopeless = over & (
         (tolerance < LEFT_MIN * programmed.tolerance) | (far - near > (1.0 - LEFT_MIN) * allowed)
     )

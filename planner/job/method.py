@@ -130,12 +130,15 @@ class Method(ABC):
         """The plan made again with less and less tolerance until chords between samples keep it, as long as it takes no longer than
         `job.most`."""
         given, planned, (machine, programmed) = job, job.toolpath, job.real
+        before, times = np.nan, 1.0
         for again in range(1, PERIOD_ROUNDS + 1):
             if made.trajectory is None or _inside(made) or made.cycle_time > job.most:
                 break
             with job.stage("geometry"):
                 near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
-                less = periods.with_less_tolerance(planned, programmed, near, far)
+                times = 2.0 * times if made.cycle_time == before else 1.0
+                before = made.cycle_time
+                less = periods.with_less_tolerance(planned, programmed, near, far, times)
                 if less is None and made.verdict is not None and (worst := _worst(made.verdict)) is not None:
                     less = periods.with_less_inside(planned, programmed, *worst, again)
             if less is None:

@@ -12,12 +12,12 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from collections.abc import Callable
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
+from planner.nc.language.fault_places import last_statement, statement_of
 from planner.nc.language.making import Making
 from planner.nc.language.rows import AppendedRows, NotFinite
 from planner.nc.language.stops import Endless, TooDeep, sentence
@@ -101,7 +101,7 @@ class ProgramRun:
             try:
                 left = self.travel.end()
             except ValueError as fault:  # what a statement began has no end: no statement of its own to name
-                return self._stopped(ProgramFault(self._last_place(), str(fault)))
+                return self._stopped(ProgramFault(last_statement(self.units), str(fault)))
             if left:
                 self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
         except Ended:
@@ -112,7 +112,7 @@ class ProgramRun:
             place = SourcePlace(self._file_at(fault.at), fault.line, fault.at)
             return ProgramFault(place, f"the computed {fault.letter} word is infinite")
         except (ArithmeticError, ValueError, KeyError) as fault:
-            return self._stopped(ProgramFault(self._place(fault.__traceback__), sentence(fault)))
+            return self._stopped(ProgramFault(statement_of(fault.__traceback__, self.units), sentence(fault)))
         return None
 
     def add(self, compiled: Compiled, marker: str) -> None:
@@ -338,22 +338,6 @@ class ProgramRun:
         with contextlib.suppress(Ended, NotFinite, ProgramFault):
             self.flush()
         return ProgramFault(fault.place, message)
-
-    def _place(self, traceback: TracebackType | None) -> SourcePlace:
-        """The statement that a traceback ends in."""
-        place = None
-        while traceback is not None:
-            unit = self.units.get(traceback.tb_frame.f_code.co_filename)
-            if unit is not None:
-                place = unit.places[traceback.tb_lineno - 1]
-            traceback = traceback.tb_next
-        assert place is not None
-        return place
-
-    def _last_place(self) -> SourcePlace:
-        """The last statement of the main program."""
-        main = next(iter(self.units.values()))
-        return max((place for place in main.places if place.file == 0), key=lambda place: place.at)
 
     def _file_at(self, at: int) -> int:
         return sum(begin <= at for begin, _ in self.rows.files)

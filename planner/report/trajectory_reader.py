@@ -158,16 +158,11 @@ def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
                 return {name: file[name] for name in file.files if name != "metadata"}, (
                     str(file["metadata"]) if "metadata" in file.files else ""
                 )
-        except (
-            SyntaxError,
-            RecursionError,
-            tokenize.TokenError,
-        ) as fault:  # numpy reads a header as Python's words
+        # numpy reads a header as Python's words
+        except (SyntaxError, RecursionError, tokenize.TokenError) as fault:
             raise ValueError("the header of an array is damaged") from fault
-        except (
-            RuntimeError,
-            zlib.error,
-        ) as fault:  # an archive that is damaged, encrypted, or packed in another way
+        # an archive that is damaged, encrypted, or packed in another way
+        except (RuntimeError, zlib.error) as fault:
             raise ValueError(f"the archive: {fault}") from fault
 
 

@@ -16,6 +16,7 @@ import dataclasses
 import hashlib
 import importlib
 import itertools
+import re
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,6 +47,7 @@ DRAWS = 60  # of a program until one has few blocks and moves; the least one cou
 VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
 FIRST_SEEDS = 20  # by whose jobs the draws are known again
+DIGITS = 6  # of their numbers
 PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
 QUICK: dict[str, Any] = {"effort": "quick"}
 # Methods with their settings, and how often each is drawn.
@@ -123,11 +125,15 @@ class Job:
 
 
 def fingerprint() -> str:
-    """A word for what seeds draw: another one where the first of them draw other jobs."""
+    """A word for what seeds draw: another one where the first of them draw other jobs.
+
+    Numbers count with `DIGITS` digits: powers and sines differ in their last bit between processors.
+    """
     drawn = [
         (made.text, repr(made.machine), made.way, made.tolerance) for made in map(job, range(FIRST_SEEDS))
     ]
-    return hashlib.sha256(repr(drawn).encode()).hexdigest()[:12]
+    rounded = re.sub(r"\d+\.\d+(e[-+]?\d+)?", lambda number: f"{float(number[0]):.{DIGITS}g}", repr(drawn))
+    return hashlib.sha256(rounded.encode()).hexdigest()[:12]
 
 
 def job_from(data: dict[str, Any]) -> Job:

@@ -202,23 +202,22 @@ def _drawn(source: str, rng: Rng) -> tuple[str, Machine, Program | None, str]:
     else:
         machine = machine_of(rng, "xyz" if source in ("mixed", "dense") and rng.random() < 0.8 else "xyzabc")
         text = _text(source, rng, machine)
-        machine = _narrow(machine, text) if rng.random() < SHARE_OF_NARROW else machine
+        if rng.random() < SHARE_OF_NARROW:
+            linear = _linear(machine)
+            try:
+                return text, linear, parse_program(text, linear, source=f"{source} job"), ""
+            except InputError:  # it may be that the program moves a rotary axis
+                pass
     try:
         return text, machine, parse_program(text, machine, source=f"{source} job"), ""
     except InputError as fault:
         return text, machine, None, str(fault)
 
 
-def _narrow(machine: Machine, text: str) -> Machine:
-    """The machine without its rotary axes, if the program can be read for that: many programs do not move them."""
-    linear = machine.model_copy(
-        update={"axes": {letter: axis for letter, axis in machine.axes.items() if letter not in ROTARY_AXES}}
-    )
-    try:
-        parse_program(text, linear)
-    except InputError:
-        return machine
-    return linear
+def _linear(machine: Machine) -> Machine:
+    """The machine without its rotary axes."""
+    axes = {letter: axis for letter, axis in machine.axes.items() if letter not in ROTARY_AXES}
+    return machine.model_copy(update={"axes": axes})
 
 
 def _text(source: str, rng: Rng, machine: Machine) -> str:

@@ -29,6 +29,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.timing import MotionInTime
 from planner.verify.filtered import look_behind, motion_asked
+from planner.verify.matching import Located
 from planner.verify.pieces import ProgramPieces, program_pieces, widened
 
 # Of the tolerance, what measuring at other times may find more [-].
@@ -132,11 +133,11 @@ class Behind:
         kept: list[tuple[FloatArray, FloatArray, Array]] = []
         worst = np.zeros(len(self.pieces.piece))
 
-        def each(t: FloatArray, ratio: FloatArray, piece: Array) -> None:
+        def each(t: FloatArray, ratio: FloatArray, place: Located) -> None:
             ratio = ratio * wider
-            np.maximum.at(worst, piece, ratio)
+            np.maximum.at(worst, place.piece, ratio)
             over = ratio > 1.0 - SPARE
-            kept.append((t[over], ratio[over], piece[over]))
+            kept.append((t[over], ratio[over], place.piece[over]))
 
         at = motion_asked(motion, self.machine.dt)
         look = look_behind(at, motion.end, filters, self.machine.dt, pieces, each)

@@ -21,13 +21,15 @@ to keep within the tolerance.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 from planner.fir.filters import damped_period
 from planner.machine import Mode
 from planner.motion.timing import MotionInTime
@@ -99,48 +101,25 @@ class ShapedMotion:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The mean of the copies at ascending times (T,) [s]; block and line are those at the mean delay, s and feed means as well."""
-        copies = [self._copy(times - delay, dt) for delay in self.shaper.delay]
-        means = {
-            name: np.tensordot(self.shaper.weight, [copy[name] for copy in copies], axes=1)
-            for name in ("position", "velocity", "acceleration", "jerk", "s", "feed")
+        place = times - np.append(self.shaper.delay, self.shaper.middle)[:, None]
+        at_rest = (place <= 0.0) | (place >= self.motion.end)
+        # two times next to each other may be one after a delay was subtracted
+        single, which = np.unique(np.clip(place, 0.0, self.motion.end), return_inverse=True)
+        there = self.motion.at(single, dt)
+        which = which.reshape(place.shape)  # NumPy 2.0.0 gave it so, all others flat
+        copies, weight = which[:-1], self.shaper.weight
+        means: dict[str, Any] = {
+            name: np.tensordot(weight, getattr(there, name)[copies], axes=1) for name in ("position", "s")
         }
-        at_mean = self._copy(times - self.shaper.middle, dt)
-        base = self._ends[0]
-        return Trajectory(
-            axes=base.axes,
-            radius=base.radius,
-            dt=dt,
-            t=times,
-            block=at_mean["block"],
-            line=at_mean["line"],
-            **means,
+        for name in ("velocity", "acceleration", "jerk", "feed"):
+            columns = getattr(there, name)[copies]
+            columns[at_rest[:-1]] = 0.0
+            means[name] = np.tensordot(weight, columns, axes=1)
+        middle = which[-1]
+        return dataclasses.replace(
+            there, t=times, block=there.block[middle], line=there.line[middle], **means
         )
 
     def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:
         """The motion standing longer by `by` (n,) [s] where all copies have come to rest, at the times `at` (n,) [s]."""
         return ShapedMotion(self.motion.waiting(at - self.shaper.length, by), self.shaper)
-
-    @cached_property
-    def _ends(self) -> tuple[Trajectory, Trajectory]:
-        """The first and the last moment of the motion."""
-        first, last = (self.motion.at(np.array([time]), 1.0) for time in (0.0, self.motion.end))
-        return first, last
-
-    def _copy(self, times: FloatArray, dt: float) -> dict[str, Array]:
-        """The columns of the motion at ascending times, at rest outside [0, end]."""
-        inside = (times > 0.0) & (times < self.motion.end)
-        begin = int(np.searchsorted(times, 0.0, side="right"))
-        stop = begin + int(inside.sum())
-        columns: dict[str, Array] = {}
-        # two times next to each other may be one after a delay was subtracted
-        single, which = np.unique(times[begin:stop], return_inverse=True)
-        there = self.motion.at(single, dt) if stop > begin else None
-        for name in ("position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line"):
-            first, last = (getattr(end, name)[0] for end in self._ends)
-            column = np.empty((len(times), *np.shape(first)), dtype=np.asarray(first).dtype)
-            still = name in ("velocity", "acceleration", "jerk", "feed")
-            column[:begin], column[stop:] = (0.0, 0.0) if still else (first, last)
-            if there is not None:
-                column[begin:stop] = getattr(there, name)[which]
-            columns[name] = column
-        return columns

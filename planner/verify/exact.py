@@ -30,7 +30,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verify.findings import Look, line_of
 from planner.verify.follow import follow
-from planner.verify.matching import HELD, LAST, LOST_AFTER
+from planner.verify.matching import HELD, LAST, LOST_AFTER, Located
 from planner.verify.pieces import (
     CONTOUR_ROUNDING,
     PLACE_ROUNDING,
@@ -77,8 +77,9 @@ class _Worst:
     time: float = 0.0
     piece: int = 0
 
-    def take(self, t: FloatArray, ratio: FloatArray, piece: Array) -> None:
+    def take(self, t: FloatArray, ratio: FloatArray, place: Located) -> None:
         """The next samples, as `follow` tells of them."""
+        piece = place.piece
         apart = np.where(self.exact[piece], ratio * self.pieces.piece["budget"][piece], 0.0)
         k = int(apart.argmax())
         if apart[k] > self.apart:

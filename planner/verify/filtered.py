@@ -135,7 +135,7 @@ def look_behind(
 ) -> Look:
     """Match the filtered motion with the path.
 
-    each : called with times (T,) [s], distance over budget (T,) and piece (T,) of every chunk
+    each : called with times (T,) [s], distance over budget (T,) and places of every chunk
     """
     return follow(filtered(at, end, filters, dt), pieces, NOTE, each=each)
 

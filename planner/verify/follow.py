@@ -14,7 +14,7 @@ from planner.verify.matching import SEARCH_MAX, SEARCHED, AtStop, Located, match
 from planner.verify.pieces import ProgramPieces, reach_piece
 from planner.verify.stream import Observed
 
-Each = Callable[[FloatArray, FloatArray, Array], None]
+Each = Callable[[FloatArray, FloatArray, Located], None]
 
 
 def follow(
@@ -28,7 +28,7 @@ def follow(
     """Match a motion with a path.
 
     parts  : of its samples, in order: times (T,) [s], positions (T, A) [mm]
-    each   : called with times (T,) [s], distance over budget (T,) and piece (T,) of every part
+    each   : called with times (T,) [s], distance over budget (T,) and places of every part
     search : whether a motion that was lost is looked for on the pieces ahead; if not, it is lost for good
     """
     axes = pieces.vertex.shape[1]
@@ -49,12 +49,12 @@ def follow(
         skip = len(carried_t)
         if not skip:
             seen.first, seen.t_first = position[0].copy(), float(t[0])
-        piece, feed_max = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-        match_samples(pieces, seen.match, t, position, skip, False, anywhere, Located(piece, feed_max))
+        place = Located(np.zeros(len(t), dtype=np.int64), np.zeros(len(t)))
+        match_samples(pieces, seen.match, t, position, skip, False, anywhere, place)
         if each is not None:
             ratio = np.empty(len(t))
-            _ratios(pieces, piece, position, ratio)
-            each(t[skip:], ratio[skip:], piece[skip:])
+            _ratios(pieces, place.piece, position, ratio)
+            each(t[skip:], ratio[skip:], Located(place.piece[skip:], place.feed_max[skip:]))
         seen.samples += len(t) - skip
         seen.last, seen.t_last = position[-1].copy(), float(t[-1])
         carried_t, carried = t[-1:], position[-1:]

@@ -62,6 +62,11 @@ class Shaper:
         """Mean delay [s]."""
         return float(self.weight @ self.delay)
 
+    @property
+    def variance(self) -> float:
+        """Of the delays [s2]: half of it times an acceleration is about how far the shaped motion is from the path [mm]."""
+        return float(self.weight @ (self.delay - self.middle) ** 2)
+
     def remains(self, mode: Mode) -> float:
         """What is left of a mode's ringing, as a fraction of the ringing without shaping [-]."""
         w = 2.0 * math.pi * mode.frequency

@@ -9,6 +9,7 @@ from benchmarks import problems, random_lines
 from planner.base.errors import InputError, NotSolvedError
 from planner.machine import Axis, Fir, Machine, Mode
 from planner.methods.registry import plan
+from planner.motion.shaping import shaper_of
 from planner.nc.reader import parse_program
 from planner.optimal.settling import AIM, MOST_SLOWER, slower_by_errors
 
@@ -63,6 +64,30 @@ G1 X-0.3 Y12.2
 G1 X-0.3 Y15 Z1
 M2
 """
+
+
+CURVE = b"""G21 G90 G17 G94 G64 P0.05 F60000
+G1 X60
+G3 X60 Y80 I0 J40
+G1 X0
+M2
+"""
+
+
+def test_a_curve_is_taken_so_that_the_shaper_cuts_it_off_by_the_tolerance():
+    """Along an arc the delivered motion is inside by half of the normal acceleration times the variance of the delays; the straights
+    beside it are as fast as ever."""
+    machine = problems.machine(modes=(Mode(frequency=4.0, damping=0.05),))
+    made = plan(parse_program(CURVE, machine), machine, method="optimal", effort="quick", shaped=True)
+    assert made.verdict.passed
+    position, feed = made.trajectory.position, made.trajectory.feed
+    on_arc = position[:, 0] > 70.0
+    inside = 40.0 - np.hypot(*(position[on_arc, :2] - [60.0, 40.0]).T)
+    assert 0.9 * 0.05 < inside.max() < 0.05
+    of_feed = feed[on_arc].max() ** 2 / 40.0 * shaper_of(machine.modes).variance / 2.0
+    assert of_feed == pytest.approx(inside.max(), rel=0.02)
+    assert feed.max() > 1.5 * feed[on_arc].max()
+    assert "filter_error" in dict(made.grid.ranked())
 
 
 @pytest.mark.slow

@@ -82,10 +82,13 @@ def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
 
 def counted_time(plan: Plan) -> float:
     """Cycle time [s], inf unless the verdict is passed, or nothing but chords between samples stands against it: then the job is
-    planned again with less tolerance (delivery/periods.py)."""
+    planned again with less tolerance (delivery/periods.py). Chords that leave the contour leave the exact path of G61 as well."""
     if plan.trajectory is None or plan.verdict is None:
         return float("inf")
-    chords = all(fault.startswith(("vertex", "contour", "eq. 18")) for fault in plan.verdict.faults)
+    by_chords: tuple[str, ...] = ("vertex", "contour")
+    if any(fault.startswith(by_chords) for fault in plan.verdict.faults):
+        by_chords = (*by_chords, "exact path")
+    chords = all(fault.startswith((*by_chords, "eq. 18")) for fault in plan.verdict.faults)
     return plan.trajectory.cycle_time if chords else float("inf")
 
 

@@ -35,6 +35,7 @@ from planner.nc.program import Program
 from planner.verify import Verdict, verify
 
 Delivered = tuple[Trajectory, Verdict]
+FILTERS = "filters"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,6 +51,7 @@ class Job:
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
     most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
     motion_of : the motions of the trajectories delivered so far, as long as the trajectories exist
+    slowed_by : what made motions slower, beside the limits, that they had been planned by: "filters"
     """
 
     program: Program
@@ -60,6 +62,7 @@ class Job:
     judged: tuple[Machine, Toolpath] | None = None
     most: float = np.inf
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
+    slowed_by: set[str] = field(default_factory=set)
 
     @property
     def real(self) -> tuple[Machine, Toolpath]:
@@ -126,7 +129,10 @@ class Job:
         """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""
         with self.stage("filters"):
             machine, toolpath = self.real
-            return kept(motion, toolpath, machine)
+            made = kept(motion, toolpath, machine)
+            if made.end > motion.end:
+                self.slowed_by.add(FILTERS)
+            return made
 
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too.

@@ -15,7 +15,7 @@ from planner.delivery import periods
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.job import Job
+from planner.job.job import FILTERS, Job
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
 from planner.job.trace import Log
@@ -37,12 +37,14 @@ class Method(ABC):
 
     ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
               `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
+    measures_filters : whether filters make its motions slower only where they are measured to leave the tolerance
     instead : methods that are tried as well if the chords between samples need some of the tolerance, because another one may then be
               faster, and where the verdict fails
     """
 
     instead: Sequence[Method] = ()
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
+    measures_filters: ClassVar[bool] = False
 
     def plan(
         self,
@@ -84,6 +86,8 @@ class Method(ABC):
         best = self.plan_within_periods(job)
         if job.machine.fir is None or not best.solved:
             return best
+        if self.measures_filters and FILTERS not in job.slowed_by and _passed(best):
+            return best  # with less of the tolerance for the path it would not be faster
         for share, seen in self.ways:
             made = self.plan_within_periods(_faster_than(best, job.with_share(share, seen)))
             before, best = best, faster(best, made)
@@ -165,8 +169,7 @@ class Method(ABC):
         for other in self.instead:
             again = job.afresh()
             rival = other.plan_within_periods(again if best is None else _faster_than(best, again))
-            passed = rival.verdict is not None and rival.verdict.passed
-            wins = passed and (best is None or faster(best, rival) is rival)
+            wins = _passed(rival) and (best is None or faster(best, rival) is rival)
             job.tell(
                 "another method",
                 found=_time(rival),
@@ -201,8 +204,12 @@ def faster(plan: Plan, other: Plan) -> Plan:
 
 def _faster_than(plan: Plan, job: Job) -> Job:
     """The job, of which only motions are asked for that take less time than the plan, if that passes."""
-    passed = plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
-    return dataclasses.replace(job, most=min(job.most, plan.cycle_time)) if passed else job
+    return dataclasses.replace(job, most=min(job.most, plan.cycle_time)) if _passed(plan) else job
+
+
+def _passed(plan: Plan) -> bool:
+    """Whether there is a motion, and its verdict is passed."""
+    return plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
 
 
 def _out_of_step(plan: Plan) -> ThreadCheck | None:

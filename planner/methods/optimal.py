@@ -64,7 +64,7 @@ class OptimalMethod(Method):
     rounds: int | None = None
     shaped: bool = False
 
-    ways = ((0.5, 1.0), (0.1, 1.0))
+    ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
 
     @property
     def instead(self) -> tuple[Method, ...]:  # type: ignore[override]

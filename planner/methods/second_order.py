@@ -39,7 +39,7 @@ class SecondOrderMethod(Method):
     rounds: int | None = None
     shaped: bool = False
 
-    ways = ((0.5, 1.0), (0.1, 1.0))
+    ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
 
     def plan_job(self, job: Job) -> Plan:
         order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)

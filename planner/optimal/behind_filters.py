@@ -23,7 +23,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.constraints.limits import FILTER_ERROR
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.filters import ROOM_LEAST, SPARE, Behind, Errors, Violations, kept, rested
-from planner.job.job import Job
+from planner.job.job import FILTERS, Job
 from planner.motion.timing import Motion
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
@@ -64,12 +64,16 @@ def within_filters(
     corners = CornerFeeds(plain, motion, behind, of_path)
     contour = _Contour(corners, behind, of_path)
     best, fastest = planned, np.inf
+    if BOUND in (plain.bound_names[k] for k in np.unique(plain.feed_sq_bound)):
+        job.slowed_by.add(FILTERS)
     for _ in range(ROUNDS):
         waiting = rested(behind, motion)
         places = behind.places(waiting, of_path)
         missed = len(places.time) > 0
         slowed = waiting.end / np.sqrt(places.less.min(initial=1.0))  # what `kept` would make of it, about
         job.tell("filters", found=waiting.end, places=len(places.time), kept=bool(slowed < fastest))
+        if missed or waiting.end > motion.end:
+            job.slowed_by.add(FILTERS)
         if (missed and useless(waiting.end / BACK)) or not (missed or planned.problem is not plain):
             return planned, waiting
         if slowed < fastest:

@@ -33,7 +33,7 @@ from planner.constraints import normal_limit
 from planner.constraints.limits import FILTER_ERROR
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.job import Job
+from planner.job.job import FILTERS, Job
 from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion, shaper_of
@@ -185,6 +185,7 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "
             "and damping"
         )
+    job.slowed_by.add(FILTERS)  # D is measured behind them (settling.py), and p is made slower for it
     # reshaping makes paths for the motion as it is planned, not for the one behind the shaper
     settings = dataclasses.replace(settings, rounds=settings.rounds or 0)
     plan = _plan_of(job, settings, shaped(job, settings))

@@ -35,6 +35,11 @@ def largest(machine: Machine) -> float:
     return machine.normal_acceleration or np.inf
 
 
+def with_less(machine: Machine, most: float) -> Machine:
+    """The machine with A of at most that [mm/s2]: what is behind the setpoints cuts curves off by no more."""
+    return machine.model_copy(update={NAME: min(most, largest(machine))})
+
+
 def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:
     """(P,) limit / kappa, inf on straights [mm2/s2]."""
     return over(limit, kappa)

@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from planner.base.names import OPTIMAL, SECOND_ORDER
+from planner.constraints import filter_error, normal_limit
 from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
 from planner.delivery.periods import settled
@@ -36,6 +37,10 @@ from planner.verify import Verdict, verify
 
 Delivered = tuple[Trajectory, Verdict]
 FILTERS = "filters"
+# A motion that turns in less time than the filters are long is nearer to its path than the closed form says. Twice its acceleration is
+# as fast as 3 and 4 times for less processor time, and faster than once (40 jobs with filters, the first ones of the campaign behind
+# seed 70000).
+BOLDER = 2.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,11 +74,12 @@ class Job:
         """Machine and toolpath by which the motion is judged."""
         return self.judged or (self.machine, self.toolpath)
 
-    def with_share(self, share: float, seen: float) -> Job:
+    def with_share(self, share: float, seen: float, *, curved: bool) -> Job:
         """The job with smaller tolerances, so that the rest is left to the filters behind the setpoints.
 
-        share : of the tolerances, 0 < share <= 1 [-]
-        seen  : of the lengths of the filters, as far as closed forms use them [-]
+        share  : of the tolerances, 0 < share <= 1 [-]
+        seen   : of the lengths of the filters, as far as closed forms use them [-]
+        curved : whether the normal acceleration is limited to `BOLDER` times that by which filters take the rest
 
         Only for machines with filters.
         """
@@ -85,9 +91,13 @@ class Job:
             "time_constants": tuple(by * T for T in machine.fir.time_constants),
             "phase_lag_max": None if lag is None else by * lag,
         }
+        planned = machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)})
+        if curved:
+            rest = (1.0 - share) * float(toolpath.tolerance.min())
+            planned = normal_limit.with_less(planned, BOLDER * rest / filter_error.rate(machine))
         return dataclasses.replace(
             self,
-            machine=machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)}),
+            machine=planned,
             toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
             judged=(machine, toolpath),
             noted=[],

@@ -89,7 +89,9 @@ class Method(ABC):
         if self.measures_filters and FILTERS not in job.slowed_by and _passed(best):
             return best  # with less of the tolerance for the path it would not be faster
         for share, seen in self.ways:
-            made = self.plan_within_periods(_faster_than(best, job.with_share(share, seen)))
+            made = self.plan_within_periods(
+                _faster_than(best, job.with_share(share, seen, curved=self.measures_filters))
+            )
             before, best = best, faster(best, made)
             job.tell(
                 "share of tolerance",

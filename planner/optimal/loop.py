@@ -142,6 +142,8 @@ def plan_on_path(job: Job, settings: Settings, stopped: Stopped | None = None) -
         return job.plan(
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
         )  # fmt: skip
+    if job.machine.normal_acceleration != job.real[0].normal_acceleration:
+        found = [found.pop().held_by_filters()]
     return _plan_of(job, settings, found, useless)
 
 

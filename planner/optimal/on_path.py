@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.constraints import normal_limit
+from planner.constraints.limits import FILTER_ERROR
 from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.solution import FeedrateSolution
@@ -38,6 +41,16 @@ class OnPath:
     def faster_than(self, other: OnPath) -> bool:
         """True if this motion was found and takes less time than another that was found."""
         return self.solution.solved and self.solution.cycle_time < other.solution.cycle_time
+
+    def held_by_filters(self) -> OnPath:
+        """The same, if the normal acceleration is limited for what is behind the setpoints: then no limit of the machine holds it."""
+        problem = self.problem
+        names = tuple(
+            FILTER_ERROR.name if name == normal_limit.NAME else name for name in problem.bound_names
+        )
+        first = np.array([names.index(name) for name in names])
+        problem = dataclasses.replace(problem, bound_names=names, feed_sq_bound=first[problem.feed_sq_bound])
+        return dataclasses.replace(self, problem=problem)
 
     def motion(self) -> Motion:
         """The motion in time; the problem must be solved."""

@@ -30,7 +30,6 @@ import numpy as np
 
 from planner.base.errors import InputError, NotSolvedError
 from planner.constraints import normal_limit
-from planner.constraints.limits import FILTER_ERROR
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import FILTERS, Job
@@ -124,7 +123,7 @@ class _Search:
         machine = _faster(job.machine, one.more)
         if one.curved:
             least = (1.0 - one.share) * float(job.toolpath.tolerance.min())
-            machine = _gentle_in_curves(machine, least / (self.shaper.variance / 2.0))
+            machine = normal_limit.with_less(machine, least / (self.shaper.variance / 2.0))
         candidate = dataclasses.replace(job, machine=machine, toolpath=toolpath)
         try:
             planned = time_optimal(candidate, self.settings)
@@ -133,7 +132,7 @@ class _Search:
         if not planned.solution.solved:
             return None
         if machine.normal_acceleration != job.machine.normal_acceleration:
-            planned = _said_of_the_shaper(planned)
+            planned = planned.held_by_filters()
         made = Settling(job, self.shaper, self.settings.order, one.share).settled(planned, self.useless)
         stops = int((toolpath.joint == Joint.STOP).sum())
         job.tell(
@@ -164,18 +163,6 @@ def _faster(machine: Machine, by: float) -> Machine:
         for letter, axis in machine.axes.items()
     }
     return machine.model_copy(update={"axes": axes})
-
-
-def _gentle_in_curves(machine: Machine, most: float) -> Machine:
-    """The machine with at most that normal acceleration [mm/s2]."""
-    return machine.model_copy(update={"normal_acceleration": min(most, normal_limit.largest(machine))})
-
-
-def _said_of_the_shaper(planned: OnPath) -> OnPath:
-    """What holds p in curves is no limit of the machine, but the error of the shaper, a filter."""
-    problem = planned.problem
-    names = tuple(FILTER_ERROR.name if name == normal_limit.NAME else name for name in problem.bound_names)
-    return dataclasses.replace(planned, problem=dataclasses.replace(problem, bound_names=names))
 
 
 def shaped_plan(job: Job, settings: Settings) -> Plan:

@@ -48,6 +48,28 @@ def test_the_rounds_settle():
     assert rounds[-1].facts["places"] == 0
 
 
+@pytest.mark.parametrize(("length", "tried"), [(1e-4, 0), (0.02, 2)])
+def test_smaller_shares_of_the_tolerance_are_tried_where_filters_take_time(length, tried):
+    trace = Trace()
+    machine = problems.machine(fir=Fir(time_constants=(length,)))
+    made = plan(JOB, machine, effort="quick", log=trace)
+    assert made.verdict.passed
+    assert sum(step.name == "share of tolerance" for step in trace.steps) == tried
+
+
+def test_what_long_filters_hold_in_curves_is_said_to_be_theirs():
+    """The curve is planned by the closed form of their error, as a normal acceleration, which this machine does not limit."""
+    machine = problems.machine(fir=Fir(time_constants=(0.15,)))
+    program = parse_program(
+        "G21 G64 P0.05 F60000\nG1 X60\nG3 X60 Y80 I0 J40\nG1 X0\n", source="a half circle"
+    )
+    made = plan(program, machine, effort="quick")
+    assert made.verdict.passed
+    held = dict(made.grid.ranked())
+    assert held["filter_error"] > 0.1
+    assert "normal_acceleration" not in held
+
+
 @pytest.mark.parametrize("change", [lambda program: program, reversed_program])
 def test_corners_that_were_too_slow_get_faster_again(change):
     """Seed 450 of the campaign: corners were so slow after the first round that the time fell from 0.116 s to 0.082 s until the last;

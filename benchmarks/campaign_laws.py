@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from planner.machine import Axis, Machine
+from planner.machine.parts import MAGNITUDE_MAX
 from planner.nc.program import Kind, PathControl, Program, SplineTable
 
 ALLOWED = 1e-3  # of the time [-]
@@ -117,7 +118,7 @@ def scaled_machine(machine: Machine, k: float) -> Machine:
     }
     for name in ("feed_max", "normal_acceleration"):
         value = getattr(machine, name)
-        update[name] = None if value is None else value * k
+        update[name] = None if value is None else min(value * k, MAGNITUDE_MAX)  # no limit at all
     return machine.model_copy(update=update)
 
 

@@ -93,7 +93,9 @@ class Job:
         }
         planned = machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)})
         if curved:
-            rest = (1.0 - share) * float(toolpath.tolerance.min())
+            rest = (1.0 - share) * float(
+                toolpath.tolerance.max()
+            )  # smaller ones are left to what is measured
             planned = normal_limit.with_less(planned, BOLDER * rest / filter_error.rate(machine))
         return dataclasses.replace(
             self,

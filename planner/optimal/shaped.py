@@ -122,8 +122,9 @@ class _Search:
         toolpath = dataclasses.replace(toolpath, tolerance=one.share * toolpath.tolerance)
         machine = _faster(job.machine, one.more)
         if one.curved:
-            least = (1.0 - one.share) * float(job.toolpath.tolerance.min())
-            machine = normal_limit.with_less(machine, least / (self.shaper.variance / 2.0))
+            # of the largest tolerance: where it is smaller, settling measures what is left to do
+            rest = (1.0 - one.share) * float(job.toolpath.tolerance.max())
+            machine = normal_limit.with_less(machine, rest / (self.shaper.variance / 2.0))
         candidate = dataclasses.replace(job, machine=machine, toolpath=toolpath)
         try:
             planned = time_optimal(candidate, self.settings)

@@ -70,6 +70,18 @@ def test_what_long_filters_hold_in_curves_is_said_to_be_theirs():
     assert "normal_acceleration" not in held
 
 
+def test_a_small_tolerance_somewhere_does_not_slow_curves_elsewhere():
+    """By the closed form of the smallest tolerance the two half circles took 2.868 s."""
+    machine = problems.machine(fir=Fir(time_constants=(0.06, 0.03)))
+    program = parse_program(
+        "G21 G64 P0.3 F60000\nG1 X30\nG3 X30 Y40 I0 J20\nG1 X0\nG3 X0 Y80 I0 J20\nG1 X20\nG64 P0.005\nG1 X40\nX44 Y84\nX60\n",
+        source="half circles, and corners",
+    )
+    made = plan(program, machine, effort="quick")
+    assert made.verdict.passed
+    assert made.cycle_time < 2.75
+
+
 @pytest.mark.parametrize("change", [lambda program: program, reversed_program])
 def test_corners_that_were_too_slow_get_faster_again(change):
     """Seed 450 of the campaign: corners were so slow after the first round that the time fell from 0.116 s to 0.082 s until the last;

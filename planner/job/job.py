@@ -56,7 +56,7 @@ class Job:
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
     most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
     motion_of : the motions of the trajectories delivered so far, as long as the trajectories exist
-    slowed_by : what made motions slower, beside the limits, that they had been planned by: "filters"
+    slowed_by : what made one of the motions slower than its limits did, noted as it happens: `FILTERS` or nothing
     """
 
     program: Program
@@ -93,9 +93,8 @@ class Job:
         }
         planned = machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)})
         if curved:
-            rest = (1.0 - share) * float(
-                toolpath.tolerance.max()
-            )  # smaller ones are left to what is measured
+            # of the largest tolerance: where it is smaller, the filters' error is measured
+            rest = (1.0 - share) * float(toolpath.tolerance.max())
             planned = normal_limit.with_less(planned, BOLDER * rest / filter_error.rate(machine))
         return dataclasses.replace(
             self,

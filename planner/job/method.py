@@ -89,9 +89,8 @@ class Method(ABC):
         if self.measures_filters and FILTERS not in job.slowed_by and _passed(best):
             return best  # with less of the tolerance for the path it would not be faster
         for share, seen in self.ways:
-            made = self.plan_within_periods(
-                _faster_than(best, job.with_share(share, seen, curved=self.measures_filters))
-            )
+            shared = job.with_share(share, seen, curved=self.measures_filters)
+            made = self.plan_within_periods(_faster_than(best, shared))
             before, best = best, faster(best, made)
             job.tell(
                 "share of tolerance",
@@ -230,8 +229,7 @@ def _not_delivered(plan: Plan, why: str) -> Plan:
 
 def _time(plan: Plan) -> float:
     """Cycle time [s], NaN for a motion that does not pass."""
-    passed = plan.trajectory is not None and plan.verdict is not None and plan.verdict.passed
-    return plan.trajectory.cycle_time if passed and plan.trajectory is not None else np.nan
+    return plan.cycle_time if _passed(plan) else np.nan
 
 
 def _inside(made: Plan) -> bool:

@@ -14,7 +14,7 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.campaign import SUMMARY, kept_rows, rows_of
 from benchmarks.campaign_course import course
-from benchmarks.campaign_jobs import job, job_from
+from benchmarks.campaign_jobs import fingerprint, job, job_from
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
 from benchmarks.campaign_laws import (
     ALLOWED,
@@ -240,6 +240,11 @@ def test_a_job_is_the_same_when_it_is_read_again() -> None:
     np.testing.assert_array_equal(again.program.end, made.program.end)
     np.testing.assert_array_equal(again.program.feed, made.program.feed)
     assert (again.way, again.tolerance) == (made.way, made.tolerance)
+
+
+def test_seeds_draw_the_jobs_of_the_committed_tally() -> None:
+    """On any processor: the campaign goes on where another machine stopped."""
+    assert fingerprint() == Tally.read(SUMMARY).draws
 
 
 def test_the_committed_tally_is_read() -> None:

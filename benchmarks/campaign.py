@@ -8,7 +8,8 @@ more, changed by a law (campaign_laws.py). Each job has C processor seconds in a
 
 Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (campaign_tally.py), with
 a summary in campaign.md, and removed. Jobs that are in one of them are not planned again; --again plans what is not as it should be. A
-change of the draws makes other jobs of the seeds: the campaign then begins anew.
+change of the draws makes other jobs of the seeds: the campaign then begins anew. What compiling a kernel takes, once on a machine, is
+not counted: a job that was ended in it would leave it to the next one.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from benchmarks.campaign_rows import Row, about, outcome
 from benchmarks.campaign_table import write_summary
 from benchmarks.campaign_tally import CRASH, TOO_LONG, Tally, wrongs
 from benchmarks.record import RESULTS, provenance
+from planner.base import kernels
 from planner.base.threads import use_threads
 
 KEPT, SUMMARY = RESULTS / "campaign.jsonl", RESULTS / "campaign.json"
@@ -47,6 +49,7 @@ class Worker:
     seed: int = -1
     began: float = 0.0
     before: float = 0.0
+    compiles: bool = False
 
     @classmethod
     def started(cls) -> Worker:
@@ -57,7 +60,7 @@ class Worker:
         return cls(process, here)
 
     def give(self, seed: int) -> None:
-        self.seed, self.began, self.before = seed, time.monotonic(), 0.0
+        self.seed, self.began, self.before, self.compiles = seed, time.monotonic(), 0.0, False
         self.before = self.used()
         self.ends.send(seed)
 
@@ -73,13 +76,18 @@ class Worker:
 
     def result(self, limit: float) -> Row | None:
         """The row of its job, or None while it has time left, of `limit` [CPU s]."""
-        late = self.used() > limit or time.monotonic() - self.began > WALL * limit
-        if not late and self.ends.poll():
+        late = not self.compiles and self.used() > limit
+        late |= time.monotonic() - self.began > WALL * limit
+        while not late and self.ends.poll():
             try:
-                return dict(self.ends.recv())
+                told = self.ends.recv()
             except EOFError:
                 self.process.join()
                 return {"seed": self.seed, "outcome": CRASH, "said": f"died with {self.process.exitcode}"}
+            if isinstance(told, dict):
+                return told
+            self.compiles = told is None
+            self.before += told or 0.0
         if not late:
             return None
         self.process.kill()
@@ -91,14 +99,36 @@ class Worker:
         return row | {"outcome": TOO_LONG, "said": f"more than {limit:g} CPU s", "cpu": limit}
 
 
+class Compiling(kernels.Compilation):
+    """Tells through a pipe that a kernel is being compiled, by None, and what that took [CPU s]."""
+
+    def __init__(self, ends: Connection):
+        self._ends, self._began, self.took = ends, 0.0, 0.0
+
+    def begins(self, is_kept: bool) -> None:
+        """A kernel is about to be compiled."""
+        self._began = time.process_time()
+        self._ends.send(None)
+
+    def ends(self) -> None:
+        """It is."""
+        took = time.process_time() - self._began
+        self.took += took
+        self._ends.send(took)
+
+
 def _serve(ends: Connection) -> None:
     use_threads(1)
+    compiling = Compiling(ends)
+    kernels.at_compilation(compiling)
     while True:
         try:
             seed = ends.recv()
         except EOFError:
             return
-        ends.send(outcome(seed))
+        before = compiling.took
+        row = outcome(seed)
+        ends.send(row | {"cpu": round(row["cpu"] - (compiling.took - before), 3)})
 
 
 def rows_of(seeds: list[int], processes: int, seconds: float, limit: float = LIMIT) -> Iterator[Row]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.campaign import SUMMARY, kept_rows, rows_of
+from benchmarks.campaign import SUMMARY, kept_rows
 from benchmarks.campaign_course import course
 from benchmarks.campaign_jobs import fingerprint, job, job_from
 from benchmarks.campaign_judge import Motion, faults, filtered, matched
@@ -318,9 +318,3 @@ def test_the_same_number_makes_the_same_job() -> None:
     one, other = job(7), job(7)
     assert one.text == other.text
     assert one.machine == other.machine
-
-
-@pytest.mark.slow
-def test_a_job_that_takes_too_long_is_ended() -> None:
-    rows = list(rows_of([20, 21], 1, np.inf, limit=-1.0))
-    assert [row["outcome"] for row in rows] == ["too long", "too long"]

@@ -6,10 +6,8 @@ the filtered one has come to rest at the same point. So there are two ways to le
 
   slower   a run between full stops slowed down by f has 1/f^2 of the error; what a path that rounds its corners within less than the
            tolerance leaves, it leaves again
-  rest     two runs that are Td apart do not know of each other: the stop between them is reached. Paper 000's dwell is Td - Tk, the
-           shortest rest at which the filtered motion still comes near enough: here it is found for the motion as it is. With what runs
-           into the stop, a(t), and what runs out of it, b(t), both seen from the vertex, behind the filters the motion is a + b shifted
-           by the rest.
+  rest     two runs that are Td apart do not know of each other: the stop between them is reached. The shortest rest with which the
+           filtered motion comes near enough is found for the motion as it is (rests.py)
 
 The motion is measured as the verifier measures it (verify/filtered.py), the errors are put down to runs and stops, and those are slowed
 down and lengthened until nothing is left. Behind the last run nothing is added: the filtered motion ends Td after the setpoints do.
@@ -24,6 +22,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
+from planner.delivery.rests import mean_of_filters
 from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -36,8 +35,6 @@ from planner.verify.pieces import ProgramPieces, program_pieces, widened
 SPARE = 2e-3
 # A motion that leaves the tolerance is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
 WIDER = 16.0
-# The kernel is taken in so many steps where rests are sought [-]; a rest is found to 2^-HALVINGS of Td.
-STEPS, HALVINGS = 128, 10
 STOPS_AT_ONCE = 500  # 5 MB an array
 # At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
 # together by up to 240, which leaves 1/57,600 of any filter's error.
@@ -110,8 +107,7 @@ class Behind:
         if machine.fir is None:
             return  # `errors` of the motion itself can be asked for
         self.filters = Filters(machine.fir.time_constants)
-        weights = self.filters.step(self.filters.delay * np.arange(STEPS + 1) / STEPS)
-        self._weights = np.diff(weights)
+        self._mean = mean_of_filters(self.filters)
 
     def errors(self, motion: MotionInTime, filters: tuple[float, ...]) -> Errors:
         """Errors of the filtered motion, matched with the path as the verifier does it. That loses a motion which leaves the tolerance;
@@ -182,35 +178,14 @@ class Behind:
 
     def _rests(self, motion: Timed, end: FloatArray, begin: FloatArray) -> FloatArray:
         """The shortest rests (g,) [s] between runs that end and begin at the times (g,) [s]."""
-        step = self.filters.delay / STEPS
-        inside = step * (np.arange(STEPS) + 0.5)
+        inside = self._mean.inside
         times = np.stack([end[:, None] - inside, begin[:, None] + inside], axis=1)
         place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
         seen = motion.at(place, self.machine.dt)
         stop = motion.at(np.unique(end), self.machine.dt)
         off = seen.position[of].reshape(*times.shape, -1) - stop.position[:, None, None]
-        into, out = off[:, 0], off[:, 1]
-        before, after = np.zeros((2, len(end), STEPS + 1, off.shape[-1]))
-        for j in range(STEPS + 1):  # so many steps after the stop the filters still hold what runs into it
-            before[:, j] = np.einsum("c,gca->ga", self._weights[j:], into[:, : STEPS - j])
-            after[:, j] = np.einsum("c,gca->ga", self._weights[:j], out[:, :j][:, ::-1])
         budget = self._budget(stop.block, stop.position) * (1.0 - SPARE)
-        low, high = np.zeros(len(end)), np.full(len(end), float(STEPS))
-        fine = self._miss(before, after, low) <= budget
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            enough = self._miss(before, after, middle) <= budget
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        return np.where(fine, 0.0, high * step)
-
-    def _miss(self, before: FloatArray, after: FloatArray, rest: FloatArray) -> FloatArray:
-        """How far the filtered motion passes by the stops (g,) [mm] if it rests there for so many steps of the kernel (g,)."""
-        j = np.arange(before.shape[1]) - rest[:, None]
-        whole = np.clip(np.floor(j).astype(np.int64), 0, before.shape[1] - 2)
-        fraction = np.clip(j - whole, 0.0, 1.0)[:, :, None]
-        rows = np.arange(len(rest))[:, None]
-        shifted = (1.0 - fraction) * after[rows, whole] + fraction * after[rows, whole + 1]
-        return np.linalg.norm(before + shifted, axis=2).min(axis=1)
+        return self._mean.shortest_rests(off[:, 0], off[:, 1], budget)
 
     def _budget(self, block: Array, position: FloatArray) -> FloatArray:
         """Budget of the joints (g,) that are nearest to positions on blocks [mm]."""

@@ -15,6 +15,7 @@ from planner.constraints.normal_limit import slowest
 from planner.delivery.filters import FLOOR_STEP, WIDER, Behind, runs_within, stops_between
 from planner.delivery.filters import SPARE as SPARE_ERROR
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
+from planner.delivery.rests import mean_of_copies
 from planner.geometry.toolpath import Joint
 from planner.job.job import Job
 from planner.motion.shaping import ShapedMotion, Shaper
@@ -34,9 +35,6 @@ MOST_SLOWER = 2.0  # of a run, in one round [-] ...
 SHORT_RUN = (
     0.25  # ... but of one to which that was no help, which takes at least so much of what D is made of [-]
 )
-# Steps of the shaper's length in which rests are sought: with one mode each is less than 4 degrees of it, and straight lines
-# between them miss 1e-3 of the amplitude. Rests are found to 2^-HALVINGS of the length: 10 us of 40 ms.
-STEPS, HALVINGS = 96, 12
 
 
 class Over(NamedTuple):
@@ -60,7 +58,7 @@ class Settling:
         """share : of the tolerance, for the path of p [-]"""
         self.job, self.shaper, self.order, self.share = job, shaper, order, share
         machine = job.real[0]
-        self.behind = Behind(job.toolpath, machine)
+        self.behind, self._mean = Behind(job.toolpath, machine), mean_of_copies(shaper)
         self.filters = machine.fir.time_constants if machine.fir else ()
         self.seen = self.shaper.length + sum(self.filters)  # what D is made of, back from a time [s]
         self.limits = {
@@ -201,28 +199,21 @@ class Settling:
         if len(runs) < 2:
             return rest
         joint = samples.path.legs.first[samples.stop][1:-1]
-        end, begin = runs.end[:-1], runs.begin[1:]
-        budget = toolpath.tolerance[joint] * ROOM
-        at = np.linspace(0.0, self.shaper.length, STEPS + 1)
-        into = self._seen(motion, end[:, None] - at) - toolpath.start[joint][:, None]
-        out = self._seen(motion, begin[:, None] + at) - toolpath.start[joint][:, None]
-        delay = self.shaper.length
-        rest[:-1] = delay
+        rest[:-1] = self.shaper.length
         free = np.flatnonzero(toolpath.joint[joint] != Joint.STOP)
-        near = _miss(into[free], out[free], np.zeros(len(free)), self.shaper) <= budget[free]
-        rest[free[near]] = 0.0
-        free = free[~near]
-        low, high = np.zeros(len(free)), np.full(len(free), delay)
-        for _ in range(HALVINGS if len(free) else 0):
-            middle = (low + high) / 2.0
-            enough = _miss(into[free], out[free], middle, self.shaper) <= budget[free]
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        rest[free] = high
+        inside, stop = self._mean.inside, toolpath.start[joint[free], None]
+        into = self._seen(motion, runs.end[free, None] - inside) - stop
+        out = self._seen(motion, runs.begin[free + 1, None] + inside) - stop
+        rest[free] = self._mean.shortest_rests(into, out, toolpath.tolerance[joint[free]] * ROOM)
         return rest
 
     def _seen(self, motion: Motion, times: FloatArray) -> FloatArray:
         place, of = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
-        return motion.at(place, self.job.machine.dt).position[of].reshape(*times.shape, -1)
+        return (
+            motion.at(place, self.job.machine.dt)
+            .position[of]
+            .reshape(*times.shape, len(self.job.toolpath.axes))
+        )
 
 
 def slower_by_errors(
@@ -246,22 +237,3 @@ def slower_by_errors(
     to = np.sqrt(np.where(vain, 1.0, dynamic) / np.where(vain, 1.0, left))
     to = np.where(vain, np.maximum(MOST_SLOWER * s, least), np.clip(to, s, MOST_SLOWER * s))
     return np.where(e > 0.0, to, s)
-
-
-def _miss(into: FloatArray, out: FloatArray, rest: FloatArray, shaper: Shaper) -> FloatArray:
-    """(g,) how near D comes to stops at which p rests so long (g,) [mm]; into, out (g, STEPS + 1, A) [mm]: where p is, seen from the
-    stop, at equal steps of the shaper's length before and after it."""
-    steps = into.shape[1] - 1
-    rows = np.arange(len(rest))[:, None]
-    after = np.linspace(0.0, 1.0, 2 * steps + 1)[None, :] * (
-        shaper.length + rest[:, None]
-    )  # since p came to rest
-    total = np.zeros((*after.shape, into.shape[2]))
-    for delay, weight in zip(shaper.delay, shaper.weight, strict=True):
-        since = after - delay
-        for table, place in ((into, -since), (out, since - rest[:, None])):
-            x = np.clip(place / shaper.length * steps, 0.0, steps)
-            k = np.minimum(x.astype(np.int64), steps - 1)
-            share = (x - k)[:, :, None]
-            total += weight * ((1.0 - share) * table[rows, k] + share * table[rows, k + 1])
-    return np.linalg.norm(total, axis=2).min(axis=1)

@@ -145,6 +145,12 @@ class Job:
                 self.slowed_by.add(FILTERS)
             return made
 
+    def deliver_in_time(self, motion: TimedT) -> Delivered | None:
+        """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer than `most`."""
+        if motion.end <= self.most:
+            motion = self.behind_filters(motion)
+        return self.deliver(motion) if motion.end <= self.most else None
+
     def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too.
 

@@ -41,7 +41,7 @@ class StopMethod(Method):
             run = np.cumsum(parts.still[:-1]) - 1
             law = law_of_moves(samples, run, at[:-1], *stop_phases(exact, machine, parts, np.diff(at)))
             motion = Motion(samples=samples, law=law)
-        made = job.deliver(job.behind_filters(motion))
+        made = job.deliver_in_time(motion)
         return job.plan(
             made,
             method="stop",

@@ -68,11 +68,12 @@ class OptimalMethod(Method):
 
     @property
     def instead(self) -> tuple[Method, ...]:  # type: ignore[override]
-        """Single corners, method kinematic and full stops, where the chords between samples take tolerance from splines."""
+        """Full stops, method kinematic and single corners, where the chords between samples take tolerance from splines. The first
+        two have closed forms: what takes longer than they do is not planned to the end."""
         if self.corner != AUTO or self.shaped:
             return ()
         corners = (dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
-        return (*corners, KinematicMethod(), StopMethod(join_lines=True))
+        return (StopMethod(join_lines=True), KinematicMethod(), *corners)
 
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(

@@ -99,9 +99,7 @@ def remaining_budget(samples: PathSamples) -> FloatArray:
     element = samples.element
     corner = element < 0
     joint = np.where(corner, ~element, 0)
-    tolerance = path.toolpath.tolerance
-    whole = np.minimum(tolerance[samples.segment], tolerance[samples.segment + 1])
-    budget = np.where(corner, path.tol[joint] - path.tol_ap[joint], whole)
+    budget = np.where(corner, path.tol[joint] - path.tol_ap[joint], path.toolpath.along[samples.segment])
     span = element - len(samples.table.legs)
     if (span >= 0).any():
         budget[span >= 0] = path.spline.budget[span[span >= 0]]

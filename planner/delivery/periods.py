@@ -13,8 +13,8 @@ and speeds up along another.
    than the tolerance, `settled` lets the motion stand until the next sample, or for a shorter time that is enough: less than dt per
    stop.
 2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is more than the tolerance,
-   `with_less_tolerance` subtracts the excess from the tolerance of the corner. Where the chords alone would use nearly all of the
-   tolerance, the corner becomes a full stop.
+   `with_less_tolerance` subtracts the excess from the tolerance of the corner, not from that of the arcs beside it. Where the chords
+   alone would use nearly all of the tolerance, the corner becomes a full stop.
 3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error after all. If the verdict
    finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the tolerance of the block.
 """
@@ -213,7 +213,7 @@ def with_less_tolerance(
         (tolerance < LEFT_MIN * programmed.tolerance) | (far - near > (1.0 - LEFT_MIN) * allowed)
     )
     tolerance[hopeless] = planned.tolerance[hopeless]
-    return dataclasses.replace(planned.with_joints(hopeless, Joint.STOP), tolerance=tolerance)
+    return _with_tolerance(planned.with_joints(hopeless, Joint.STOP), tolerance, planned.along)
 
 
 def with_less_inside(
@@ -227,7 +227,16 @@ def with_less_inside(
     segment = np.flatnonzero(planned.line == line)
     joints = np.union1d(segment, segment + 1)
     tolerance = planned.tolerance.copy()
-    tolerance[joints] *= max(1.0 - again * REDUCED_INSIDE * (ratio - 1.0), 0.5)
+    by = max(1.0 - again * REDUCED_INSIDE * (ratio - 1.0), 0.5)
+    tolerance[joints] *= by
     if not len(joints) or (tolerance[joints] < LEFT_MIN * programmed.tolerance[joints]).any():
         return None
-    return dataclasses.replace(planned, tolerance=tolerance)
+    along = planned.along.copy()
+    along[segment] *= by
+    return _with_tolerance(planned, tolerance, along)
+
+
+def _with_tolerance(toolpath: Toolpath, tolerance: FloatArray, along: FloatArray) -> Toolpath:
+    """The path with other tolerances at its joints (M+1,) and along its segments (M,) [mm]."""
+    inside = along / np.minimum(tolerance[:-1], tolerance[1:])
+    return dataclasses.replace(toolpath, tolerance=tolerance, inside=inside)

@@ -124,8 +124,7 @@ def guide_of_path(
     path, segment = samples.path, samples.segment
     toolpath = path.toolpath
     corner = np.where(samples.element < 0, ~samples.element, -1)
-    beside = np.minimum(toolpath.tolerance[segment], toolpath.tolerance[segment + 1])
-    whole = np.where(corner >= 0, path.tol[corner], beside)
+    whole = np.where(corner >= 0, path.tol[corner], toolpath.along[segment])
     tol = whole - np.where(corner >= 0, path.tol_ap[corner], 0.0)
     behind = np.linalg.norm(np.append(samples.d2_left[1:], samples.d2_left[-1:], axis=0), axis=1)
     kappa = np.maximum(np.linalg.norm(samples.d2_right, axis=1), behind)

@@ -38,7 +38,7 @@ def arc_sagitta(toolpath: Toolpath, fraction: float) -> tuple[Array, FloatArray]
     Returns the number of chords (M,), 1 for lines, and their largest distance from the segment (M,) [mm].
     """
     arcs, curved = toolpath.arcs, toolpath.arc >= 0
-    least = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
+    least = toolpath.along
     count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
     row = toolpath.arc[curved]
     budget = fraction * least[curved]
@@ -90,7 +90,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     joint[np.append(first, len(segment))[stop]] = Joint.STOP
 
     tolerance, dwell = np.zeros(len(segment) + 1), np.zeros(len(segment) + 1)
-    tolerance[:-1] = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
+    tolerance[:-1] = toolpath.along[segment]
     tolerance[first], tolerance[-1] = toolpath.tolerance[:-1], toolpath.tolerance[-1]
     left = np.append(sagitta[segment], 0.0)
     tolerance -= np.maximum(left, np.insert(left[:-1], 0, 0.0))
@@ -98,6 +98,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     return dataclasses.replace(
         toolpath,
         extrusion=None,
+        inside=None,
         start=start,
         end=end,
         length=length,

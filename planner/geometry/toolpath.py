@@ -81,6 +81,8 @@ class Toolpath:
     zero_length     : (Z,) blocks that move nowhere, kept as events
     radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one norm measures them
     extrusion       : what the extruder does along it; None without one
+    inside          : (M,) `along` over the smaller tolerance of the segment's ends [-], where joints were given less of it
+                      (delivery/periods.py); None for 1
     """
 
     source: str
@@ -108,6 +110,7 @@ class Toolpath:
     zero_length: Array
     radius: float = 1.0
     extrusion: Extrusion | None = None
+    inside: FloatArray | None = None
 
     def __post_init__(self) -> None:
         segments, axes = len(self.length), len(self.axes)
@@ -127,6 +130,8 @@ class Toolpath:
         for name in ("theta", "tolerance", "dwell"):
             freeze(self, name, np.float64, (segments + 1,))
         freeze(self, "zero_length", np.int64, (None,))
+        if self.inside is not None:
+            freeze(self, "inside", np.float64, (segments,))
         if segments and (self.joint[0] != Joint.STOP or self.joint[-1] != Joint.STOP):
             raise ValueError("Toolpath.joint: the first and the last joint must be STOP")
         if not (self.length > 0).all():
@@ -134,6 +139,12 @@ class Toolpath:
 
     def __len__(self) -> int:
         return len(self.length)
+
+    @property
+    def along(self) -> FloatArray:
+        """(M,) contour tolerance along each segment, between its joints [mm]."""
+        least: FloatArray = np.minimum(self.tolerance[:-1], self.tolerance[1:])
+        return least if self.inside is None else least * self.inside
 
     @property
     def straight(self) -> Array:
@@ -162,6 +173,7 @@ class Toolpath:
             arc=np.full(len(first), -1),
             curve=np.full(len(first), -1),
             extrusion=None,
+            inside=None,
             **{name: getattr(self, name)[first] for name in of_segment},
             **{name: getattr(self, name)[at] for name in ("joint", "theta", "tolerance", "dwell")},
         )

@@ -42,7 +42,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
         (machine.limits(q, axes) / component).min(axis=1) for q in ("velocity", "acceleration", "jerk")
     )
     half = np.sqrt(0.5)
-    budget = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[curved] / error_rate(machine)
+    budget = toolpath.along[curved] / error_rate(machine)
     across = np.minimum(half * a_all, np.minimum(budget, normal_limit.largest(machine)))
     v[curved] = np.min(
         [

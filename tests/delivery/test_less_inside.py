@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import planner
 from benchmarks import problems
-from planner.delivery.periods import LEFT_MIN, with_less_inside
+from planner.constraints.on_grid import remaining_budget
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.delivery.periods import LEFT_MIN, with_less_inside, with_less_tolerance
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.chords import chorded
+from planner.geometry.toolpath import Toolpath
 from planner.machine import Axis, Machine
 from planner.nc.reader import parse_program
+from planner.path.samples import sample_path
 
 MACHINE = Machine(
     name="slow samples",
@@ -66,3 +74,46 @@ def test_chords_that_eq_18_bounds_above_what_any_phase_shows_get_less_of_the_tol
     made = planner.plan(program, machine, geometry="spline", effort="quick")
     assert made.verdict is not None
     assert made.verdict.passed, made.verdict.faults
+
+
+ARC = "G21 G17 G90 G64 F6000\nG1 X10\nG2 X20 Y-10 I0 J-10\nG1 X30\nG1 X40 Y5\nM2\n"
+
+
+def _less(path: Toolpath, joint: int) -> Toolpath:
+    """With less tolerance at one joint."""
+    far = np.zeros(len(path) + 1)
+    far[joint] = 1.2 * path.tolerance[joint]
+    less = with_less_tolerance(path, path, 0.5 * far, far)
+    assert less is not None
+    assert less.tolerance[joint] < path.tolerance[joint]
+    return less
+
+
+def test_a_corner_that_gets_less_tolerance_leaves_the_arc_beside_it_all_of_its_own() -> None:
+    path = toolpath_from_program(parse_program(ARC, MACHINE), MACHINE)
+    assert (path.along == path.tolerance[0]).all()
+    less = _less(path, 2)
+    np.testing.assert_allclose(less.along, path.along)
+    np.testing.assert_allclose(_less(less, 3).along, path.along)
+    halved = dataclasses.replace(less, tolerance=0.5 * less.tolerance)
+    np.testing.assert_allclose(halved.along, 0.5 * path.along)
+    np.testing.assert_allclose(less.part(np.ones(len(path), bool)).along, path.along)
+    chords = chorded(less, 0.1, np.zeros(len(path), bool))
+    inside = np.flatnonzero(chords.block[1:] == chords.block[:-1]) + 1
+    assert (chords.tolerance[inside] >= 0.85 * path.tolerance[0]).all()
+    assert less.block_ends().along.shape == (4,)
+
+
+def test_chords_on_an_arc_have_the_budget_of_the_arc_not_that_of_its_corners() -> None:
+    path = toolpath_from_program(parse_program(ARC, MACHINE), MACHINE)
+
+    def budget(path: Toolpath) -> float:
+        samples = sample_path(round_corners(path, MACHINE, BezierCorner()), MACHINE)
+        on_arc = (samples.segment == 1) & (samples.element >= 0)
+        return float(remaining_budget(samples)[on_arc].min())
+
+    assert budget(_less(path, 2)) == pytest.approx(budget(path))
+    inside = with_less_inside(path, path, 3, 1.1, 1)
+    assert inside is not None
+    np.testing.assert_allclose(inside.along / path.along, [1, 0.8, 1, 1])
+    assert budget(inside) == pytest.approx(0.8 * budget(path))

@@ -212,7 +212,7 @@ def test_a_line_as_two_is_the_same_path(seed: int) -> None:
 FOUND = (8638, 8703, 16806, 28613, 29024, 31012, 31156, 33202, 34603, 36958, 44666, 54529, 55117)
 # Laws that were broken: shaped motions that took a bow from the limits; full stops where a line goes on; a spline made by rounding;
 # feeds behind a shaper that were held to the slower of two blocks at a corner; chords that leave an exact path; curves behind
-# long filters.
+# long filters; arcs that were slowed down with a corner beside them.
 FOUND_LAWS = (8190, 21810, 22340, 19330, 22330, 17570, 46550, 45000, 52710, 25060, 33240, 28770, 48660)
 # The same, of draws of before: as `python -m benchmarks campaign --show SEED` writes a job.
 FOUND_JOBS = json.loads((Path(__file__).parent / "found_jobs.json").read_text(encoding="utf-8"))

@@ -13,8 +13,8 @@ and speeds up along another.
    than the tolerance, `settled` lets the motion stand until the next sample, or for a shorter time that is enough: less than dt per
    stop.
 2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is more than the tolerance,
-   `with_less_tolerance` subtracts the excess from the tolerance of the corner, not from that of the arcs beside it. Where the chords
-   alone would use nearly all of the tolerance, the corner becomes a full stop.
+   `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs beside it only where this was
+   not enough. Where the chords alone would use nearly all of the tolerance, the corner becomes a full stop.
 3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error after all. If the verdict
    finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the tolerance of the block.
 """
@@ -194,7 +194,12 @@ def _looks(motion: MotionInTime, step: float, dt: float) -> Iterator[Trajectory]
 
 
 def with_less_tolerance(
-    planned: Toolpath, programmed: Toolpath, near: FloatArray, far: FloatArray, times: float = 1.0
+    planned: Toolpath,
+    programmed: Toolpath,
+    near: FloatArray,
+    far: FloatArray,
+    times: float = 1.0,
+    beside: bool = False,
 ) -> Toolpath | None:
     """The path to be planned so that the chords stay within the tolerance of the programmed path; None if they do already.
 
@@ -202,6 +207,7 @@ def with_less_tolerance(
     near, far : by how much motion and chords miss the vertices (M+1,) [mm], from `missed`
     times     : how often what is too much is subtracted [-]: more than once where that changed nothing before, because the motion did
                 not use what was taken from it
+    beside    : take from the arcs beside the corners too, whose chords may be what misses them
     """
     allowed = USED * programmed.tolerance
     # where the path turns slowly chords have all of the tolerance, eq. (20): what is too much there, the verdict says
@@ -213,7 +219,10 @@ def with_less_tolerance(
         (tolerance < LEFT_MIN * programmed.tolerance) | (far - near > (1.0 - LEFT_MIN) * allowed)
     )
     tolerance[hopeless] = planned.tolerance[hopeless]
-    return _with_tolerance(planned.with_joints(hopeless, Joint.STOP), tolerance, planned.along)
+    along = planned.along
+    if beside:
+        along = np.minimum(along, np.minimum(tolerance[:-1], tolerance[1:]))
+    return _with_tolerance(planned.with_joints(hopeless, Joint.STOP), tolerance, along)
 
 
 def with_less_inside(

@@ -27,6 +27,9 @@ from planner.verify import ThreadCheck, Verdict
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
+# From the arcs beside corners it is taken where a round for the corners changed nothing, or after so many of them.
+CORNER_ROUNDS = 4
+SAME_TIME = 1e-12  # share of a time that is rounding [-]
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
 INSTEAD_POINTS = 50_000
 IN_STEP = (OPTIMAL, KINEMATIC)  # methods for threads
@@ -141,9 +144,11 @@ class Method(ABC):
                 break
             with job.stage("geometry"):
                 near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
-                times = 2.0 * times if made.cycle_time == before else 1.0
+                same = abs(made.cycle_time - before) <= SAME_TIME * made.cycle_time
+                times = 2.0 * times if same else 1.0
                 before = made.cycle_time
-                less = periods.with_less_tolerance(planned, programmed, near, far, times)
+                beside = same or again > CORNER_ROUNDS
+                less = periods.with_less_tolerance(planned, programmed, near, far, times, beside)
                 if less is None and made.verdict is not None and (worst := _worst(made.verdict)) is not None:
                     less = periods.with_less_inside(planned, programmed, *worst, again)
             if less is None:

@@ -79,11 +79,11 @@ def test_chords_that_eq_18_bounds_above_what_any_phase_shows_get_less_of_the_tol
 ARC = "G21 G17 G90 G64 F6000\nG1 X10\nG2 X20 Y-10 I0 J-10\nG1 X30\nG1 X40 Y5\nM2\n"
 
 
-def _less(path: Toolpath, joint: int) -> Toolpath:
+def _less(path: Toolpath, joint: int, *, beside: bool = False) -> Toolpath:
     """With less tolerance at one joint."""
     far = np.zeros(len(path) + 1)
     far[joint] = 1.2 * path.tolerance[joint]
-    less = with_less_tolerance(path, path, 0.5 * far, far)
+    less = with_less_tolerance(path, path, 0.5 * far, far, beside=beside)
     assert less is not None
     assert less.tolerance[joint] < path.tolerance[joint]
     return less
@@ -102,6 +102,13 @@ def test_a_corner_that_gets_less_tolerance_leaves_the_arc_beside_it_all_of_its_o
     inside = np.flatnonzero(chords.block[1:] == chords.block[:-1]) + 1
     assert (chords.tolerance[inside] >= 0.85 * path.tolerance[0]).all()
     assert less.block_ends().along.shape == (4,)
+
+
+def test_where_that_is_not_enough_the_arc_beside_a_corner_gets_less_as_well() -> None:
+    path = toolpath_from_program(parse_program(ARC, MACHINE), MACHINE)
+    less = _less(path, 2, beside=True)
+    np.testing.assert_allclose(less.along[[0, 3]], path.along[[0, 3]])
+    np.testing.assert_allclose(less.along[[1, 2]], less.tolerance[2])
 
 
 def test_chords_on_an_arc_have_the_budget_of_the_arc_not_that_of_its_corners() -> None:

@@ -49,8 +49,8 @@ ABOVE = 2e-3
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
-# Of an excess inside a block by so many times in the first round, twice that in the second ...: its chords have a share of the
-# tolerance only, and some methods use it in steps.
+# Of an excess inside a block by so many times, and `again` times that: its chords have a share of the tolerance only, and some methods
+# use it in steps.
 REDUCED_INSIDE = 2.0
 # A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
@@ -231,7 +231,7 @@ def with_less_inside(
     """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are `ratio` times the
     tolerance off while they keep it at the vertices for all that `missed` sees; None where next to nothing would be left.
 
-    again : the round, from 1
+    again : how often it is subtracted, from 1
     """
     segment = np.flatnonzero(planned.line == line)
     joints = np.union1d(segment, segment + 1)

@@ -38,7 +38,8 @@ def arc_sagitta(toolpath: Toolpath, fraction: float) -> tuple[Array, FloatArray]
     Returns the number of chords (M,), 1 for lines, and their largest distance from the segment (M,) [mm].
     """
     arcs, curved = toolpath.arcs, toolpath.arc >= 0
-    least = toolpath.along
+    # of what its joints may use too: chords take it from them
+    least = np.minimum(toolpath.along, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]))
     count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
     row = toolpath.arc[curved]
     budget = fraction * least[curved]

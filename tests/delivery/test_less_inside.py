@@ -101,6 +101,8 @@ def test_a_corner_that_gets_less_tolerance_leaves_the_arc_beside_it_all_of_its_o
     chords = chorded(less, 0.1, np.zeros(len(path), bool))
     inside = np.flatnonzero(chords.block[1:] == chords.block[:-1]) + 1
     assert (chords.tolerance[inside] >= 0.85 * path.tolerance[0]).all()
+    little = dataclasses.replace(less, tolerance=0.05 * less.tolerance, inside=20.0 * less.along / path.along)
+    assert (chorded(little, 0.1, np.zeros(len(path), bool)).tolerance > 0.0).all()
     assert less.block_ends().along.shape == (4,)
 
 

@@ -22,7 +22,7 @@ FILTERS = [Filters((0.04,)), Filters((0.03, 0.02)), Filters((0.02, 0.02, 0.011))
 
 
 def _way(t: FloatArray) -> FloatArray:
-    """(n,) from rest at 0 [mm], and its derivative."""
+    """(n,) how far a motion has come that leaves rest at 0 [mm]."""
     return FAR * (t.clip(0.0) / ARRIVAL) ** 3
 
 

@@ -28,7 +28,7 @@ from planner.verify import ThreadCheck, Verdict
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
 # From the arcs beside corners it is taken where a round for the corners changed nothing, or after so many of them; inside blocks it is
-# more and more from then on.
+# more and more from then on (without that the verdict of 53750 of the campaign fails).
 CORNER_ROUNDS = 4
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.

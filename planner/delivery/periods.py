@@ -27,7 +27,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Joint, Toolpath, lesser_end
 from planner.machine import Machine
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
@@ -221,7 +221,7 @@ def with_less_tolerance(
     tolerance[hopeless] = planned.tolerance[hopeless]
     along = planned.along
     if beside:
-        along = np.minimum(along, np.minimum(tolerance[:-1], tolerance[1:]))
+        along = np.minimum(along, lesser_end(tolerance))
     return _with_tolerance(planned.with_joints(hopeless, Joint.STOP), tolerance, along)
 
 
@@ -247,5 +247,5 @@ def with_less_inside(
 
 def _with_tolerance(toolpath: Toolpath, tolerance: FloatArray, along: FloatArray) -> Toolpath:
     """The path with other tolerances at its joints (M+1,) and along its segments (M,) [mm]."""
-    inside = along / np.minimum(tolerance[:-1], tolerance[1:])
+    inside = along / lesser_end(tolerance)
     return dataclasses.replace(toolpath, tolerance=tolerance, inside=inside)

@@ -14,7 +14,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Joint, Toolpath, lesser_end
 
 # A chord turns by at most this much [rad]: of an arc no larger than the tolerance eight chords are left.
 CHORD_ANGLE_MAX = np.pi / 4
@@ -39,7 +39,7 @@ def arc_sagitta(toolpath: Toolpath, fraction: float) -> tuple[Array, FloatArray]
     """
     arcs, curved = toolpath.arcs, toolpath.arc >= 0
     # of what its joints may use too: chords take it from them
-    least = np.minimum(toolpath.along, np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:]))
+    least = np.minimum(toolpath.along, lesser_end(toolpath.tolerance))
     count, sagitta = np.ones(len(toolpath), np.int64), np.zeros(len(toolpath))
     row = toolpath.arc[curved]
     budget = fraction * least[curved]

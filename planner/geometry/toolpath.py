@@ -27,6 +27,12 @@ from planner.geometry.curves import Curves
 from planner.geometry.extrusion import Extrusion, extruding_part
 
 
+def lesser_end(at_joints: FloatArray) -> FloatArray:
+    """(M,) the smaller of the values (M+1,) at the two ends of each segment."""
+    lesser: FloatArray = np.minimum(at_joints[:-1], at_joints[1:])
+    return lesser
+
+
 class Joint(IntEnum):
     """How the motion passes the joint between two segments."""
 
@@ -143,7 +149,7 @@ class Toolpath:
     @property
     def along(self) -> FloatArray:
         """(M,) contour tolerance along each segment, between its joints [mm]."""
-        least: FloatArray = np.minimum(self.tolerance[:-1], self.tolerance[1:])
+        least = lesser_end(self.tolerance)
         return least if self.inside is None else least * self.inside
 
     @property

@@ -21,7 +21,7 @@ from planner.base.kernels import njit
 from planner.constraints import filter_error
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
-from planner.geometry.toolpath import Toolpath
+from planner.geometry.toolpath import Toolpath, lesser_end
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits
@@ -143,7 +143,7 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
 def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
     """Limits v, a, j (3, M) along every segment; with a, filters round full stops within the tolerance."""
     v, a, j = block_limits(toolpath, machine)
-    tolerance = np.minimum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
+    tolerance = lesser_end(toolpath.tolerance)
     return np.stack([v, filter_error.at_stops(a, tolerance, toolpath.held, machine), j])
 
 

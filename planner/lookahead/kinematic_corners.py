@@ -21,7 +21,7 @@ from planner.corners.allocation import error_rate
 from planner.corners.sharing import share_legs
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.legs import Legs
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Joint, Toolpath, lesser_end
 from planner.lookahead.corner_pieces import ARC_RAMP
 from planner.lookahead.look_ahead import capped, needed
 from planner.lookahead.passage import LegLimits, Passage
@@ -44,9 +44,7 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
     """
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
     tolerance = toolpath.tolerance[path.first]
-    a = filter_error.at_stops(
-        a, np.minimum(tolerance[:-1], tolerance[1:]), toolpath.held[path.first[:-1]], machine
-    )
+    a = filter_error.at_stops(a, lesser_end(tolerance), toolpath.held[path.first[:-1]], machine)
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
     j = np.where(turning > 0.0, np.minimum(j, a / ARC_RAMP), j)

@@ -32,6 +32,7 @@ from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
 from planner.feedrate.solution import FeedrateSolution
+from planner.geometry.toolpath import lesser_end
 from planner.job.records import SAVED_MIN, DearCorners
 from planner.machine import Machine
 from planner.path.rows import FREE_PART_MIN
@@ -80,8 +81,7 @@ class CornerPrices:
 
     def between(self) -> float:
         """dT/d(tolerance) through the error bounds of the segments between corners [s/mm]."""
-        tolerance = self.path.toolpath.tolerance
-        return float((self.segment / np.minimum(tolerance[:-1], tolerance[1:])).sum())
+        return float((self.segment / lesser_end(self.path.toolpath.tolerance)).sum())
 
     def dearest(self, together: FloatArray) -> DearCorners:
         """Prices of single corners.

@@ -11,9 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.constraints.limit import Cap, Limit, over
 from planner.machine import Machine
 
@@ -24,18 +22,6 @@ if TYPE_CHECKING:
 def rate(machine: Machine) -> float:
     """sum T^2/24 [s2]: filter error per unit of acceleration; 0 without filters."""
     return sum(T * T for T in machine.fir.time_constants) / 24.0 if machine.fir else 0.0
-
-
-def at_stops(a: FloatArray, tolerance: FloatArray, held: Array, machine: Machine) -> FloatArray:
-    """Accelerations with which filters round full stops within the tolerance.
-
-    a         : (n,) of moves from stop to stop [mm/s2]
-    tolerance : (n,) at their ends [mm]; over `rate` it is the most
-    held      : (n,) moves in step with the spindle keep theirs, for which their run-in is made; they rest at their ends
-    """
-    if machine.fir is None:
-        return a
-    return np.where(held, a, np.minimum(a, tolerance / rate(machine)))
 
 
 def feed_sq_max(

@@ -18,10 +18,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.constraints import filter_error
 from planner.constraints.assemble import feedrate_problem
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
-from planner.geometry.toolpath import Toolpath, lesser_end
 from planner.lookahead.passage import LegLimits, Passage
 from planner.lookahead.ramps import JointKind
 from planner.lookahead.rest_to_rest import block_limits
@@ -103,7 +101,7 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
     element = samples.element[at]
     run = np.searchsorted(samples.piece, at, side="right") - 1
     joint = np.where(element < 0, ~element, -1)
-    limits = _block_limits(path.toolpath, machine)[:, samples.segment[at]]
+    limits = np.stack(block_limits(path.toolpath, machine))[:, samples.segment[at]]
     # Blocks that cut a line must not make two legs of it, and their directions differ by rounding.
     other = (np.abs(np.diff(limits)) > SAME * limits[:, 1:]).any(axis=0) & (joint[1:] < 0)
     change = (np.diff(run) != 0) | (np.diff(joint) != 0) | other
@@ -138,13 +136,6 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
         run=run[leg],
         begin=np.where(turns[:-1], begin[before], begin[leg]),
     )
-
-
-def _block_limits(toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """Limits v, a, j (3, M) along every segment; with a, filters round full stops within the tolerance."""
-    v, a, j = block_limits(toolpath, machine)
-    tolerance = lesser_end(toolpath.tolerance)
-    return np.stack([v, filter_error.at_stops(a, tolerance, toolpath.held, machine), j])
 
 
 @njit(cache=True, error_model="numpy")

@@ -15,13 +15,13 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import filter_error, normal_limit
+from planner.constraints import normal_limit
 from planner.corners import kinematic as corner
 from planner.corners.allocation import error_rate
 from planner.corners.sharing import share_legs
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.legs import Legs
-from planner.geometry.toolpath import Joint, Toolpath, lesser_end
+from planner.geometry.toolpath import Joint, Toolpath
 from planner.lookahead.corner_pieces import ARC_RAMP
 from planner.lookahead.look_ahead import capped, needed
 from planner.lookahead.passage import LegLimits, Passage
@@ -38,13 +38,8 @@ EASE_MIN = 1e-12
 
 
 def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
-    """Limits of the legs of a path of lines, and of arcs between full stops.
-
-    The acceleration a is one with which filters round full stops within the tolerance (constraints/filter_error.py).
-    """
+    """Limits of the legs of a path of lines, and of arcs between full stops."""
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
-    tolerance = toolpath.tolerance[path.first]
-    a = filter_error.at_stops(a, lesser_end(tolerance), toolpath.held[path.first[:-1]], machine)
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
     j = np.where(turning > 0.0, np.minimum(j, a / ARC_RAMP), j)

@@ -28,7 +28,7 @@ from planner.geometry.extrusion import Extrusion, extruding_part
 
 
 def lesser_end(at_joints: FloatArray) -> FloatArray:
-    """(M,) the smaller of the values (M+1,) at the two ends of each segment."""
+    """(M,) the smaller of the two values at the ends of each segment, of those `at_joints` (M+1,)."""
     lesser: FloatArray = np.minimum(at_joints[:-1], at_joints[1:])
     return lesser
 

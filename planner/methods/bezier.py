@@ -22,7 +22,7 @@ from planner.corners.smooth import SmoothPath, exact_stops, round_corners
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
 from planner.job.job import Job
-from planner.job.method import Method
+from planner.job.method import CLOSED_FORM_WAYS, Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, corner_chain
@@ -55,7 +55,7 @@ class BezierMethod(Method):
     corner: BezierCorner = field(default_factory=BezierCorner)
     allocate: bool = True
 
-    ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
+    ways = CLOSED_FORM_WAYS
 
     @property
     def keeps_tolerance(self) -> bool:

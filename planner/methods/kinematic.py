@@ -29,7 +29,7 @@ from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import Job
-from planner.job.method import Method
+from planner.job.method import CLOSED_FORM_WAYS, Method
 from planner.job.plan import Plan
 from planner.job.records import CornerTable, Tables
 from planner.lookahead.corner_pieces import along_axes, corner_pieces
@@ -60,7 +60,7 @@ class KinematicMethod(Method):
     start_stop: float = 0.0
     short_segment: float = 1.0
 
-    ways = ((1.0, 0.7), (1.0, 0.5), (0.5, 0.5), (0.5, 0.35), (0.5, 0.25), (0.1, 0.5), (0.1, 0.25))
+    ways = CLOSED_FORM_WAYS
 
     def __post_init__(self) -> None:
         if not 0 <= self.start_stop < np.inf:

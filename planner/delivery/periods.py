@@ -16,7 +16,8 @@ and speeds up along another.
    `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs beside it only where this was
    not enough. Where the chords alone would use nearly all of the tolerance, the corner becomes a full stop.
 3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error after all. If the verdict
-   finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the tolerance of the block.
+   finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the tolerance of the block;
+   where that is not enough, it takes what the worst phase of the samples shows at the vertices inside.
 """
 
 from __future__ import annotations
@@ -226,15 +227,19 @@ def with_less_tolerance(
 
 
 def with_less_inside(
-    planned: Toolpath, programmed: Toolpath, line: int, ratio: float, again: int
+    planned: Toolpath, programmed: Toolpath, line: int, ratio: float, far: FloatArray, again: int
 ) -> Toolpath | None:
     """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are `ratio` times the
-    tolerance off while they keep it at the vertices for all that `missed` sees; None where next to nothing would be left.
+    tolerance off while they keep it at the corners for all that `missed` sees; None where next to nothing would be left.
 
+    far   : by how much chords miss the vertices (M+1,) in the worst phase of the samples [mm]: where the path turns slowly, that counts
+            from the second time on
     again : how often it is subtracted, from 1
     """
     segment = np.flatnonzero(planned.line == line)
     joints = np.union1d(segment, segment + 1)
+    if again > 1:
+        ratio = max(ratio, float((far[joints] / programmed.tolerance[joints]).max(initial=0.0)))
     tolerance = planned.tolerance.copy()
     by = max(1.0 - again * REDUCED_INSIDE * (ratio - 1.0), 0.5)
     tolerance[joints] *= by

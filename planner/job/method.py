@@ -155,7 +155,7 @@ class Method(ABC):
                 less = periods.with_less_tolerance(planned, programmed, near, far, times, beside)
                 if less is None and made.verdict is not None and (worst := _worst(made.verdict)) is not None:
                     times_inside = max(again - CORNER_ROUNDS, 1)
-                    less = periods.with_less_inside(planned, programmed, *worst, times_inside)
+                    less = periods.with_less_inside(planned, programmed, *worst, far, times_inside)
             if less is None:
                 break
             planned = less

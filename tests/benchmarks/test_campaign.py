@@ -226,11 +226,29 @@ FOUND = (
     55117,
     74537,
     78278,
+    85505,
 )
 # Laws that were broken: shaped motions that took a bow from the limits; full stops where a line goes on; a spline made by rounding;
 # feeds behind a shaper that were held to the slower of two blocks at a corner; chords that leave an exact path; curves behind
-# long filters; arcs that were slowed down with a corner beside them.
-FOUND_LAWS = (8190, 21810, 22340, 19330, 22330, 17570, 46550, 45000, 52710, 25060, 33240, 28770, 48660)
+# long filters; arcs that were slowed down with a corner beside them; curves behind a shaper; legs between full stops behind filters.
+FOUND_LAWS = (
+    8190,
+    21810,
+    22340,
+    19330,
+    22330,
+    17570,
+    46550,
+    45000,
+    52710,
+    25060,
+    33240,
+    28770,
+    48660,
+    37860,
+    65790,
+    72170,
+)
 # The same, of draws of before: as `python -m benchmarks campaign --show SEED` writes a job.
 FOUND_JOBS = json.loads((Path(__file__).parent / "found_jobs.json").read_text(encoding="utf-8"))
 

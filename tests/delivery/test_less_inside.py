@@ -46,14 +46,28 @@ def test_on_a_spline_the_chords_of_long_periods_keep_the_tolerance() -> None:
 
 def test_only_the_blocks_of_the_line_lose_tolerance_and_more_so_every_round() -> None:
     path = toolpath_from_program(parse_program(LINES, MACHINE), MACHINE)
-    less = [with_less_inside(path, path, 3, 1.01, again) for again in (1, 2)]
+    near = np.zeros(len(path) + 1)
+    less = [with_less_inside(path, path, 3, 1.01, near, again) for again in (1, 2)]
     kept = [made.tolerance / path.tolerance for made in less if made is not None]
     np.testing.assert_allclose(kept, [[1, 0.98, 0.98, 1, 1], [1, 0.96, 0.96, 1, 1]])
-    thin = with_less_inside(path, path, 3, 1.4, 1)
+    thin = with_less_inside(path, path, 3, 1.4, near, 1)
     while thin is not None and thin.tolerance.min() > 2 * LEFT_MIN * path.tolerance.min():
-        thin = with_less_inside(thin, path, 3, 1.4, 1)
+        thin = with_less_inside(thin, path, 3, 1.4, near, 1)
     assert thin is not None
-    assert with_less_inside(thin, path, 3, 1.4, 1) is None
+    assert with_less_inside(thin, path, 3, 1.4, near, 1) is None
+
+
+def test_what_the_worst_phase_shows_of_a_block_counts_from_the_second_time_on() -> None:
+    """Found by the campaign of random jobs: along a hook of a spline, of 1 um, chords missed vertices by 1.03 of their budget, by 1.9
+    in the worst phase, and eight rounds took too little of the tolerance."""
+    path = toolpath_from_program(parse_program(LINES, MACHINE), MACHINE)
+    far = np.array([9.0, 1.0, 1.1, 9.0, 9.0]) * path.tolerance  # that of line 3 ends at vertices 1 and 2
+    kept = [
+        less.tolerance[2] / path.tolerance[2]
+        for again in (1, 2)
+        if (less := with_less_inside(path, path, 3, 1.01, far, again)) is not None
+    ]
+    np.testing.assert_allclose(kept, [0.98, 0.6])
 
 
 def test_chords_that_eq_18_bounds_above_what_any_phase_shows_get_less_of_the_tolerance() -> None:
@@ -122,7 +136,7 @@ def test_chords_on_an_arc_have_the_budget_of_the_arc_not_that_of_its_corners() -
         return float(remaining_budget(samples)[on_arc].min())
 
     assert budget(_less(path, 2)) == pytest.approx(budget(path))
-    inside = with_less_inside(path, path, 3, 1.1, 1)
+    inside = with_less_inside(path, path, 3, 1.1, np.zeros(len(path) + 1), 1)
     assert inside is not None
     np.testing.assert_allclose(inside.along / path.along, [1, 0.8, 1, 1])
     assert budget(inside) == pytest.approx(0.8 * budget(path))

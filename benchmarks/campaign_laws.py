@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from planner.base.arrays import Array
+from planner.geometry.build import ZERO_LENGTH
 from planner.machine import Axis, Machine
 from planner.machine.parts import MAGNITUDE_MAX
 from planner.nc.program import Kind, PathControl, Program, SplineTable
@@ -60,7 +62,7 @@ def changed(program: Program, machine: Machine, tolerance: float | None, rng: Rn
     if law == "mirror":
         return Changed(law=law, program=mirrored(program), machine=machine, tolerance=tolerance)
     if law == "reverse":
-        if len(np.unique(program.path_control)) > 1:
+        if len(np.unique(program.path_control)) > 1 or not (tolerance or _ends_alike(program)):
             return None
         return Changed(law=law, program=reversed_program(program), machine=machine, tolerance=tolerance)
     if law == "split":
@@ -136,9 +138,11 @@ def mirrored(program: Program) -> Program:
 
 
 def reversed_program(program: Program) -> Program:
-    """The way back: path control and tolerance of a joint, which its block before says, stay those of the joint."""
+    """The way back: path control and tolerance of a joint, which the last block says that moves before it, stay those of the joint."""
     position = np.vstack([program.start, program.end])
     count = len(program)
+    says = _moving_before(program)
+    control, joint_tolerance = program.path_control[says], program.tolerance[says]
     arc_end = position[program.arc_block + 1]
     center = program.arc_center.copy()
     rows = np.arange(len(center))
@@ -158,13 +162,28 @@ def reversed_program(program: Program) -> Program:
             points=table.points[::-1, ::-1],
             weights=table.weights[::-1, ::-1],
         ),
-        path_control=np.append(program.path_control[-2::-1], program.path_control[-1:]),
-        tolerance=np.append(program.tolerance[-2::-1], program.tolerance[-1:]),
+        path_control=np.append(control[-2::-1], control[-1:]),
+        tolerance=np.append(joint_tolerance[-2::-1], joint_tolerance[:1]),
         events=(),
         frame=np.zeros(0, dtype=np.int32),
         frames=(),
         **{name: getattr(program, name)[::-1] for name in ("kind", "feed", "dwell", "line")},
     )
+
+
+def _moving_before(program: Program) -> Array:
+    """(B,) the last block up to each that moves; for those before the first one that one."""
+    position = np.vstack([program.start, program.end])
+    moves = np.linalg.norm(np.diff(position, axis=0), axis=1) > ZERO_LENGTH
+    moves[program.arc_block] = moves[program.splines.block] = True
+    last = np.maximum.accumulate(np.where(moves, np.arange(len(program)), -1))
+    return np.where(last < 0, moves.argmax(), last)
+
+
+def _ends_alike(program: Program) -> bool:
+    """Whether the last two blocks that move have the same tolerance: the way back has that of the joint between them at its start."""
+    said = program.tolerance[np.unique(_moving_before(program))]
+    return bool(np.array_equal(said[-2:-1], said[-1:], equal_nan=True)) or len(said) < 2
 
 
 def split(program: Program, rng: Rng) -> Program | None:

@@ -165,6 +165,7 @@ def after_filters(
     faults = [check.sentence(toolpath.axes)] if check.broken else []
     faults += apart.vertex_faults(toolpath)
     faults += findings.order(looks, toolpath, pieces)[2]
+    faults = faults or findings.out_of_order(looks, toolpath, pieces)
     return AfterFilters(
         contour=check,
         vertex=apart.vertex_check(toolpath),

@@ -11,7 +11,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import in_degrees
 from planner.verify import limits as rows
-from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER
+from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verify.stream import Limits, Observed
 from planner.verify.verdict import LimitCheck
@@ -220,6 +220,18 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple
             said.append("order: " + look.noted(held))
         in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
     return np.unique(pieces.piece["segment"][lost]), in_order, said
+
+
+def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:
+    """What is wrong with a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
+    been at the one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
+    for look in looks:
+        at = int(look.seen.match.tally[STUCK_AT])
+        if at != NOT_LOST:
+            line = line_of(toolpath, pieces, at - 1)
+            said = f"near enough to all of the path, but not in its order, at the end of line {line}"
+            return ["order: the motion is " + look.noted(said)]
+    return []
 
 
 def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:

@@ -75,6 +75,10 @@ def verify(
     contour_check = apart.contour_check(toolpath)
     end_error, end_faults = findings.end_error(looks, toolpath, limits.rounding)
     lost, order, order_faults = findings.order(looks, toolpath, pieces)
+    vertex_faults = apart.vertex_faults(toolpath)
+    if not (contour_check.broken or vertex_faults or order_faults):
+        order_faults = findings.out_of_order(looks, toolpath, pieces)
+        order = not order_faults
     coarse, notes = samples.digits(trajectory, limits, given, not_limited)
     if motion is None:
         seen = max(contour_error or 0.0, vertex_error or 0.0)
@@ -86,7 +90,7 @@ def verify(
     faults += findings.column_faults(looks, limits, toolpath, pieces)
     faults += end_faults + samples.rest_faults(reader.delivered, looks, limits)
     faults += [contour_check.sentence(toolpath.axes)] if contour_check.broken else []
-    faults += apart.vertex_faults(toolpath)
+    faults += vertex_faults
     faults += order_faults
     faults += findings.stop_faults(looks, toolpath, pieces)
     faults += exact_faults(trajectory, looks, toolpath, limits)

@@ -56,8 +56,8 @@ STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding
 
 TRACK = np.dtype([("low", "f8"), ("new", "f8"), ("lost", "?")])
 PASSED = np.dtype([("near", "f8"), ("near_time", "f8"), ("rest", "f8"), ("stop_ratio", "f8")])
-FIRST, LAST, JUMPS, SEARCHED, HELD, LOST_AFTER, ASTRAY = range(7)  # in Match.tally
-NOT_LOST = -1  # in tally[LOST_AFTER]
+FIRST, LAST, JUMPS, SEARCHED, HELD, LOST_AFTER, ASTRAY, STUCK_AT = range(8)  # in Match.tally
+NOT_LOST = -1  # in tally[LOST_AFTER] and tally[STUCK_AT]
 BEFORE, POINT, WORST_AT = range(3)  # in Match.place
 
 
@@ -67,8 +67,9 @@ class Match(NamedTuple):
     track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
     passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to
              stop: rest = standstill there [s], stop_ratio = how well it stops, <= 1 if within what samples can show
-    tally  : (7,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the last piece that was
-             possible when the motion was lost first, or NOT_LOST; 1 while it is lost
+    tally  : (8,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the last piece that was
+             possible when the motion was lost first, or NOT_LOST; 1 while it is lost; the vertex at which the motion did not fit
+             into the budgets first, or NOT_LOST
     place  : (3, A) the sample before, the present one, the worst one [mm]
     worst  : (6,) of the worst sample that is not lost: ratio, distance [mm], budget [mm], time [s], piece; largest distance of
              any [mm]
@@ -86,8 +87,8 @@ def new_match(pieces: ProgramPieces) -> Match:
     vertices, axes = pieces.vertex.shape
     track, passed = np.zeros(vertices - 1, dtype=TRACK), np.zeros(vertices, dtype=PASSED)
     track["low"] = passed["near"] = passed["stop_ratio"] = np.inf
-    tally = np.zeros(7, dtype=np.int64)
-    tally[LOST_AFTER] = NOT_LOST
+    tally = np.zeros(8, dtype=np.int64)
+    tally[LOST_AFTER] = tally[STUCK_AT] = NOT_LOST
     return Match(
         track=track,
         passed=passed,
@@ -166,9 +167,11 @@ def _step(
     widen, widen_vertex = 1.0, 1.0
     for attempt in range(BISECTIONS + 4):
         late = attempt > 0
-        first, last, distance, i, feed = _column(
+        first, last, distance, i, feed, stuck = _column(
             pieces, match, before, point, time, widen, widen_vertex, late
         )
+        if attempt == 0 and first > last and match.tally[STUCK_AT] == NOT_LOST:
+            match.tally[STUCK_AT] = stuck
         if attempt <= 1:  # 0: as it should be, 1: a vertex missed by little
             if first <= last:
                 break
@@ -205,13 +208,14 @@ def _column(
     widen: float,
     widen_vertex: float,
     late: bool,
-) -> tuple[int, int, float, int, float]:
+) -> tuple[int, int, float, int, float, int]:
     """Which pieces `point` can lie on, into match.track.new. The one step of the sweep.
 
     widen, widen_vertex : factors on the budgets of samples and vertices
     late                : a vertex counts as passed if any earlier chord came near enough
 
-    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed
+    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed, and the vertex
+       that was not passed
     """
     track, passed = match.track, match.passed
     i, last_before = match.tally[FIRST], match.tally[LAST]
@@ -244,7 +248,7 @@ def _column(
                 leave = earliest
         entry = leave
         i += 1
-    return first, last, nearest, best, feed
+    return first, last, nearest, best, feed, i
 
 
 @kernel()

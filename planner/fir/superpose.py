@@ -128,6 +128,8 @@ def _superpose(command, t_out, state, first_out):
             if passed[3] < high:
                 for c in range(axes):
                     state[3, n, c] = now[3, c]
+                    if short:  # or what its jerk adds to the acceleration would be missing up to the next superposition
+                        state[2, n, c] = now[2, c] - now[3, c] * (at - emitted)
                 if not short:
                     t_out[n], emitted = command.begin[k] + at, at
                     for m in range(3):

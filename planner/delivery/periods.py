@@ -50,7 +50,7 @@ ABOVE = 2e-3
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
-# Of an excess inside a block by so many times, and `again` times that: its chords have a share of the tolerance only, and some methods
+# Of an excess inside a block by so many times: its chords have a share of the tolerance only, and some methods
 # use it in steps.
 REDUCED_INSIDE = 2.0
 # A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
@@ -227,21 +227,21 @@ def with_less_tolerance(
 
 
 def with_less_inside(
-    planned: Toolpath, programmed: Toolpath, line: int, ratio: float, far: FloatArray, again: int
+    planned: Toolpath, programmed: Toolpath, line: int, ratio: float, far: FloatArray, times: float
 ) -> Toolpath | None:
     """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are `ratio` times the
     tolerance off while they keep it at the corners for all that `missed` sees; None where next to nothing would be left.
 
     far   : by how much chords miss the vertices (M+1,) in the worst phase of the samples [mm]: where the path turns slowly, that counts
-            from the second time on
-    again : how often it is subtracted, from 1
+            if more than once is subtracted
+    times : how often what is too much is subtracted [-], as in `with_less_tolerance`
     """
     segment = np.flatnonzero(planned.line == line)
     joints = np.union1d(segment, segment + 1)
-    if again > 1:
+    if times > 1.0:
         ratio = max(ratio, float((far[joints] / programmed.tolerance[joints]).max(initial=0.0)))
     tolerance = planned.tolerance.copy()
-    by = max(1.0 - again * REDUCED_INSIDE * (ratio - 1.0), 0.5)
+    by = max(1.0 - times * REDUCED_INSIDE * (ratio - 1.0), 0.5)
     tolerance[joints] *= by
     if not len(joints) or (tolerance[joints] < LEFT_MIN * programmed.tolerance[joints]).any():
         return None

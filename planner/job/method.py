@@ -28,7 +28,8 @@ from planner.verify import ThreadCheck, Verdict
 # elsewhere, but what one phase may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
 # From the arcs beside corners it is taken where a round for the corners changed nothing, or after so many of them; inside blocks it is
-# more and more from then on (without that the verdict of 53750 of the campaign fails).
+# more and more from then on (without that the verdict of 53750 of the campaign fails). Where a round changed nothing the next one takes
+# twice as much.
 CORNER_ROUNDS = 4
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
@@ -154,8 +155,8 @@ class Method(ABC):
                 beside = same or again > CORNER_ROUNDS
                 less = periods.with_less_tolerance(planned, programmed, near, far, times, beside)
                 if less is None and made.verdict is not None and (worst := _worst(made.verdict)) is not None:
-                    times_inside = max(again - CORNER_ROUNDS, 1)
-                    less = periods.with_less_inside(planned, programmed, *worst, far, times_inside)
+                    times *= max(again - CORNER_ROUNDS, 1)
+                    less = periods.with_less_inside(planned, programmed, *worst, far, times)
             if less is None:
                 break
             planned = less

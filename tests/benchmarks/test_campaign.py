@@ -174,6 +174,7 @@ FOUND = (
     85505,
     89558,
     90945,
+    97308,
 )
 # Laws that were broken: shaped motions that took a bow from the limits; full stops where a line goes on; a spline made by rounding;
 # feeds behind a shaper that were held to the slower of two blocks at a corner; chords that leave an exact path; curves behind

@@ -71,8 +71,8 @@ def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):
 
 
 def test_edges_that_close_within_rounding_lose_nothing():
-    """Found by the campaign of random jobs: of a piece of 0.3 ps that was left out the change of the acceleration was left out, too; 42 ms
-    later the motion jumped by 1.6e-9 mm, in which a verdict saw 1.0005 of the jerk."""
+    """Found by the campaign of random jobs: of a piece of 0.3 ps that was left out the change of the acceleration was left out, too; 42
+    ms later the motion jumped by 1.6e-9 mm, in which a verdict saw 1.0005 of the jerk."""
     T1, T2, speed = 0.04, 3e-4, 50.0
     lasting = np.array([T1 + 3e-13, 0.2])  # the first leg ends when its first edge leaves T1
     x = np.append(0.0, np.cumsum(speed * lasting))

@@ -50,8 +50,7 @@ ABOVE = 2e-3
 # Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
 # long, eq. (20).
 REDUCED_BY = 1.5
-# Of an excess inside a block by so many times: its chords have a share of the tolerance only, and some methods
-# use it in steps.
+# Of an excess inside a block by so many times: its chords have a share of the tolerance only, and some methods use it in steps.
 REDUCED_INSIDE = 2.0
 # A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1

@@ -5,7 +5,8 @@ it went on by a vertex passed too late, a sample may be nearer to the next piece
 nothing is known. Such a motion is read again with 4, 16 and 64 times the tolerance, until it fits: among all pieces that can be
 reached in order within that, the nearest to every sample is found, and the checks compare with the tolerance as it is. A motion that
 does not fit then has no distance from the path: None. To fit into a widened tolerance means to use half of it: a detour of all of it
-would leave only its tip to pass the vertex at.
+would leave only its tip to pass the vertex at. What fits there by less than the tolerance as it is came near to two vertices in the
+wrong order, which is a fault (findings.out_of_order).
 """
 
 from __future__ import annotations

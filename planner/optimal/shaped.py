@@ -31,6 +31,7 @@ import numpy as np
 from planner.base.errors import InputError, NotSolvedError
 from planner.constraints import normal_limit
 from planner.feedrate.solution import Status
+from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.job.job import BOLDER, FILTERS, Job
 from planner.job.plan import Plan
@@ -67,7 +68,7 @@ CANDIDATES = (
     Candidate(np.inf, 1.75, 0.5, True),
     Candidate(np.inf, 1.75, 0.5, False),
 )
-STOPPING = Candidate(0.0, 1.0, 0.5, False)
+STOPPING = Candidate(COLLINEAR_ANGLE, 1.0, 0.5, False)
 # What the verdict may see of a limit above it, between the places where D was looked at [-]: 9e-3 of a jerk on a random job.
 SEEN_MOST = 0.05
 
@@ -101,7 +102,7 @@ class _Search:
     def __init__(self, job: Job, settings: Settings):
         self.job, self.settings, self.shaper = job, settings, shaper_of(job.machine.modes)
         self.best: Shaped | None = None
-        self._stopping = dataclasses.replace(job, toolpath=_stopping(job.toolpath, 0.0))
+        self._stopping = dataclasses.replace(job, toolpath=_stopping(job.toolpath, STOPPING.sharp))
         stops = int((self._stopping.toolpath.joint[1:] == Joint.STOP).sum())
         self._least = job.line_stop_time + self.shaper.length * stops
 

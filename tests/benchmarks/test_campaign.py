@@ -196,6 +196,7 @@ FOUND_LAWS = (
     37860,
     65790,
     72170,
+    28340,
 )
 # The same, of draws of before: as `python -m benchmarks campaign --show SEED` writes a job.
 FOUND_JOBS = json.loads((Path(__file__).parent / "found_jobs.json").read_text(encoding="utf-8"))

@@ -115,6 +115,24 @@ def five_points_machine() -> Machine:
     return machine(velocity=1e3, acceleration=1e6, jerk=1e10, dt=0.004, normal_acceleration=1e4)
 
 
+def random_axes(
+    rng: np.random.Generator,
+    *,
+    velocity: tuple[float, float],
+    acceleration: tuple[float, float],
+    jerk: tuple[float, float],
+) -> dict[str, Axis]:
+    """x, y and z with limits of their own, log-uniform between the powers of ten that are given."""
+    return {
+        letter: Axis(
+            velocity=10 ** rng.uniform(*velocity),
+            acceleration=10 ** rng.uniform(*acceleration),
+            jerk=10 ** rng.uniform(*jerk),
+        )
+        for letter in "xyz"
+    }
+
+
 def random_polyline(
     rng: np.random.Generator,
     *,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
-from planner.machine import Axis, Machine
+from planner.machine import Machine
 from planner.methods.bezier import BezierMethod
 from planner.methods.registry import plan
 from planner.methods.stop import StopMethod
@@ -171,14 +171,7 @@ def test_a_corner_is_run_through_only_where_that_is_faster():
 def test_random_paths_are_verified_and_never_slower_than_stopping(seed, dims):
     """Limits of their own per axis, legs of 10 um to 100 mm, turns of all sizes."""
     rng = np.random.default_rng(seed)
-    axes = {
-        k: Axis(
-            velocity=10 ** rng.uniform(1, 3),
-            acceleration=10 ** rng.uniform(2.5, 4),
-            jerk=10 ** rng.uniform(4, 6.5),
-        )
-        for k in "xyz"
-    }
+    axes = problems.random_axes(rng, velocity=(1, 3), acceleration=(2.5, 4), jerk=(4, 6.5))
     program = problems.random_polyline(rng, blocks=int(rng.integers(2, 25)), dimensions=dims, longest=100.0)
     made = bezier(program, problems.machine(tolerance=10 ** rng.uniform(-2, -0.5), axes=axes))
     assert made.trajectory.cycle_time <= made.stop_time * (1 + 1e-6)

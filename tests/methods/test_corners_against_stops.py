@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import problems
-from planner.machine import Axis, Machine
+from planner.machine import Machine
 from planner.machine.parts import Fir
 from planner.methods.bezier import BezierMethod
 from planner.methods.kinematic import KinematicMethod
@@ -17,14 +17,7 @@ from planner.nc.program import Program
 def random_job(seed: int) -> tuple[Program, Machine]:
     """Lines on a machine with one to three filters of 3 to 30 ms and a tolerance of 2 to 100 um."""
     rng = np.random.default_rng(seed)
-    axes = {
-        letter: Axis(
-            velocity=10 ** rng.uniform(2, 3),
-            acceleration=10 ** rng.uniform(3, 4.5),
-            jerk=10 ** rng.uniform(5, 7),
-        )
-        for letter in "xyz"
-    }
+    axes = problems.random_axes(rng, velocity=(2, 3), acceleration=(3, 4.5), jerk=(5, 7))
     filters = Fir(time_constants=tuple(10 ** rng.uniform(-2.5, -1.5, size=int(rng.integers(1, 4)))))
     machine = problems.machine(tolerance=10 ** rng.uniform(-2.7, -1), axes=axes, fir=filters)
     blocks, dims = int(rng.integers(2, 12)), int(rng.integers(2, 4))

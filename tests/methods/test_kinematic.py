@@ -14,7 +14,6 @@ from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import arc_point, arc_sagitta, chorded
 from planner.geometry.toolpath import Joint
-from planner.machine import Axis
 from planner.methods.kinematic import CHORD_FRACTION, KinematicMethod
 from planner.methods.registry import plan
 from planner.methods.stop import StopMethod
@@ -87,16 +86,9 @@ def test_times_of_the_shared_jobs():
 def test_random_paths_are_verified_and_never_slower_than_stopping(seed):
     """Two or three axes with limits of their own, legs of 10 um to 100 mm, turns of all sizes."""
     rng = np.random.default_rng(seed)
-    axes = {
-        letter: Axis(
-            velocity=10 ** rng.uniform(1, 3),
-            acceleration=10 ** rng.uniform(2, 4),
-            jerk=10 ** rng.uniform(3.5, 6.5),
-        )
-        for letter in "xyz"
-    }
+    axes = problems.random_axes(rng, velocity=(1, 3), acceleration=(2, 4), jerk=(3.5, 6.5))
     machine = problems.machine(
-        tolerance=10 ** rng.uniform(-2.8, -0.5),  # a dt^2/8 and more: see leg_limits
+        tolerance=10 ** rng.uniform(-2.8, -0.5),  # a dt^2/8 and more
         axes=axes,
         **({"normal_acceleration": 10 ** rng.uniform(2, 4)} if rng.random() < 0.3 else {}),
     )

@@ -13,6 +13,7 @@ from planner.nc.language import frames
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import cycles as heidenhain_cycles
+from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
 from planner.nc.language.making import Maker, Making, Row
 from planner.nc.language.siemens import cycles as siemens_cycles
 from planner.nc.language.travel_rows import at_place, in_plane
@@ -21,7 +22,13 @@ from planner.nc.program import Kind
 
 def compensate(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """Radius compensation: side 1 left, -1 right, 0 off."""
-    making.travel.compensate(round(given["side"]))
+    making.travel.compensate(round(given["side"]), making.note)
+    return []
+
+
+def _oversize(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """DR of a tool call, by which the tool's radius is larger than in its table until the next call."""
+    making.travel.oversize = given["DR"] * making.unit
     return []
 
 
@@ -44,7 +51,7 @@ def _approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
         compensated=given["side"] != 0.0,
     )
     found.check("APPR")
-    making.travel.approach(found)
+    making.travel.approach(found, making.note)
     return []
 
 
@@ -133,6 +140,11 @@ def _back(making: Making, rows: list[Row]) -> list[Row]:
     return rows[1:] if absolute else [*rows, [("G", 91.0)]]
 
 
+def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """A conversational move with a coordinate that the plane of the pole in force does not allow. Raises ValueError."""
+    raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
+
+
 def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """DEP of a kind (index in KINDS), with X Y Z, LEN, R, CCA and F."""
     unit, end = making.unit, np.array(making.here())
@@ -184,10 +196,12 @@ _FLAT = 1e-9  # relative, below which three points are on a line
 
 MAKERS: dict[str, Maker] = {
     "compensate": compensate,
+    "oversize": _oversize,
     "approach": _approach,
     "depart": depart,
     "siemens frame": frames.siemens,
     "heidenhain frame": frames.heidenhain,
+    "out of plane": out_of_plane,
     "keep": keep,
     "bring back": bring_back,
     **siemens_cycles.MAKERS,

@@ -42,7 +42,9 @@ from planner.nc.lexer import Words
 _PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
 _ENDS = (2.0, 30.0)
 # G codes behind which the position is asked of the interpreter.
-_PLACING = frozenset((43.0, 43.1, 49.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3))
+_PLACING = frozenset(
+    (10.0, 43.0, 43.1, 43.2, 49.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3)
+)
 # G codes that leave the position and the coordinates as they are.
 _NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0, 96.0, 97.0))
 _EVEN = 1e-9  # relative error of a frame that still counts as even
@@ -134,8 +136,10 @@ class RowsThrough(Coordinates):
         for code in codes & {0.0, 1.0, 2.0, 3.0}:
             self.motion = int(code)
         for code in own & _PLANES.keys():
-            if self.compensated and _PLANES[code] != self.normal:
-                raise ValueError("the plane changes while cutter radius compensation is on")
+            if _PLANES[code] != self.normal:
+                if self.compensated:
+                    raise ValueError("the plane changes while cutter radius compensation is on")
+                self._no_corner()
             self.normal = _PLANES[code]
         if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from planner.base.arrays import FloatArray
 from planner.nc.language.approach import Approach, Departure
 from planner.nc.language.corner_moves import CornerMove
@@ -10,16 +12,24 @@ from planner.nc.language.rows_through import RowsThrough
 
 
 class Travel(RowsThrough):
-    """The frame and the compensation in force, and the commands that change them."""
+    """The frame and the compensation in force, and the commands that change them.
+
+    oversize : by which the loaded tool's radius is larger than its table says [mm]
+    """
+
+    oversize = 0.0
 
     def position(self) -> FloatArray:
         """(3,) the programmed position [mm]."""
         return self.place.copy() if self.active else self.interpreter.state.programmed()
 
     def radius(self) -> float:
-        """Radius of the loaded tool [mm], 0 where the machine file gives none."""
+        """Radius of the loaded tool [mm], 0 where neither the program nor the machine file gives one. Raises ValueError."""
         tool = self.interpreter.state.tools.get(self.interpreter.state.tool_loaded)
-        return 0.0 if tool is None else tool.diameter / 2.0
+        found = (0.0 if tool is None else tool.diameter / 2.0) + self.oversize
+        if found < 0.0:
+            raise ValueError(f"the tool's radius and DR are together {found:g} mm")
+        return found
 
     def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
         """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
@@ -30,8 +40,11 @@ class Travel(RowsThrough):
         self.matrix, self.shift = matrix, shift
         self.place = self.unmapped(self._mapped)
 
-    def compensate(self, side: int) -> None:
-        """Switch compensation on, to the left (1) or right (-1) of the path, or off (0). Raises ValueError."""
+    def compensate(self, side: int, assume: Callable[[str], None]) -> None:
+        """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what is assumed.
+
+        Raises ValueError.
+        """
         self._no_corner()
         if side == 0:
             if self._approach is not None:
@@ -48,24 +61,30 @@ class Travel(RowsThrough):
                     "the side of compensation changes between two moves; switch it off before (R0, G40)"
                 )
             return
-        radius = self.radius()
+        radius = self._known_radius(assume)
         if radius == 0.0:
-            number = self.interpreter.state.tool_loaded
-            self.interpreter.note(
-                f"tool {number} has no diameter in the machine file: radius compensation does not move the path",
-                0,
-            )
             return
         self._begin()
         self._offset = OffsetMoves(self._mapped, radius, side, self.normal)
 
-    def approach(self, approach: Approach) -> None:
+    def _known_radius(self, assume: Callable[[str], None]) -> float:
+        """Radius of the tool that compensates [mm]; where it is 0 that is said."""
+        radius = self.radius()
+        if radius == 0.0:
+            number = self.interpreter.state.tool_loaded
+            assume(
+                f"tool {number} has no diameter in the machine file: radius compensation does not move the path"
+            )
+        return radius
+
+    def approach(self, approach: Approach, assume: Callable[[str], None]) -> None:
         """APPR: the contour begins at a point; the way to it is known with its first move. Raises ValueError."""
         self._no_corner()
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
         self._begin()
-        approach.begin(self._mapped, self.mapped(approach.first), self.motion, self.radius(), self.mirrored)
+        radius = self._known_radius(assume) if approach.compensated else 0.0
+        approach.begin(self._mapped, self.mapped(approach.first), self.motion, radius, self.mirrored)
         approach.scale = self.scale()
         self._approach = approach
         self.place, self._mapped = approach.first.copy(), self.mapped(approach.first)

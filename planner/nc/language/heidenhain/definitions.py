@@ -6,7 +6,7 @@ import re
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.heidenhain import contour, cycles, drilling, patterns
-from planner.nc.language.heidenhain.flow import Flow
+from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.items import looked_up, word
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, of, own, parameter, value
@@ -25,6 +25,26 @@ from planner.nc.language.tree import (
 )
 
 _PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
+_VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q\d+))"
+_LENGTHS, _OVERSIZE = r"\s*(L|R)(?=[-+.\dQ\s])", r"\s*(DL|DR2|DR)(?=[-+.\dQ\s])"
+_TOOL_DEF = re.compile(rf"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?((?:\s*[LR]{_VALUE})*)\s*$", re.IGNORECASE)
+_TOOL_CALL = re.compile(
+    r"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?"
+    rf"((?:\s*(?:DL|DR2|DR){_VALUE})*)\s*$",
+    re.IGNORECASE,
+)
+
+
+def _named(block: ConversationalBlock, names: str, start: int, end: int) -> dict[str, Expression]:
+    """The values behind names, in a part of a block. Raises ProgramFault for a name that comes twice."""
+    found: dict[str, Expression] = {}
+    while block.text[start:end].strip():
+        name = re.compile(names, re.IGNORECASE).match(block.text, start)
+        assert name is not None
+        if name.group(1).upper() in found:
+            raise block.fault(f"a second {name.group(1).upper()} in this block", start)
+        found[name.group(1).upper()], start = value(block, name.end())
+    return found
 
 
 class Definitions(Flow):
@@ -33,6 +53,8 @@ class Definitions(Flow):
     moves  : path functions, with the feed of the tool call
     unit   : mm per unit of the program
     cycles : numbers of those that the program defines
+    oversizes : a tool call of the program has DR
+    tool_names : numbers of tools that have names
     """
 
     def __init__(self) -> None:
@@ -40,6 +62,8 @@ class Definitions(Flow):
         self.moves = Moves(1.0)
         self.unit = 1.0
         self.cycles: set[int] = set()
+        self.oversizes = False
+        self.tool_names: dict[str, int] = {}
 
     def _begin(self, block: ConversationalBlock, column: int) -> list[Statement]:
         inch = block.text.upper().split()[-1] == "INCH"
@@ -55,37 +79,60 @@ class Definitions(Flow):
         return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
 
     def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        found = re.match(
-            r"\s*(?:(\d+)(?:\.\d+)?|\"[^\"]*\")?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?((?:\s*(?:D[LR]2?|D[LR])[-+=\d.]+)*)\s*$",
-            block.text[column:],
-            re.IGNORECASE,
-        )
+        found = _TOOL_CALL.match(block.text, column)
         if found is None:
-            raise block.fault('TOOL CALL takes a number or "name", the axis Z, S and F', column)
-        tool, axis, _, feed, more = found.groups()
+            raise block.fault('TOOL CALL takes a number or "name", the axis Z, S, F, DL and DR', column)
+        tool = self._tool_number(found.group(1), found.group(2))
+        axis, feed = found.group(3), found.group(5)
         if axis and axis.upper() != "Z":
-            raise block.fault(f"tool axis {axis.upper()}; Z is planned", column + found.start(2))
-        if more and more.strip():
-            raise block.fault(
-                "DL and DR of a tool call are not read; correct the tool's length in the machine file",
-                column + found.start(5),
-            )
+            raise block.fault(f"tool axis {axis.upper()}; Z is planned", found.start(3))
         at = block.place.at
-        words = [word("T", at, Number(float(tool or 0))), word("M", at, Number(6.0))]
-        length = [word("G", at, Number(43.0)), word("H", at, Number(float(tool or 0)))]
-        rows: list[Statement] = (
-            [Line(block.place, tuple(words)), Line(block.place, tuple(length))] if tool else []
-        )
-        if found.group(3):
-            speed, _ = value(block, column + found.start(3))
+        more_of = _named(block, _OVERSIZE, *found.span(6))
+        if more_of.pop("DR2", ZERO) != ZERO:
+            raise block.fault("DR2, of a tool's corner radius, is not read; write 0", found.start(6))
+        if more_of and tool is None:
+            raise block.fault("DL and DR need the number of the tool in their TOOL CALL", found.start(6))
+        rows: list[Statement] = []
+        if tool is not None:
+            number = Number(float(tool))
+            rows.append(Line(block.place, (word("T", at, number), word("M", at, Number(6.0)))))
+            rows.append(Line(block.place, (word("G", at, Number(43.0)), word("H", at, number))))
+            if more_of.get("DL", ZERO) != ZERO:
+                rows.append(Line(block.place, (word("G", at, Number(43.2)), word("Z", at, more_of["DL"]))))
+            if self.oversizes:
+                rows.append(MadeRows(block.place, "oversize", (("DR", more_of.get("DR", ZERO)),)))
+        if found.group(4):
+            speed, _ = value(block, found.start(4))
             rows.append(Line(block.place, (word("S", at, speed),)))
         self.moves.automatic = None
         if feed and feed.upper() != "MAX":
-            self.moves.automatic, _ = value(block, column + found.start(4))
+            self.moves.automatic, _ = value(block, found.start(5))
             rows.append(Line(block.place, (word("F", at, self.moves.scaled(self.moves.automatic)),)))
-        if tool:
+        if tool is not None:
             rows.append(looked_up(block))
         return rows
+
+    def _tool_number(self, number: str | None, name: str | None) -> int | None:
+        """The number of a tool, and one above all others for a tool with a name."""
+        if number:
+            return int(number)
+        return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
+
+    def _tool_data(self, block: ConversationalBlock, column: int) -> list[Statement]:
+        """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool to have ready."""
+        found = _TOOL_DEF.match(block.text, column)
+        if found is None:
+            raise block.fault("TOOL DEF takes the number of a tool, its length L and its radius R", column)
+        data = _named(block, _LENGTHS, *found.span(3))
+        if not data:
+            return []
+        tool = self._tool_number(found.group(1), found.group(2))
+        if tool is None:
+            raise block.fault("TOOL DEF with L or R needs the number of the tool", column)
+        at = block.place.at
+        words = [word("G", at, Number(10.0)), word("L", at, ONE), word("P", at, Number(float(tool)))]
+        words += [word({"L": "Z", "R": "R"}[name], at, given) for name, given in data.items()]
+        return [Line(block.place, tuple(words))]
 
     def _define(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])

@@ -38,7 +38,7 @@ _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
 _FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
 _FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
 _FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}
-_NAMED = 100_000  # number of the first label with a name
+NAMED = 100_000  # number of the first label, and of the first tool, with a name
 
 
 class Flow:
@@ -66,7 +66,7 @@ class Flow:
             raise block.fault('a label is a number or a name: LBL 5, LBL "holes"', column)
         if found.group(1):
             return int(found.group(1)), found.end()
-        return self.names.setdefault(found.group(2), _NAMED + len(self.names)), found.end()
+        return self.names.setdefault(found.group(2), NAMED + len(self.names)), found.end()
 
     def _label_here(self, block: ConversationalBlock, column: int) -> list[Statement]:
         label, _ = self._label(block, column)

@@ -18,7 +18,8 @@ _ITEM = re.compile(
 _ROTARY = ("A", "B", "C")
 X, Y, Z = own("x"), own("y"), own("z")
 POSITION = {"X": X, "Y": Y, "Z": Z}
-POLE = own("cx"), own("cy")
+POLE = own("cx"), own("cy"), own("cz")
+PLANE = own("plane")  # the normal of the pole's plane, 0 to 2
 DIRECTION = own("dx"), own("dy")
 POLAR = own("pr"), own("pa")
 
@@ -107,6 +108,6 @@ def looked_up(block: ConversationalBlock) -> Line:
 
 
 def refuse_arc_axes(block: ConversationalBlock, given: Items) -> None:
-    """Arcs of C, CR and CT lie in the plane. Raises ProgramFault."""
+    """Arcs of CR and CT lie in the working plane, and so do those of C where all poles do. Raises ProgramFault."""
     if "Z" in given.axes:
         raise block.fault("an arc with Z; a helix is written as CP with IPA")

@@ -23,6 +23,7 @@ from planner.nc.language.heidenhain.contour import approach_rows, compensates, d
 from planner.nc.language.heidenhain.definitions import Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
 from planner.nc.language.heidenhain.items import (
+    PLANE,
     POLAR,
     POLE,
     Items,
@@ -38,6 +39,7 @@ from planner.nc.language.heidenhain.items import (
 from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, value
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
+    TWO,
     ZERO,
     Call,
     Expression,
@@ -75,12 +77,18 @@ class HeidenhainParser(Definitions):
         self.faults: list[ProgramFault] = []
         self.skip = False  # the block was read with the one before
         self.compensates = False  # a block of the program has RL, RR, APPR or DEP
+        self.poles = False  # a block of it, or of a program beside it, may set a pole
 
     def parse(self) -> list[Procedure]:
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
         self.compensates = any(compensates(block.text) for block in self.blocks)
+        self.oversizes = any(re.match(r"TOOL CALL.*\bDR", b.text, re.IGNORECASE) for b in self.blocks)
+        poles = [block.text.upper() for block in self.blocks if re.match(r"CC\b", block.text, re.IGNORECASE)]
+        shared = bool(self.file) or any(re.match("CALL PGM", b.text, re.IGNORECASE) for b in self.blocks)
+        self.poles = bool(poles) or shared
+        self.moves.tilted = shared or any("Z" in pole for pole in poles)
         source = self.source
         start = SourcePlace(source.file, 1, source.begin)
         main = self._body(0, len(self.blocks))
@@ -104,6 +112,7 @@ class HeidenhainParser(Definitions):
         if not source.file:
             set_up += [(one, ZERO) for one in (X, Y, Z, *POLE, *POLAR)]
             set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")]
+            set_up.append((PLANE, TWO))
         name = "file" if source.file else ""
         return [Procedure(name, start, [Line(start, (), tuple(set_up)), *main]), *procedures]
 
@@ -185,15 +194,16 @@ class HeidenhainParser(Definitions):
         return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
     def _straight(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        given = items(block, column, turning=self.source.at_tip)
-        before, after, machine = self._codes(block, given)
+        given, name = items(block, column, turning=self.source.at_tip), block.text[:column].upper()
+        before, after, machine = self._codes(block, given, straight=name == "L")
+        if machine and any(relative for _, relative in given.axes.values()):
+            raise block.fault("an incremental coordinate with M91 is not read; write the machine coordinate")
         lines: list[Statement] = [*before, *self._side(block, given)]
-        if block.text[:column].upper() == "LP":
-            found, ends = self.moves.polar_ends(block, given)
-            lines += found
+        if name == "LP":
+            self._need_pole(block)
+            lines += self.moves.polar_line(block, given)
         else:
-            ends = self._ends(block, given)
-        lines += self.moves.straight(block, given, ends, machine)
+            lines += self.moves.straight(block, given, self._ends(block, given), machine)
         return [*lines, *([looked_up(block)] if machine else []), *after]
 
     def _corner(self, k: int, last: int) -> list[Statement]:
@@ -222,13 +232,23 @@ class HeidenhainParser(Definitions):
         before, after, _ = self._codes(block, given)
         before += self._side(block, given)
         if name == "CTP":
-            found, ends = self.moves.polar_ends(block, given)
-            return [*before, *found, *self.moves.tangent_arc(block, given, ends), *after]
+            self._need_pole(block)
+            return [*before, *self.moves.polar_tangent(block, given), *after]
         if name == "CP":
-            return [*before, *self.moves.polar_arc(block, given), *after]
-        refuse_arc_axes(block, given)
+            rows = self.moves.polar_arc(block, given)
+            self._need_pole(block)
+            return [*before, *rows, *after]
+        if name != "C" or not self.moves.tilted:
+            refuse_arc_axes(block, given)
         how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
-        return [*before, *how(block, given, self._ends(block, given)), *after]
+        rows = how(block, given, self._ends(block, given))
+        if name == "C":
+            self._need_pole(block)
+        return [*before, *rows, *after]
+
+    def _need_pole(self, block: ConversationalBlock) -> None:
+        if not self.poles:
+            raise block.fault("there is no pole: write CC before")
 
     def _side(self, block: ConversationalBlock, given: Items) -> list[Statement]:
         return side_rows(block, given) if self.compensates else []
@@ -244,15 +264,21 @@ class HeidenhainParser(Definitions):
     def _pole(self, block: ConversationalBlock, column: int) -> list[Statement]:
         given = items(block, column)
         ends = self._ends(block, given) if given.axes else {"X": X, "Y": Y}
+        if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
+            raise block.fault(
+                "the plane of a pole is that of its two coordinates; write CC with both of them", column
+            )
         named: list[tuple[Parameter, Expression]] = [
-            (POLE["XY".index(axis)], end) for axis, end in ends.items() if axis in "XY"
+            (POLE["XYZ".index(axis)], end) for axis, end in ends.items()
         ]
-        return [Line(block.place, (), tuple(named))]
+        normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
+        return [Line(block.place, (), (*named, (PLANE, Number(float(normal)))))]
 
     def _codes(
-        self, block: ConversationalBlock, given: Items
+        self, block: ConversationalBlock, given: Items, *, straight: bool = False
     ) -> tuple[list[Statement], list[Statement], bool]:
-        """What the M codes of a block do before its move and after it, and whether it goes in machine coordinates."""
+        """What the M codes of a block do before its move and after it, and whether it goes in machine coordinates, as `straight` moves
+        may."""
         before: list[Statement] = []
         after: list[Statement] = []
         machine = False
@@ -260,6 +286,8 @@ class HeidenhainParser(Definitions):
             row = Line(block.place, (word("M", block.byte(column), Number(float(code))),))
             if code == 99:
                 after += self._call_cycle(block)
+            elif code == 91 and not straight:
+                raise block.fault("M91, machine coordinates, is read in L", column)
             elif code == 91:
                 machine = True
             elif code in (13, 14):
@@ -316,9 +344,8 @@ _WHY = {
 _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Statement]]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
-    **dict.fromkeys(
-        ("BLK FORM", "TOOL DEF", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing
-    ),
+    **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing),
+    "TOOL DEF": HeidenhainParser._tool_data,
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
     **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),

@@ -16,6 +16,7 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.names import known_name
 from planner.base.units import MICROMETRE
+from planner.interactive.scene import fitted_scene
 from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES
 from planner.report.colours import COLOURS, GREY, limit_colours
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 # Samples of a figure at most [-]; the path of 11,157 samples makes a figure of 1.1 MB.
 POINTS_MAX = 40_000
-FLAT = 0.12  # third extent over the largest below which a path is seen from above
 COLOURINGS = ("feed", "limit", "deviation")
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]"}
 QUANTITIES = ("velocity", "acceleration", "jerk")
@@ -82,16 +82,8 @@ class PlanFigures:
                 ),
             ]
         )
-        extent = np.ptp(xyz, axis=0)
-        flat = extent[2] < FLAT * max(float(extent.max()), 1e-9)
-        camera = {
-            "projection": {"type": "orthographic"},
-            "eye": {"x": 0, "y": 0, "z": 1.6} if flat else {"x": 1.2, "y": -1.3, "z": 0.9},
-            "up": {"x": 0, "y": 1, "z": 0} if flat else {"x": 0, "y": 0, "z": 1},
-        }
-        axes = {f"{letter}axis": {"title": {"text": f"{letter} [mm]"}} for letter in LINEAR_AXES}
         figure.update_layout(
-            scene={"aspectmode": "data", "camera": camera, **axes}, margin={"l": 0, "r": 0, "t": 30, "b": 0}
+            scene=fitted_scene(np.concatenate([xyz, programmed])), margin={"l": 0, "r": 0, "t": 30, "b": 0}
         )
         figure.update_layout(showlegend=False, title={"text": self._title()}, height=560)
         return figure

@@ -1,15 +1,16 @@
 """Thousands of random jobs, planned, judged twice, and held against laws: what goes wrong?
 
-    python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C]
+    python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C] [--anew]
 
 A job follows from its seed (campaign_jobs.py): program, machine, tolerance, period, method. Its plan (campaign_rows.py) is judged by
 the planner's verifier and by another judge that shares no code with the package (campaign_judge.py); every tenth job is planned once
 more, changed by a law (campaign_laws.py). Each job has C processor seconds in a child process, which is ended if they do not suffice.
 
-Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (campaign_tally.py), with
-a summary in campaign.md, and removed. Jobs that are in one of them are not planned again; --again plans what is not as it should be. A
-change of the draws makes other jobs of the seeds: the campaign then begins anew. What compiling a kernel takes, once on a machine, is
-not counted: a job that was ended in it would leave it to the next one.
+Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (campaign_tally.py),
+with a summary in campaign.md, and removed. Jobs that are in one of them are not planned again. --again plans jobs once more; what comes
+of that is told beside, and they count as they came out the first time. All jobs of a campaign are planned at one commit of the planner:
+at another one, and after a change of the draws, --anew begins again. What compiling a kernel takes, once on a machine, is not counted:
+a job that was ended in it would leave it to the next one.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from benchmarks.campaign_jobs import fingerprint, job
 from benchmarks.campaign_rows import Row, about, outcome
 from benchmarks.campaign_table import write_summary
 from benchmarks.campaign_tally import CRASH, TOO_LONG, Tally, wrongs
-from benchmarks.record import RESULTS, provenance
+from benchmarks.record import RESULTS, planner_state
 from planner.base import kernels
 from planner.base.threads import use_threads
 
@@ -152,12 +153,11 @@ def rows_of(seeds: list[int], processes: int, seconds: float, limit: float = LIM
             workers[n].give(left.pop())
 
 
-def kept_rows(file: Path = KEPT) -> dict[int, Row]:
-    """The rows of earlier runs by seed; the last one of each counts."""
+def kept_rows(file: Path = KEPT) -> list[Row]:
+    """The rows of earlier runs, in their order."""
     if not file.exists():
-        return {}
-    rows = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines() if line.endswith("}")]
-    return {row["seed"]: row for row in rows}
+        return []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines() if line.endswith("}")]
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -166,7 +166,12 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0, help="of the first job")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--again", type=int, nargs="*", help="these jobs, or all that failed, once more")
+    parser.add_argument(
+        "--again", type=int, nargs="*", help="these jobs, or all that failed, once more; told beside"
+    )
+    parser.add_argument(
+        "--anew", action="store_true", help="begin a new campaign; what there is of another is left out"
+    )
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin no job after so many")
     parser.add_argument("--limit", type=float, default=LIMIT, help="CPU s of a job")
     parser.add_argument("--file", type=Path, default=KEPT)
@@ -175,18 +180,22 @@ def main(argv: list[str] | None = None) -> int:
     if options.show is not None:
         print(json.dumps(job(options.show).data(), indent=1))
         return 0
-    draws = fingerprint()
-    tally = Tally.read(SUMMARY) if options.file == KEPT else Tally()
-    if len(tally) and tally.draws != draws:
+    draws, commit = fingerprint(), planner_state()
+    tally = Tally.read(SUMMARY) if options.file == KEPT and not options.anew else Tally()
+    if len(tally) and (tally.draws, tally.commit) != (draws, commit):
         parser.error(
-            f"{SUMMARY.name} is of other draws of the seeds: move it and {KEPT.name} away to begin again"
+            f"{SUMMARY.name} is of other draws of the seeds, or of planner {tally.commit} where this is {commit}; --anew begins again"
         )
-    tally.draws = draws
-    tally.add(kept_rows(options.file).values())
+    tally.draws, tally.commit = draws, commit
+    if options.anew:
+        options.file.unlink(missing_ok=True)
+    try:
+        tally.add(kept_rows(options.file))
+    except ValueError as fault:
+        parser.error(f"{options.file}: {fault}; --anew begins again")
     seeds = [seed for seed in range(options.seed, options.seed + options.count) if seed not in tally]
     if options.again is not None:
         seeds = options.again or list(tally.wrong)
-    commit = provenance()["commit"]
     options.file.parent.mkdir(exist_ok=True)
     with options.file.open("a", encoding="utf-8") as file:
         for row in rows_of(seeds, options.processes, options.seconds, options.limit):

@@ -32,9 +32,9 @@ def write_summary(tally: Tally) -> None:
     if not len(tally):
         return
     cpu = tally.seconds_of_all()
-    commits = tally.commits + Counter(row.get("commit", "?") for row in tally.wrong.values())
     text = (
-        f"{len(tally)} jobs, made at {', '.join(commits)}; {cpu:.0f} CPU s, {cpu / len(tally):.2f} s in the mean; half of the "
+        f"{len(tally)} jobs, all at commit {tally.commit} of the planner; {cpu:.0f} CPU s, "
+        f"{cpu / len(tally):.2f} s in the mean; half of the "
         f"jobs within {tally.seconds(0.5):.2f} s, 99 % within {tally.seconds(0.99):.1f} s.\n\n"
     )
     for number, name in enumerate(("source", "way")):
@@ -49,6 +49,7 @@ def write_summary(tally: Tally) -> None:
     )
     text += f"\n{len(tally.wrong)} jobs are not as they should be. Those that did not take too long:\n\n"
     text += markdown(["seed", "source", "way", "outcome", "what"], list(map(_wrong, _besides_long(tally))))
+    text += _again(tally)
     write_results("campaign", tally.data(), text)
     PAGE.write_text(with_paragraph(PAGE.read_text(encoding="utf-8"), paragraph(tally)), encoding="utf-8")
 
@@ -68,13 +69,26 @@ def paragraph(tally: Tally) -> str:
     second = sum(bool(row.get("second")) for row in tally.wrong.values() if row["outcome"] == PASSED)
     second += sum(bool(row.get("law_second")) for row in tally.wrong.values())
     text = (
-        f"{len(tally):,} jobs: {of[PASSED]:,} plans pass the verifier, {of[REFUSED]:,} programs are refused and {of[UNSOLVED]:,} not "
+        f"{len(tally):,} jobs, all at commit {tally.commit}, each counted as it came out the first time: "
+        f"{of[PASSED]:,} plans pass the verifier, {of[REFUSED]:,} programs are refused and {of[UNSOLVED]:,} not "
         f"solved, with a reason, {of[DOCUMENTED]:,} plans fail as [methods](methods.md) says of their method (the papers' methods as "
         f"they are, chords under G61), {of[TOO_LONG]:,} take more than their processor seconds, {of[FAILED]:,} fail, "
         f"{of[CRASH]:,} crash. The second judge finds a fault in {second:,} of the plans that pass. Of {changed:,} changed jobs "
         f"{len(broken):,} break their law{worst}."
     )
     return textwrap.fill(text, WIDTH, break_on_hyphens=False)
+
+
+def _again(tally: Tally) -> str:
+    """What came of jobs that were planned again; they count above as they came out the first time."""
+    if not tally.again:
+        return "\nNo job was planned again.\n"
+    counts = Counter(
+        (tally.wrong[seed]["outcome"] if seed in tally.wrong else "as it should be", outcome)
+        for seed, outcome in tally.again.items()
+    )
+    rows = [[*key, str(count)] for key, count in sorted(counts.items())]
+    return "\nPlanned again, and not counted above:\n\n" + markdown(["first", "then", "jobs"], rows)
 
 
 def _besides_long(tally: Tally) -> list[dict[str, Any]]:

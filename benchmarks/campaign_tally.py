@@ -1,6 +1,7 @@
 """What the campaign has come to so far: rows that are as they should be are counted, the others kept.
 
-The tally is what is committed of a campaign (results/campaign.json): the next one, here or elsewhere, goes on behind it.
+The tally is what is committed of a campaign (results/campaign.json). It is of one commit of the planner: a run at that commit goes on
+behind it, another one begins anew. A job counts as it came out the first time; what came of jobs that were planned again stands beside.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ PASSED, FAILED, DOCUMENTED, UNSOLVED, REFUSED, CRASH, TOO_LONG = OUTCOMES = (
     "too long",
 )
 KEPT_OF_A_ROW = (
-    "seed", "source", "way", "outcome", "said", "second", "law", "law_broken", "law_said", "law_second", "cpu", "commit",
+    "seed", "source", "way", "outcome", "said", "second", "law", "law_broken", "law_said", "law_second", "cpu",
 )  # fmt: skip
 BINS = 20  # of processor seconds, in a decade
 LEAST = 1e-3  # processor seconds below this are counted as this
@@ -51,13 +52,11 @@ class Tally:
     said     : sentences of refused and unsolved jobs, numbers left out
     cpu      : how many took so many processor seconds, by the number of their bin
     cpu_sum  : of all of `right` [s]
-    commits  : at which they were planned
+    commit   : of the planner, at which all were planned
     seeds    : of `right`, by outcome
     wrong    : rows that are not as they should be, by seed
+    again    : outcomes of jobs that were planned once more, by seed, with more processor seconds for example; they are counted nowhere
     draws    : names what is drawn from seeds (`campaign_jobs.fingerprint`)
-
-    A job that is planned again counts as it came out the last time; its processor seconds, law and commit stay those of before where
-    it was right before.
     """
 
     right: Counter[tuple[str, str, str]] = field(default_factory=Counter)
@@ -65,9 +64,10 @@ class Tally:
     said: Counter[str] = field(default_factory=Counter)
     cpu: Counter[int] = field(default_factory=Counter)
     cpu_sum: float = 0.0
-    commits: Counter[str] = field(default_factory=Counter)
+    commit: str = ""
     seeds: dict[str, set[int]] = field(default_factory=dict)
     wrong: dict[int, Row] = field(default_factory=dict)
+    again: dict[int, str] = field(default_factory=dict)
     draws: str = ""
 
     def __contains__(self, seed: object) -> bool:
@@ -77,22 +77,20 @@ class Tally:
         return sum(map(len, self.seeds.values())) + len(self.wrong)
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Count rows; the last one of a seed counts."""
+        """Count rows, the first one of each seed. Raises ValueError for a row of another commit."""
         for row in rows:
             seed, job = row["seed"], (row.get("source", "?"), row.get("way", "?"))
-            before = next((outcome for outcome, some in self.seeds.items() if seed in some), None)
-            if before is not None:
-                self.seeds[before].remove(seed)
-                self.right[*job, before] -= 1
-            self.wrong.pop(seed, None)
+            self.commit = self.commit or row["commit"]
+            if row["commit"] != self.commit:
+                raise ValueError(f"a job of commit {row['commit']} among those of {self.commit}")
+            if seed in self:
+                self.again[seed] = row["outcome"]
+                continue
             if wrongs(row):
                 self.wrong[seed] = {key: row[key] for key in KEPT_OF_A_ROW if row.get(key) or key == "seed"}
                 continue
             self.seeds.setdefault(row["outcome"], set()).add(seed)
             self.right[*job, row["outcome"]] += 1
-            if before is not None:
-                continue
-            self.commits[row.get("commit", "?")] += 1
             self.cpu[_bin(row.get("cpu", 0.0))] += 1
             self.cpu_sum += row.get("cpu", 0.0)
             if row.get("law"):
@@ -126,7 +124,8 @@ class Tally:
             "said": dict(self.said.most_common()),
             "cpu": {str(number): self.cpu[number] for number in sorted(self.cpu)},
             "cpu_sum": round(self.cpu_sum, 3),
-            "commits": dict(self.commits),
+            "commit": self.commit,
+            "again": {str(seed): self.again[seed] for seed in sorted(self.again)},
             "wrong": [self.wrong[seed] for seed in sorted(self.wrong)],
         }
 
@@ -149,9 +148,10 @@ class Tally:
             said=Counter(data["said"]),
             cpu=Counter({int(number): count for number, count in data["cpu"].items()}),
             cpu_sum=data["cpu_sum"],
-            commits=Counter(data["commits"]),
+            commit=data["commit"],
             seeds={outcome: _numbers(runs) for outcome, runs in data["seeds"].items()},
             wrong={row["seed"]: row for row in data["wrong"]},
+            again={int(seed): outcome for seed, outcome in data["again"].items()},
             draws=data["draws"],
         )
 

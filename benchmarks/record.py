@@ -29,6 +29,12 @@ def provenance() -> dict[str, Any]:
     }
 
 
+def planner_state() -> str:
+    """The last commit that changed the planner, with "+" where the working tree has further changes; "" without git."""
+    last = _git("log", "-1", "--format=%h", "--", ":/planner")
+    return last + ("+" if last and _git("status", "--porcelain", "--", ":/planner") else "")
+
+
 def _git(*words: str) -> str:
     """What git says, "" where it says nothing or is not installed."""
     command, here = ["git", *words], Path(__file__).parent

@@ -21,7 +21,7 @@ from typing import IO
 
 from joblib import Parallel, delayed
 
-from benchmarks.record import RESULTS, provenance
+from benchmarks.record import RESULTS, planner_state, provenance
 from benchmarks.runner import rows
 from benchmarks.runner.measure import REPEATS
 from benchmarks.runner.rows import ERROR, METHOD, OVER_LIMIT, Row, line_of
@@ -240,17 +240,3 @@ def _told(row: Row) -> str:
     cpu = "" if row.cpu_s is None else f", {row.cpu_s:.3g} CPU s" + (" (busy core)" if row.noisy else "")
     said = "" if row.verdict == rows.PASSED or row.kind == rows.MODEL else f": {row.message[:120]}"
     return f"{row.suite} / {row.job} / {row.way}: {row.status}{time} {row.verdict}{cpu}{said}"
-
-
-def planner_state() -> str:
-    """The last commit that changed the planner, with "+" where the working tree has further changes; "" without git."""
-    try:
-        last = _git("log", "-1", "--format=%h", "--", "planner")
-        return last + ("+" if _git("status", "--porcelain", "--", "planner") else "")
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-
-
-def _git(*arguments: str) -> str:
-    ran = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True)
-    return ran.stdout.strip()

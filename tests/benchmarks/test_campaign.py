@@ -20,6 +20,7 @@ from benchmarks.campaign_judge import Motion, faults, filtered
 from benchmarks.campaign_rows import blocks_of, motion_of, outcome, row_of
 from benchmarks.campaign_table import BEGIN, END, PAGE, paragraph, with_paragraph
 from benchmarks.campaign_tally import LEAST, Tally, wrongs
+from benchmarks.record import planner_state
 from planner.job.plan import Plan
 from planner.methods.registry import plan
 from planner.nc.reader import parse_program
@@ -230,22 +231,36 @@ def test_the_paragraph_is_all_that_changes_on_its_page() -> None:
 
 
 def test_a_run_keeps_its_rows_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, commit = tmp_path / "rows.jsonl", planner_state()
+    row = {"seed": 20, "outcome": "passed", "commit": commit}
+    file.write_text(json.dumps(row) + "\n" + '{"seed": 21, "outc', encoding="utf-8")
+    assert kept_rows(file) == [row]
+    file.write_text(json.dumps(row) + "\n", encoding="utf-8")
+    assert main(["campaign", "--seed", "20", "--count", "1", "--file", str(file)]) == 0
+    assert kept_rows(file) == [row]
+    assert capsys.readouterr().out == ""
+
+
+def test_a_run_at_another_commit_is_asked_to_begin_anew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "rows.jsonl"
     file.write_text(
-        json.dumps({"seed": 20, "outcome": "kept"}) + "\n" + '{"seed": 21, "outc', encoding="utf-8"
+        json.dumps({"seed": 20, "outcome": "passed", "commit": "0000000"}) + "\n", encoding="utf-8"
     )
-    assert kept_rows(file) == {20: {"seed": 20, "outcome": "kept"}}
-    file.write_text(json.dumps({"seed": 20, "outcome": "passed"}) + "\n", encoding="utf-8")
-    assert main(["campaign", "--seed", "20", "--count", "1", "--file", str(file)]) == 0
-    assert kept_rows(file)[20]["outcome"] == "passed"
-    assert capsys.readouterr().out == ""
+    with pytest.raises(SystemExit):
+        main(["campaign", "--seed", "20", "--count", "1", "--file", str(file)])
+    assert "a job of commit 0000000 among those of" in capsys.readouterr().err
+    assert len(kept_rows(file)) == 1
+    assert main(["campaign", "--seed", "20", "--count", "0", "--file", str(file), "--anew"]) == 0
+    assert kept_rows(file) == []
 
 
 ROWS = (
     {"seed": 0, "source": "dense", "way": "stop", "outcome": "passed", "cpu": 0.02, "commit": "a", "law": "split", "law_broken": 0.0},
     {"seed": 1, "source": "dense", "way": "stop", "outcome": "refused", "said": "x:3: at 7.5", "cpu": 0.0, "commit": "a"},
     {"seed": 2, "source": "lathe", "way": "fir", "outcome": "too long", "said": "more", "cpu": 3.0, "commit": "a"},
-    {"seed": 4, "source": "lathe", "way": "fir", "outcome": "passed", "cpu": 0.5, "commit": "b", "law": "split", "law_broken": 0.1},
+    {"seed": 4, "source": "lathe", "way": "fir", "outcome": "passed", "cpu": 0.5, "commit": "a", "law": "split", "law_broken": 0.1},
 )  # fmt: skip
 
 
@@ -262,22 +277,30 @@ def test_a_tally_counts_what_is_right_keeps_what_is_not_and_is_read_as_it_was(tm
     file = tmp_path / "campaign.json"
     file.write_text(json.dumps(tally.data()), encoding="utf-8")
     assert Tally.read(file) == tally
-    tally.add([dict(ROWS[2], outcome="passed", said="")])
-    assert list(tally.wrong) == [4]
-    assert tally.outcomes() == {"passed": 3, "refused": 1}
-    assert tally.data()["seeds"] == {"passed": "0 2", "refused": "1"}
     tally.add(dict(ROWS[0], seed=seed) for seed in (11, 12, 13))
-    assert tally.data()["seeds"]["passed"] == "0 2 11-13"
+    assert tally.data()["seeds"]["passed"] == "0 11-13"
     file.write_text(json.dumps(tally.data()), encoding="utf-8")
-    assert Tally.read(file).seeds == tally.seeds
+    assert Tally.read(file) == tally
 
 
-def test_what_is_wrong_when_it_is_planned_again_counts_as_wrong() -> None:
+def test_a_job_counts_as_it_came_out_the_first_time() -> None:
+    """What is planned again until it passes would make every campaign a good one."""
     tally = Tally()
-    tally.add([*ROWS, dict(ROWS[0], outcome="crash"), dict(ROWS[1], outcome="passed")])
-    assert sorted(tally.wrong) == [0, 2, 4]
+    tally.add(ROWS)
+    counted = tally.outcomes()
+    tally.add([dict(ROWS[0], outcome="crash"), dict(ROWS[2], outcome="passed")])
+    assert tally.outcomes() == counted
     assert len(tally) == len(ROWS)
-    assert tally.outcomes() == {"crash": 1, "too long": 1, "passed": 2}
+    assert tally.again == {0: "crash", 2: "passed"}
+    assert "each counted as it came out the first time" in paragraph(tally).replace("\n", " ")
+
+
+def test_a_tally_is_of_one_commit() -> None:
+    tally = Tally()
+    tally.add(ROWS)
+    with pytest.raises(ValueError, match="of commit b among those of a"):
+        tally.add([dict(ROWS[0], seed=9, commit="b")])
+    assert 9 not in tally
 
 
 def test_the_same_number_makes_the_same_job() -> None:

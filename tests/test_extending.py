@@ -24,8 +24,8 @@ def seen() -> dict:
 
 
 def test_limits_hold_the_motion_and_are_kept(seen):
-    assert seen["powered"].verdict.passed
-    assert seen["powered"].verdict.limits["velocity.spindle power"].ratio > 0.999
+    assert seen["clamped"].verdict.passed
+    assert seen["clamped"].verdict.limits["velocity.clamp side"].ratio > 0.999
     assert seen["armed"].verdict.passed
     arm = [c.ratio for name, c in seen["armed"].verdict.limits.items() if name.endswith(".arm")]
     assert len(arm) == 3
@@ -34,7 +34,7 @@ def test_limits_hold_the_motion_and_are_kept(seen):
     assert {name for name in prices.limits if name.endswith(".arm")} == {
         f"{quantity}.arm" for quantity in ("velocity", "acceleration", "jerk")
     }
-    assert {name.partition(".")[2] for name, _ in prices.ranked()} & {"arm", "spindle power"}
+    assert {name.partition(".")[2] for name, _ in prices.ranked()} & {"arm", "clamp side"}
 
 
 def test_the_corner_shape_is_used_and_passes(seen):
@@ -56,7 +56,7 @@ def test_methods_are_compared(seen):
     rows = {row.method: row for row in seen["rows"]}
     assert set(rows) == {"bezier", "Gentle(0.5)", "Gentle(0.25)"}
     assert rows["bezier"].outcome == "failed"
-    assert "spindle power" in rows["bezier"].sentence
+    assert "clamp side" in rows["bezier"].sentence
     assert rows["Gentle(0.25)"].cycle_time > rows["Gentle(0.5)"].cycle_time
 
 

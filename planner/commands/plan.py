@@ -82,7 +82,7 @@ def plan_command(
         bool, typer.Option("--report", help="write a page into DIR that opens in a browser (report.html)")
     ] = False,
     corners: Annotated[
-        bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18-20")
+        bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18 to 20")
     ] = False,
     verbose: Annotated[
         bool,

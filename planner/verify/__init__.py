@@ -15,7 +15,7 @@ sharp each check is:
     filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
     error_allocation.py
-                  eq. 18-20 at every programmed corner, on the motion's own curvature
+                  eq. 18 and 19 at every programmed corner, and the comparison with eq. 20, on the motion's own curvature
     corners.py    the record of that
     exact.py      blocks under G61: the samples run along the path itself
     held.py       threads: moves in step with the spindle

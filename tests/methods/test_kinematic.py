@@ -320,3 +320,22 @@ def test_samples_lie_on_the_arc_however_fast_the_acceleration_steps(radius, acce
     made = kinematic(parse_program(text), machine)
     off = np.linalg.norm(made.trajectory.position[:, :2] - [0.0, radius], axis=1) - radius
     assert np.abs(off).max() <= 1e-6
+
+
+LABEL = (  # a frame with round corners, a circle and a star, in HPGL
+    "IN;SP1;VS30;PU200,0;PD3000,0;AA3000,200,90;PD3200,2200;AA3000,2200,90;PD200,2400;AA200,2200,90;PD0,200;AA200,200,90;"
+    "PU2600,1200;CI300;PU1600,1800;PD1747,1402,2171,1385,1838,1123,1953,715,1600,950,1247,715,1362,1123,1029,1385,1453,1402,1600,1800;"
+    "PU0,0;SP0;"
+)
+
+
+def test_the_contour_error_of_paper_003_with_its_settings():
+    """It prints 2000 mm/s2, 300 mm/s, 10 ms, 0.05 mm and an error within 0.025 mm, which is a dt^2/8, the bow of a chord; the jerk of
+    paper 000. (docs/papers.md, E)"""
+    machine = problems.machine(
+        velocity=300.0, acceleration=2000.0, jerk=2000.0 / 0.03, dt=0.01, tolerance=0.05
+    )
+    drawn = kinematic(parse_program(LABEL, source="label.plt"), machine)
+    stopping = StopMethod().plan(parse_program(LABEL, source="label.plt"), machine)
+    assert drawn.cycle_time < 0.95 * stopping.require().cycle_time
+    assert 0.02 < drawn.verdict.contour_error_mm < 0.025

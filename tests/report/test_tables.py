@@ -29,7 +29,7 @@ def test_plan() -> None:
     assert "x 0.5, y 1.000001" in said
     assert "x 3.5  (not limited by this method)" in said
     assert "12.300 µm" in said
-    assert "eq. 18-20 hold at 3 of 3 corners, at most 1.0000; 1.35 times the speed of eq. 20" in said
+    assert "eq. 18 and 19 hold at 3 of 3 corners, at most 1.0000; 1.35 times the speed of eq. 20" in said
     of = "(median of 2 corners where eq. 20 is below the feed); full stops at 1"
     assert of in " ".join(said.split())
     assert "passed" in said

@@ -159,7 +159,7 @@ def test_samples_too_far_apart_are_said_aloud_and_the_motion_is_looked_at_instea
     alone = judged(motion, points, coarse, between=False).corners
     assert (alone.count, alone.not_looked_at, alone.held) == (0, 1, 0)
     assert np.isnan(alone.worst_speed_ratio)
-    assert alone.sentence() == "eq. 18-20 hold at 0 of 1 corners; 1 could not be checked"
+    assert alone.sentence() == "eq. 18 and 19 hold at 0 of 1 corners; 1 could not be checked"
     assert alone.summary()["not_looked_at"] == 1
     asked = judged(motion, points, coarse).corners
     assert (asked.count, asked.not_looked_at) == (1, 0)

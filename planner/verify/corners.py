@@ -1,7 +1,7 @@
 """The record of eq. 18-20 at the programmed corners: what the motion does there, beside what the papers let it do.
 
-Checked are eq. 18, the corner's tolerance with the chord error in it, and eq. 19, the speed. Eq. 19 with the motion's own curvature follows
-from the limits of the axes' acceleration (error_allocation.py), so it says where these act at corners, and does not fail without them.
+Checked are eq. 18, the corner's tolerance with the chord error in it, and eq. 19, the speed. Eq. 19 with the motion's own curvature
+follows from the limits of the axes' acceleration (error_allocation.py), so it does not fail without them, and says where they act.
 Eq. 20 is a comparison: a motion may be faster, and no verdict fails for it.
 """
 
@@ -150,8 +150,9 @@ class CornerCheck:
         }
 
     def sentence(self) -> str:
-        """Both in one line: "eq. 18 and 19 hold at 4 of 4 corners, at most 0.9993; 1.54 times the speed of eq. 20 (median)". Eq. 20 is a
-        comparison, not a check."""
+        """Both in one line: "eq. 18 and 19 hold at 4 of 4 corners, at most 0.9993; 1.54 times the speed of eq. 20 (median)".
+
+        Eq. 20 is a comparison, not a check."""
         if not len(self):
             return "none: the program has no corner without a full stop"
         said = f"eq. 18 and 19 hold at {self.held:,} of {len(self):,} corners"

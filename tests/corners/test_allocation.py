@@ -31,6 +31,7 @@ def speed_sq(tol_ap, tol, acceleration, rate):
 @given(tol=budgets, acceleration=accelerations, rate=rates)
 @settings(max_examples=100)
 def test_the_closed_form_is_the_brute_force_optimum(tol, acceleration, rate):
+    """docs/papers.md D2."""
     tried = tol * np.linspace(0.0, 1.0, 20_001)
     best = speed_sq(tried, tol, acceleration, rate).max()
     chosen = allocate(np.array([tol]), np.array([acceleration]), rate)[0]
@@ -42,7 +43,7 @@ def test_the_closed_form_is_the_brute_force_optimum(tol, acceleration, rate):
        filters=st.tuples(st.floats(1e-3, 0.05), st.floats(1e-3, 0.05)))  # fmt: skip
 @settings(max_examples=60)
 def test_three_sources_use_the_whole_budget(tol, acceleration, dt, filters):
-    """eps_ap + eps_ch + eps_fir = eps with X* = min(A, eps/2c), and no split of the three is faster."""
+    """eps_ap + eps_ch + eps_fir = eps with X* = min(A, eps/2c), and no split of the three is faster (docs/papers.md D5)."""
     rate = error_rate(problems.machine(dt=dt, fir=Fir(time_constants=filters)))
     assert rate == pytest.approx(dt**2 / 8 + (filters[0] ** 2 + filters[1] ** 2) / 24, rel=1e-12)
     chosen = allocate(np.array([tol]), np.array([acceleration]), rate)

@@ -144,6 +144,7 @@ def test_the_interior_angle_would_miss_the_tolerance():
 @given(T1=times, ratio=ratios, share=st.floats(1e-6, 1.0))
 @settings(max_examples=100)
 def test_the_inverse_of_the_ramp(T1, ratio, share):
+    """And R(Td) = Td/2 (docs/papers.md B2)."""
     shape = FirCorner(T1=T1, T2=T1 * ratio, feed_max=V)
     delay = T1 * (1 + ratio)
     t = np.array([share * delay])
@@ -180,7 +181,7 @@ def test_corners_that_stay_apart_keep_paper_000s_condition(T1, ratio, shares, sp
 @given(theta=st.floats(1.0, 179.0).map(np.deg2rad), T1=times, ratio=ratios, share=st.floats(0.01, 1.0))
 @settings(max_examples=60)
 def test_speed_and_acceleration_at_the_middle(theta, T1, ratio, share):
-    """v_mid = 2 V S(Tk/2) cos(theta/2), purely normal acceleration 2 V h(Tk/2) sin(theta/2) (docs/papers.md A.14, peaks)."""
+    """v_mid = 2 V S(Tk/2) cos(theta/2), purely normal acceleration 2 V h(Tk/2) sin(theta/2) (docs/papers.md A6)."""
     T2 = T1 * ratio
     Tk = (T1 + T2) * share
     assume(abs(Tk / 2 - T2) > 1e-6 * T2)

@@ -130,7 +130,8 @@ def test_no_other_phase_times_are_faster(seed):
 
 
 def test_the_printed_rule_is_imaginary_or_too_slow():
-    """The paper takes min(V_gw1, V_gw2). V_gw1 is imaginary for eps < eps*/4 and too slow for the other jerk-limited corners."""
+    """The paper takes min(V_gw1, V_gw2). V_gw1 is imaginary for eps < eps*/4 and too slow for the other jerk-limited corners
+    (docs/papers.md F2)."""
     c = random_corners(1, 4000)
     V, T1, T2 = zero_entry(c)
     alpha, eta = c.rates

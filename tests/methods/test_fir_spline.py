@@ -85,7 +85,7 @@ def test_v_eps_is_a_normal_acceleration():
 
 @given(rho=radii, phi=st.floats(0.01, 1.5), T1=st.floats(0.005, 0.1), ratio=shares)
 def test_v_ph_is_the_lag_of_the_filtered_point(rho, phi, T1, ratio):
-    """Par. 26: at v_ph the filtered point is phi behind, exactly."""
+    """Par. 26: at v_ph the filtered point is phi behind, exactly (docs/papers.md G1)."""
     T2 = T1 * ratio
     v = float(v_ph(np.array(1 / rho), phi, T1, T2))
     assert v == pytest.approx(2 * rho * phi / (T1 + T2))
@@ -101,7 +101,7 @@ normals = st.tuples(*(st.floats(-1, 1) for _ in range(3))).filter(lambda n: np.l
 def test_v_acc_and_v_jerk_reach_the_axes_limits_on_any_circle(rho, normal):
     """Par. 9 to 17 in any plane, also the one in which par. 9's e1 is 0/0: amplitudes v^2/rho and v^3/rho^2 times sqrt(1 - n_k^2).
 
-    v_jerk is from the derivative of the acceleration; the text's derivative of v_acc is 0 on a circle and would limit nothing.
+    v_jerk is from the derivative of the acceleration; the text's derivative of v_acc is 0 on a circle and would limit nothing (docs/papers.md G2).
     """
     machine = problems.machine(
         velocity=1e4,

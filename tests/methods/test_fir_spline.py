@@ -101,7 +101,8 @@ normals = st.tuples(*(st.floats(-1, 1) for _ in range(3))).filter(lambda n: np.l
 def test_v_acc_and_v_jerk_reach_the_axes_limits_on_any_circle(rho, normal):
     """Par. 9 to 17 in any plane, also the one in which par. 9's e1 is 0/0: amplitudes v^2/rho and v^3/rho^2 times sqrt(1 - n_k^2).
 
-    v_jerk is from the derivative of the acceleration; the text's derivative of v_acc is 0 on a circle and would limit nothing (docs/papers.md G2).
+    v_jerk is from the derivative of the acceleration; the text's derivative of v_acc is 0 on a circle and would limit nothing
+    (docs/papers.md G2).
     """
     machine = problems.machine(
         velocity=1e4,

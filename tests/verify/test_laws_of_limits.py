@@ -12,6 +12,7 @@ import pytest
 from judging import judge
 from motions import Moves, along, chain, helix, rest_to_rest, straight
 from motions import machine as machine_with
+from setpoints import trajectory_of
 
 from planner import JointLimit, PathLimit
 from planner.constraints.axis_acceleration import JUMP
@@ -157,7 +158,9 @@ def test_the_judges_filters_lag_by_the_phase_that_is_allowed():
     machine = machine_with(fir=FIR)
     toolpath, limit = circle().toolpath(machine), {limit.name: limit for limit in LIMITS}["phase_lag"]
     end, motion = steady(capped(limit, on_grid(toolpath, machine)))
-    (t, behind), *_ = filtered(lambda t: motion(t)[:2], end, machine.fir.time_constants, machine.dt)
+    times = np.append(np.arange(0.0, end, machine.dt), end)
+    setpoints = trajectory_of(times, *motion(times)[:2])
+    (t, behind), *_ = filtered(setpoints, "linear", machine.fir.time_constants, machine.dt)
     steadily = (t > sum(FIR["time_constants"])) & (t < end)
     (here, *_), behind = motion(t[steadily]), behind[steadily]
     lag = np.arctan2(here[:, 1], here[:, 0]) - np.arctan2(behind[:, 1], behind[:, 0])

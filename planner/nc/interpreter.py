@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
 from planner.nc.assumed import Assumed
@@ -26,11 +27,16 @@ from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover
 from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
-from planner.nc.program import MOVES, Frame, Kind, Program
+from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.state import REFUSED_MOTION, Setup, State, set_units, system_name
 from planner.nc.store import Store
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
+
+_FEED_LEAST = (
+    1.0 / SECONDS_PER_MINUTE
+)  # nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s]
+_IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of the machine file"
 
 
 class Interpreter:
@@ -41,6 +47,7 @@ class Interpreter:
     open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
     by_word : rows that were executed word by word, not by the compiled loop
     ended : M2, M30 or a second % was executed; later chunks are not
+    two_axes : the program has X and Z and no Y, and was not found to be one for a lathe
     """
 
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
@@ -61,7 +68,9 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
         self.ended = False
+        self.two_axes = False
         self.by_word = 0
+        self._timed = False  # a feed is in inverse time
         self._words: Words | None = None  # of the last chunk
         self._begun = False
         self._read = 0  # rows of the last chunk
@@ -89,6 +98,7 @@ class Interpreter:
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._note_units()
+        self._note_feeds()
         self._end_compensation()
         read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         return read if self.found.faults else at_the_tip(read, self.tool_point, self.setup.machine)
@@ -179,13 +189,26 @@ class Interpreter:
         if len(moves) and (self._units_at is None or moves[0] < self._units_at):
             self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
 
+    def _note_feeds(self) -> None:
+        """Say it if feed moves are so slow that F is most likely one per turn of the spindle."""
+        kind, feed = (
+            column[: self.store.blocks] for column in (self.store.block.kind, self.store.block.feed)
+        )
+        slow = np.flatnonzero(np.isin(kind, FEED_MOVES) & (feed < _FEED_LEAST))
+        if len(slow) and not self._timed:
+            at = feed[slow[0]] * SECONDS_PER_MINUTE
+            text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
+            self.note(text, int(self.store.block.line[slow[0]]))
+
     def _execute_or_report(self, block: Block) -> bool:
         try:
             return self._execute(block)
         except WordFault as fault:
+            message = fault.message
             if isinstance(fault, moves.ArcFault):
                 self.open_arcs.append((block.line, fault.otherwise))
-            self.report(fault.word, fault.message)
+                message += f"; {_IF_LATHE}" if self.two_axes else ""
+            self.report(fault.word, message)
             return block.m.get("stopping") in (20, 300)
         except CutterFault as fault:
             self.report(min(block.at.values()), str(fault))
@@ -197,6 +220,7 @@ class Interpreter:
         if self.mover.cutter is not None:
             compensation.check_unchanged(self.state, block)
         feeds.set_feed(self.state, block, self.note)
+        self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.store, block, self.note)
         if block.g.get("one-shot") == 40:
             auxiliary.dwell(self.state, self.store, block, self.assumed, self.note)
@@ -207,6 +231,11 @@ class Interpreter:
             homing.go_to_switches(self.state, self.store, block, self.note)
             self._one_shot(block)
             self.mover.execute(block)
+            if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
+                self.note(
+                    f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}",
+                    block.line,
+                )
             self.tool_point.check(self.state, block, turned)
         stop = block.m.get("stopping")
         if stop is not None and self.mover.cutter is not None:

@@ -18,7 +18,7 @@ from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.detect import LATHE_NOTE, dialect_of, has_further_systems, is_turned
+from planner.nc.language.detect import LATHE_NOTE, dialect_of, has_further_systems, has_two_axes, is_turned
 from planner.nc.leader import without_leader
 from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.points import are_points, read_points
@@ -139,6 +139,8 @@ def execute(
     if is_turned(words, dialect, reading, machine):
         dialect = LATHE
         interpreter.note(LATHE_NOTE, int(words.line[0]))
+    elif dialect != SIEMENS and not reading.strict:
+        interpreter.two_axes = has_two_axes(words)
     interpreter.state.fanuc = (
         reading.dialect == FANUC or dialect in (FANUC, LATHE) or has_further_systems(words)
     )

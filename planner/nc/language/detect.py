@@ -33,6 +33,12 @@ _FANUC = re.compile(
     r"GOTO|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
     r"[A-Z\d.]*(?:G6[567](?![\d.])|M9[789](?![\d.])))"
 )
+# Signs of lathes, and of others (`_has_signs`).
+_TOOL_AND_OFFSET = re.compile(r"T\d{4}", re.IGNORECASE)
+_SPEED_MAX, _SURFACE_SPEED, _PER_TURN, _TOOL_CHANGE = 50.0, 96.0, 99.0, 6.0
+_RETRACTING = (73.0, 74.0, 76.0, *(float(n) for n in range(81, 90)))
+_OF_OTHERS = (7.0, 8.0, 17.0, 19.0, 93.0, 95.0)
+_CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
 _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
 
 
@@ -77,8 +83,8 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
     """Whether a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of the machine decides.
 
-    Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle G70 to G73 with P and Q, or
-    a G76 with K and D.
+    Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle G70 to G73 with P and Q,
+    a G76 with K and D, or another sign of a lathe (`_has_signs`).
     """
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
@@ -99,7 +105,41 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
         for row in np.unique(np.searchsorted(words.first, cycles, side="right") - 1).tolist():
             if np.isin([ord(c) for c in needed], words.letter[words.first[row] : words.first[row + 1]]).all():
                 return True
-    return False
+    return letters >= set("XZ") and _has_signs(words)
+
+
+def has_two_axes(words: Words) -> bool:
+    """Whether a program has X and Z and no Y: it may be one for a lathe."""
+    return _has(words, "X") and _has(words, "Z") and not _has(words, "Y")
+
+
+def _has_signs(words: Words) -> bool:
+    """Whether a program without Y has a sign of a Fanuc or Haas lathe (G code system A), and none of a mill or of another lathe.
+
+    Signs are a tool with its offset in one word of four digits (T0101), G50 or G96 with S, and G99 without the cycles whose retract it
+    is on mills. J, M6, planes but G18, feed modes and diameters of LinuxCNC (G93, G95, G7, G8), D beside G96, and G90, G91 or G94
+    without coordinates (G90 and G94 are cycles of system A) are of others.
+    """
+    if _has(words, "J") or _rows_with(words, "M", _TOOL_CHANGE) or _rows_with(words, "G", *_OF_OTHERS):
+        return False
+    if any(not letters & set("XZUW") for letters in _rows_with(words, "G", *_CYCLES_OF_LATHES)):
+        return False
+    fast = _rows_with(words, "G", _SURFACE_SPEED)
+    if any("D" in letters for letters in fast):
+        return False
+    if any("S" in letters for letters in (*fast, *_rows_with(words, "G", _SPEED_MAX))):
+        return True
+    if _rows_with(words, "G", _PER_TURN) and not _rows_with(words, "G", *_RETRACTING):
+        return True
+    tools = np.flatnonzero(words.letter == ord("T")).tolist()
+    return any(_TOOL_AND_OFFSET.fullmatch(words.text(word)) for word in tools)
+
+
+def _rows_with(words: Words, letter: str, *codes: float) -> list[set[str]]:
+    """The letters of each row with one of the codes."""
+    at = np.flatnonzero((words.letter == ord(letter)) & np.isin(words.value, codes)).tolist()
+    rows = sorted({words.row(word) for word in at})
+    return [{chr(c) for c in words.letter[words.first[row] : words.first[row + 1]]} for row in rows]
 
 
 def _has(words: Words, letter: str) -> bool:

@@ -81,6 +81,7 @@ def compare_command(
         comparison_table,
         write_comparison,
     )
+    from planner.report.tables import assumed_lines
 
     if output is not None:
         check_comparison_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
@@ -101,7 +102,8 @@ def compare_command(
     if as_json:
         say(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
     else:
-        show(comparison_table(rows, f"{job}: {len(rows)} methods, machine {limits.name}"))
+        title = f"{job}: {len(rows)} methods, machine {limits.name}"
+        show(*assumed_lines(program.assumptions), comparison_table(rows, title))
         for file in (output, report):
             if file is not None:
                 say(str(file))

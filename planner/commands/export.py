@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -83,7 +84,8 @@ def export_command(
         raise InputError(f"--within is for pvt; --for {for_} takes every setpoint as it is")
     if os.path.lexists(output):
         raise InputError("exists already and is not overwritten; give another name", source=str(output))
-    trajectory = read_trajectory(trajectory_file(plan)).trajectory
+    read = read_trajectory(trajectory_file(plan))
+    trajectory = read.trajectory
     if len(trajectory.extruder):
         raise InputError(_NO_EXTRUDER, source=str(plan))
     new = output.with_name(f".{output.name}.{os.getpid()}")
@@ -100,12 +102,20 @@ def export_command(
         raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
     finally:
         shutil.rmtree(new, ignore_errors=True)
+    _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())
     say(f"{output}: {said}")
 
 
 _NO_EXTRUDER = (
     "this export would lose what the extruder does; planned.ngc and the trajectory file of the plan have it"
 )
+
+
+def _say_assumed(assumptions: Sequence[object]) -> None:
+    from planner.report.tables import assumed_lines
+
+    for line in assumed_lines([str(text) for text in assumptions]):
+        say(str(line))
 
 
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
@@ -132,6 +142,7 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
         raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
     finally:
         shutil.rmtree(new, ignore_errors=True)
+    _say_assumed(saved.program.assumptions)
     say(f"{output / made.file}: {made.sentence}")
     if made.note is not None:
         say(f"note: {made.note}", err=True)

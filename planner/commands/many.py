@@ -205,7 +205,11 @@ def _report(rows: Sequence[Done], as_json: bool) -> None:
         say(json.dumps({"programs": programs}, indent=2, allow_nan=False))
         return
     from planner.report.programs import programs_table
+    from planner.report.tables import assumed_lines
 
+    for row in rows:
+        for line in assumed_lines(row.summary.get("assumptions", ())):
+            say(f"{row.job}: {line}")
     show(programs_table([(str(row.job), row.outcome, row.summary, row.said) for row in rows]))
 
 

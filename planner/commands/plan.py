@@ -202,8 +202,8 @@ def plan_command(
 
 
 def _show(result: Plan, notes: list[str], *, corners: bool) -> None:
-    from planner.report.tables import corners_table, plan_table
+    from planner.report.tables import assumed_lines, corners_table, plan_table
 
-    show(plan_table(result, notes))
+    show(*assumed_lines(result.program.assumptions), plan_table(result, notes))
     if corners:
         show("", (corners_table(result.corners) if result.corners is not None else None) or NO_CORNERS)

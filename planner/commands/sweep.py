@@ -58,6 +58,7 @@ def sweep_command(
     """
     if cluster is not None and threads is not None:
         raise InputError("--threads is for processes of this machine; a cluster has the workers that it has")
+    from planner.report.tables import assumed_lines
     from planner.study.points import SweepFolder
     from planner.study.ranges import grid_of, parse_varied
     from planner.study.sweep import sweep, write_sweep
@@ -85,7 +86,7 @@ def sweep_command(
             )
         )
     else:
-        show(sweep_table(done, title_of(studied)))
+        show(*assumed_lines(studied.program.assumptions), sweep_table(done, title_of(studied)))
         for name in written:
             say(str(output / name))
     end_with(outcomes)

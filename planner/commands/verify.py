@@ -76,7 +76,7 @@ def verify_command(
     from planner.job.at_tip import Judged, judged
     from planner.nc.reader import read_program
     from planner.report.export import corner_summary, verdict_summary
-    from planner.report.tables import verdict_table
+    from planner.report.tables import assumed_lines, verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
     from planner.verify.axes import fit_axes
     from planner.verify.judge import NOT_LIMITED_NAMES
@@ -122,7 +122,8 @@ def verify_command(
             "cycle_time_s": motion.cycle_time,
             "notes": notes,
         }
-        say(json.dumps({**verdict_summary(verdict), **about}, indent=2))
+        said = {"assumptions": program.assumptions, **verdict_summary(verdict), **about}
+        say(json.dumps(said, indent=2))
     else:
         for note in notes:
             say(f"note: {note}", err=True)
@@ -131,7 +132,8 @@ def verify_command(
             "cycle time": f"{motion.cycle_time:.4f} s",
             "tolerance": f"{low:g} mm" if low == high else f"{low:g} to {high:g} mm",
         }
-        show(verdict_table(verdict, f"{trajectory} on {job}, machine {limits.name}", asked))
+        title = f"{trajectory} on {job}, machine {limits.name}"
+        show(*assumed_lines(program.assumptions), verdict_table(verdict, title, asked))
     if not verdict.passed:
         raise typer.Exit(FAILED)
 

@@ -41,6 +41,7 @@ def what_if_command(
     """
     if not changes:
         raise InputError("nothing to change: name a setting and its value, such as --set axes.y.jerk=4e5")
+    from planner.report.tables import assumed_lines
     from planner.study.settings import parse_setting
     from planner.study.tables import what_if_dict, what_if_table
     from planner.study.what_if import what_if
@@ -51,5 +52,5 @@ def what_if_command(
     if as_json:
         say(json.dumps(what_if_dict(studied, rows), indent=2, allow_nan=False))
     else:
-        show(what_if_table(studied, rows, title_of(studied)))
+        show(*assumed_lines(studied.program.assumptions), what_if_table(studied, rows, title_of(studied)))
     end_with({it.row.outcome for it in rows})

@@ -16,6 +16,7 @@ import numpy as np
 
 from planner.nc.codes import LETTERS_REFUSED, PARKABLE, Assumption
 from planner.nc.events import plain
+from planner.nc.faults import Said
 from planner.nc.lexer import Words
 from planner.nc.reading import IGNORE, Reading
 from planner.nc.settings import EXTRUDER_ZERO, TOOL_POINT_M
@@ -110,7 +111,8 @@ class Assumed:
                 self.count(self._of_letter(chr(code)), words.text(word), line, times)
 
     def _of_letter(self, letter: str) -> Assumption:
-        if self.treatment[ord(letter)] == PARKED:
+        parked = bool(self.treatment[ord(letter)] == PARKED)
+        if parked:
             at = self.parked[ord(letter)]
             where = "" if np.isnan(at) else f" at {plain(float(at))}"
             said = f"axis {letter} is assumed to stand still{where}"
@@ -118,15 +120,16 @@ class Assumed:
             said = "left out (--extruder ignore); what the extruder does by itself takes no time in this plan"
         else:
             said = "left out, as --ignore says: the plan knows nothing of this axis"
-        return Assumption(f"{letter} word", f"{letter} words", said)
+        return Assumption(f"{letter} word", f"{letter} words", said, changes=parked)
 
-    def notes(self) -> list[tuple[int, str]]:
-        """First line and sentence of everything that was assumed."""
+    def notes(self) -> list[Said]:
+        """Everything that was assumed, by its first line."""
         return [
-            (
+            Said(
                 found.line,
                 f"{found.times:,} {what.one if found.times == 1 else what.many}: {what.said}; "
                 f"first {found.word} line {found.line}",
+                what.changes,
             )
             for what, found in self._counted.items()
         ]

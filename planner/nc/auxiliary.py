@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from planner.base.units import MILLISECOND
@@ -11,12 +9,12 @@ from planner.machine.parts import TOLERANCE_MIN
 from planner.nc import codes, signals
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind, PathControl
 from planner.nc.state import State
 from planner.nc.store import Store
 
-Note = Callable[[str, int], None]
 # By ten times the G code.
 _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
 # Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
@@ -25,7 +23,7 @@ ROWS_AT_ONCE = 4
 _SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
 
 
-def events(state: State, store: Store, block: Block, note: Note) -> None:
+def events(state: State, store: Store, block: Block, found: Findings) -> None:
     """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
     line = block.line
     if "S" in block.value:
@@ -48,7 +46,12 @@ def events(state: State, store: Store, block: Block, note: Note) -> None:
         state.tool_loaded = state.tool_selected
         store.add_event("M", 6.0, line)
         store.add(Kind.STOP, line, state)
-        note("a tool change is a full stop of the motion that moves nothing", line)
+        text = "a tool change is a full stop of the motion that moves nothing"
+        if state.change_timed:
+            found.note(text, line)
+        else:
+            why = "it has no time, which [times] tool_change of the machine file gives"
+            found.assume(f"{text}; {why}", line, block.at["tool change"])
     store.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
     for letter, value in block.events:
         store.add_event(letter, value, line)
@@ -66,22 +69,22 @@ def events(state: State, store: Store, block: Block, note: Note) -> None:
             store.add_event("G", code / 10, line)
 
 
-def dwell(state: State, store: Store, block: Block, assumed: Assumed, note: Note) -> None:
+def dwell(state: State, store: Store, block: Block, assumed: Assumed, found: Findings) -> None:
     """G4. Raises WordFault."""
     seconds = block.value.get("P")
     if seconds is not None and assumed.printer:
         seconds *= MILLISECOND
-        note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        found.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
     elif seconds is None and not assumed.strict and (assumed.printer or "S" in block.value):
         seconds = block.value.get("S", 0.0)
-        note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
+        found.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
     if seconds is None or seconds < 0:
         word = block.at["one-shot"] if seconds is None else block.at["P"]
         raise WordFault(word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5")
     store.add_dwell(seconds, block.line, state)
 
 
-def path_control(state: State, block: Block, note: Note) -> None:
+def path_control(state: State, block: Block, found: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault."""
     state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
     if "P" in block.value and block.g["path control"] == 640:
@@ -96,6 +99,6 @@ def path_control(state: State, block: Block, note: Note) -> None:
         if tolerance > 0:
             state.tolerance = tolerance * state.unit
         else:
-            note("G64 P0 gives no tolerance; the machine's holds", block.line)
+            found.note("G64 P0 gives no tolerance; the machine's holds", block.line)
     if "Q" in block.value:
-        note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)
+        found.note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)

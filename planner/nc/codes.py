@@ -27,11 +27,13 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
-    """Something counted and said once: its name for one and for many, and what is assumed of it."""
+    """Something counted and said once: its name for one and for many, what is assumed of it, and whether that may change geometry or
+    time (docs/reading.md)."""
 
     one: str
     many: str
     said: str
+    changes: bool = False
 
 
 G_GROUP: dict[int, str] = {

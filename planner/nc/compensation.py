@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from planner.nc import codes
 from planner.nc.block import Block
 from planner.nc.cutter import Cutter
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
 from planner.nc.state import State
 from planner.nc.store import Store
-
-Note = Callable[[str, int], None]
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
 _OFF = 400
@@ -57,7 +54,7 @@ def check_motion(state: State, block: Block) -> None:
         raise WordFault(block.motion_word(), _refusal(f"G{codes.number(state.motion)}"))
 
 
-def switch(state: State, store: Store, block: Block, on: Cutter | None, note: Note) -> Cutter | None:
+def switch(state: State, store: Store, block: Block, on: Cutter | None, found: Findings) -> Cutter | None:
     """The compensation after G40 to G42.1, given the one in force. Raises WordFault."""
     code = block.g["cutter compensation"]
     if code == _OFF:
@@ -79,14 +76,14 @@ def switch(state: State, store: Store, block: Block, on: Cutter | None, note: No
             block.at["L"],
             f"the edge orientation L of {name} is not supported; remove it and write the tool's path",
         )
-    diameter = _diameter(state, block, code, note)
+    diameter = _diameter(state, block, code, found)
     if diameter == 0.0:
         return None
     left = (code in _LEFT) == (diameter > 0)
     return Cutter(state, store, radius=abs(diameter) / 2.0, left=left, normal=state.normal)
 
 
-def _diameter(state: State, block: Block, code: int, note: Note) -> float:
+def _diameter(state: State, block: Block, code: int, found: Findings) -> float:
     """[mm]"""
     name = f"G{codes.number(code)}"
     if code in _DYNAMIC:
@@ -96,5 +93,6 @@ def _diameter(state: State, block: Block, code: int, note: Note) -> float:
     number = integer(block, "D", 0) if "D" in block.value else state.tool_loaded
     tool = state.tools.get(number)
     if tool is None or tool.diameter == 0.0:
-        note(f"tool {number} has no diameter in the machine file: {name} does not move the path", block.line)
+        text = f"tool {number} has no diameter in the machine file: {name} does not move the path"
+        found.assume(text, block.line, block.at["cutter compensation"])
     return 0.0 if tool is None else tool.diameter

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +10,11 @@ from planner.nc import codes, cycles
 from planner.nc.arcs import AXES, IN_PLANE
 from planner.nc.block import Block
 from planner.nc.cycles import CycleStep, Hole
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
 from planner.nc.store import Store
-
-Note = Callable[[str, int], None]
 
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _BY_HAND = 880  # G88
@@ -27,7 +25,7 @@ _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [program
 _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 
-def drill(state: State, store: Store, block: Block, note: Note) -> None:
+def drill(state: State, store: Store, block: Block, found: Findings) -> None:
     """Execute the line. Raises WordFault for words that are missing or contradict each other."""
     a, b = IN_PLANE[state.normal]
     c = state.normal
@@ -52,7 +50,7 @@ def drill(state: State, store: Store, block: Block, note: Note) -> None:
         for step in cycles.steps(hole):
             _to(state, store, block.line, step)
         here[c] = hole.retract
-    _say(state, block, note)
+    _say(state, block, found)
 
 
 def _check_words(state: State, block: Block, words: dict[str, float]) -> None:
@@ -99,25 +97,25 @@ def _repeats(block: Block, hole: Hole) -> int:
     repeats = integer(block, "L", 1) if "L" in block.value else 1
     pecks = (hole.clear - hole.bottom) / hole.peck if hole.code in cycles.PECKING else 0.0
     if repeats * (_PER_HOLE + _PER_PECK * pecks) > STEPS_MAX:
-        found = (
+        text = (
             f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
         )
-        raise WordFault(block.motion_word(), found)
+        raise WordFault(block.motion_word(), text)
     return repeats
 
 
-def _say(state: State, block: Block, note: Note) -> None:
+def _say(state: State, block: Block, found: Findings) -> None:
     """What was assumed of a cycle."""
-    name = f"G{codes.number(state.motion)}"
+    name, word = f"G{codes.number(state.motion)}", block.motion_word()
     if not state.retract_given:
-        found = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"
-        note(f"{name} before any G98 or G99: {found}", block.line)
+        text = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"
+        found.assume(f"{name} before any G98 or G99: {text}", block.line, word)
     if state.motion == _BY_HAND:
-        found = "the operator retracts the tool after the full stop; the plan has a rapid for it"
-        note(f"{name}: {found}", block.line)
+        text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
+        found.assume(f"{name}: {text}", block.line, word)
     if state.motion in cycles.TAPPING:
-        found = "planned with F as its upper limit and full stops at both ends, not at constant feed"
-        note(f"{name} is synchronised with the spindle: {found}", block.line)
+        text = "planned with F as its upper limit and full stops at both ends, not at constant feed"
+        found.assume(f"{name} is synchronised with the spindle: {text}", block.line)
 
 
 def _series(state: State, code: int, level: float) -> CycleSeries:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
+from typing import NamedTuple, overload
 
 from planner.base.errors import InputError
 from planner.nc.lexer import Words
@@ -51,17 +51,34 @@ class FaultList(Sequence[Fault]):
         return Fault(line, words.column(word), words.text(word), message, words.file(word))
 
 
-class Findings:
-    """What is found while a program is read in chunks: faults by word, and notes on what was assumed.
+class Said(NamedTuple):
+    """A note, its line, and whether it is an assumption that may change geometry or time."""
 
+    line: int
+    text: str
+    changes: bool
+
+
+class Notes(NamedTuple):
+    """What is said of a program: assumptions that may change geometry or time, and other notes."""
+
+    assumptions: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+
+
+class Findings:
+    """What is found while a program is read in chunks: faults by word, assumptions that may change geometry or time, and other notes.
+
+    strict : such assumptions are faults
     faults : of the chunks so far, in the order of their words; a line that is executed many times is named once
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, strict: bool = False) -> None:
+        self.strict = strict
         self.faults: list[tuple[Words, int, str]] = []
         self._reports: list[tuple[int, str]] = []  # of the chunk that is being read
         self._said: set[tuple[int, str]] = set()
-        self._notes: dict[str, list[int]] = {}  # in their order: first line, times
+        self._notes: dict[tuple[bool, str], list[int]] = {}  # in their order: first line, times
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
@@ -77,16 +94,30 @@ class Findings:
         self._reports.clear()
 
     def note(self, text: str, line: int) -> None:
-        """Keep what was assumed on a line."""
-        self._notes.setdefault(text, [line, 0])[1] += 1
+        """Keep what a user should know of a line, and what changes neither geometry nor time."""
+        self._notes.setdefault((False, text), [line, 0])[1] += 1
 
-    def notes(self, more: list[tuple[int, str]]) -> tuple[str, ...]:
-        """What was assumed, each once, with its first line and how often; `more` are a line and a text each."""
+    def assume(self, text: str, line: int, word: int | None = None) -> None:
+        """Keep what was assumed on a line, and may change geometry or time.
+
+        word : index in the chunk; strict reading refuses it there. None where strict reading does not come by.
+        """
+        if self.strict and word is not None:
+            self.report(word, f"{text} (assumed without --strict)")
+        else:
+            self._notes.setdefault((True, text), [line, 0])[1] += 1
+
+    def notes(self, more: Sequence[Said]) -> Notes:
+        """What was assumed, each once, with its first line and how often, and `more`; in the order of the lines."""
         found = [
-            (line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}")
-            for text, (line, times) in self._notes.items()
+            Said(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
+            for (changes, text), (line, times) in self._notes.items()
         ]
-        return tuple(text for _, text in sorted(found + more, key=lambda note: note[0]))
+        ordered = sorted([*found, *more], key=lambda said: said.line)
+        return Notes(
+            tuple(said.text for said in ordered if said.changes),
+            tuple(said.text for said in ordered if not said.changes),
+        )
 
 
 def require_none(faults: Sequence[Fault], source: str) -> None:

@@ -12,15 +12,13 @@ that n changes by at most `SURFACE_STEP` in a part, and a part has the feed of i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes
 from planner.nc.block import Block
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.state import FeedMode, State
-
-Note = Callable[[str, int], None]
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
 SURFACE_STEP = (
@@ -33,7 +31,7 @@ _SLOWEST = (
 )
 
 
-def set_feed(state: State, block: Block, note: Note) -> None:
+def set_feed(state: State, block: Block, found: Findings) -> None:
     """The feed mode and F of a block. Raises WordFault for an F that is not positive."""
     mode = _MODES[block.g["feed mode"]] if "feed mode" in block.g else state.feed_mode
     if mode != state.feed_mode:
@@ -55,19 +53,19 @@ def set_feed(state: State, block: Block, note: Note) -> None:
     code = block.g.get("units")
     if code is not None and (code == 200) != (state.unit != 1.0):
         unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")
-        note(
+        found.note(
             f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line",
             block.line,
         )
 
 
-def take_default(state: State, default: float | None, block: Block, note: Note) -> None:
+def take_default(state: State, default: float | None, block: Block, found: Findings) -> None:
     """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
     if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
         return
     state.feed, state.feed_unit = default, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
-    note(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
+    found.assume(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 
 
 def check_feed(state: State, block: Block) -> None:

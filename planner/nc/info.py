@@ -36,6 +36,7 @@ class ProgramInfo:
     """Lengths [mm], times [s], feeds [mm/s]; NaN where there is nothing to measure.
 
     source           : file name
+    assumptions      : what was assumed and may change geometry or time
     lines            : source lines
     blocks           : number of blocks by `Kind` name, in lower case; "spline" only where there are some
     full_circles     : arcs of a full turn and more;  helices : arcs that rise along their axis
@@ -49,13 +50,14 @@ class ProgramInfo:
     zero_moves       : moves that end where they start
     dwell            : sum of all dwells [s]
     tools            : tool numbers in the order of their T words
-    notes            : what the reader assumed
+    notes            : what the reader says of it, `assumptions` first
     expansion        : what was expanded: calls, turns of loops, lines executed; None where nothing was
     tool_point       : where the tool centre point is on; None where x, y and z are those of the joints
     unsupported      : every construct that is not supported or not valid
     """
 
     source: str
+    assumptions: tuple[str, ...]
     lines: int
     blocks: dict[str, int]
     full_circles: int
@@ -98,6 +100,7 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
     low, high = _extents(program, start)
     return ProgramInfo(
         source=program.source,
+        assumptions=program.assumptions,
         lines=lines,
         blocks={
             kind.name.lower(): int((program.kind == kind).sum())

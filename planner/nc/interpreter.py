@@ -22,14 +22,14 @@ from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, off
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block, read_block
 from planner.nc.cutter import CutterFault
-from planner.nc.faults import FaultList, Findings
+from planner.nc.faults import FaultList, Findings, Notes
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover
 from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
-from planner.nc.state import REFUSED_MOTION, Setup, State, set_units, system_name
+from planner.nc.state import REFUSED_MOTION, Setup, State, set_units
 from planner.nc.store import Store
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
@@ -63,7 +63,8 @@ class Interpreter:
             at_tip=self.tool_point.chain is not None,
         )
         store = Store(len(state.further.letters))
-        self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.note)
+        self.found = Findings(strict=reading.strict)
+        self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.found)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[tuple[int, bool]] = []
@@ -74,8 +75,7 @@ class Interpreter:
         self._words: Words | None = None  # of the last chunk
         self._begun = False
         self._read = 0  # rows of the last chunk
-        self._units_at: int | None = None  # number of blocks before the first G20 or G21
-        self.found = Findings()
+        self._units_known = False  # by a G20 or G21, or it was said that there was none before the first move
 
     @property
     def state(self) -> State:
@@ -97,8 +97,7 @@ class Interpreter:
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
-        self._note_units()
-        self._note_feeds()
+        self._assume_feeds()
         self._end_compensation()
         read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         return read if self.found.faults else at_the_tip(read, self.tool_point, self.setup.machine)
@@ -118,7 +117,7 @@ class Interpreter:
             self.found.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> Notes:
         """What was assumed, each once, with its first line and how often."""
         return self.found.notes(self.assumed.notes())
 
@@ -146,6 +145,7 @@ class Interpreter:
                 after += 1
             row = after
         self._read = row
+        self._assume_units()
         self.mover.splines.keep(words)
         refused = self.store.refused_word[: self.store.refusals]
         letters = words.letter[refused]
@@ -176,20 +176,28 @@ class Interpreter:
         self.found.report(word, message)
 
     def note(self, text: str, line: int) -> None:
-        """Keep what was assumed on a line."""
+        """Keep what a user should know of a line."""
         self.found.note(text, line)
+
+    def assume(self, text: str, line: int) -> None:
+        """Keep what was assumed on a line and may change geometry or time; what is strict does not come by."""
+        self.found.assume(text, line)
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
         return FaultList(self.found.faults + self.mover.splines.faults())
 
-    def _note_units(self) -> None:
-        """Say it if the first move comes before any G20 or G21."""
-        moves = np.flatnonzero(np.isin(self.store.block.kind[: self.store.blocks], MOVES))
-        if len(moves) and (self._units_at is None or moves[0] < self._units_at):
-            self.note("no G20 or G21 before the first move: mm", int(self.store.block.line[moves[0]]))
+    def _assume_units(self) -> None:
+        """Say it if there is a move before any G20 or G21."""
+        moves = np.isin(self.store.block.kind[: self.store.blocks], MOVES)
+        if self._units_known or self._words is None or not moves.any():
+            return
+        self._units_known = True
+        line = int(self.store.block.line[moves.argmax()])
+        row = int((self._words.line == line).argmax())
+        self.found.assume("no G20 or G21 before the first move: mm", line, int(self._words.first[row]))
 
-    def _note_feeds(self) -> None:
+    def _assume_feeds(self) -> None:
         """Say it if feed moves are so slow that F is most likely one per turn of the spindle."""
         kind, feed = (
             column[: self.store.blocks] for column in (self.store.block.kind, self.store.block.feed)
@@ -198,7 +206,7 @@ class Interpreter:
         if len(slow) and not self._timed:
             at = feed[slow[0]] * SECONDS_PER_MINUTE
             text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
-            self.note(text, int(self.store.block.line[slow[0]]))
+            self.assume(text, int(self.store.block.line[slow[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -219,29 +227,28 @@ class Interpreter:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
             compensation.check_unchanged(self.state, block)
-        feeds.set_feed(self.state, block, self.note)
+        feeds.set_feed(self.state, block, self.found)
         self._timed |= self.state.feed_mode == "inverse time"
-        auxiliary.events(self.state, self.store, block, self.note)
+        auxiliary.events(self.state, self.store, block, self.found)
         if block.g.get("one-shot") == 40:
-            auxiliary.dwell(self.state, self.store, block, self.assumed, self.note)
+            auxiliary.dwell(self.state, self.store, block, self.assumed, self.found)
         self._modes(block)
         turned = self.state.further.position.copy()
         if not block.foreign:
             self._check_parked(block)
-            homing.go_to_switches(self.state, self.store, block, self.note)
+            homing.go_to_switches(self.state, self.store, block, self.found)
             self._one_shot(block)
             self.mover.execute(block)
             if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
-                self.note(
-                    f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}",
-                    block.line,
-                )
+                text = f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}"
+                self.found.assume(text, block.line, block.motion_word())
             self.tool_point.check(self.state, block, turned)
         stop = block.m.get("stopping")
         if stop is not None and self.mover.cutter is not None:
             self.mover.cutter.fix()
         if stop == 600:
-            self.note("a pallet change (M60) is a full stop; the axes are assumed to stand still", block.line)
+            text = "a pallet change (M60) is a full stop; the axes are assumed to stand still"
+            self.found.assume(text, block.line, block.at["stopping"])
         if stop in (0, 10, 600):
             self.store.add_event("M", stop / 10, block.line)
         if stop in (0, 10, 600) or block.stops:
@@ -258,21 +265,19 @@ class Interpreter:
             state.normal = {170: 2, 180: 1, 190: 0}[g["plane"]]
         if "units" in g:
             set_units(state, g["units"])
-            if self._units_at is None:
-                self._units_at = self.store.blocks
+            self._assume_units()
+            self._units_known = True
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
         if "cutter compensation" in g:
-            self.mover.cutter = compensation.switch(state, self.store, block, self.mover.cutter, self.note)
+            self.mover.cutter = compensation.switch(state, self.store, block, self.mover.cutter, self.found)
         if "tool length" in g:
-            offsets.set_tool_offset(state, block, self.note)
+            offsets.set_tool_offset(state, block, self.found)
         self.tool_point.take(state, self.store, block)
         if "work offset" in g:
-            state.system = offsets.system_of(block)
-            if state.system not in state.systems and state.system != 540:
-                self.note(f"{system_name(state.system)} has no offset in the machine file: 0", block.line)
+            offsets.take_system(state, block, self.found)
         if "path control" in g:
-            auxiliary.path_control(state, block, self.note)
+            auxiliary.path_control(state, block, self.found)
         if "distance mode" in g:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
@@ -298,11 +303,11 @@ class Interpreter:
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
             )
         if code in (280, 300):
-            homing.go_home(self.state, self.store, block, self.note)
+            homing.go_home(self.state, self.store, block, self.found)
         elif code in (281, 301):
             offsets.store_position(self.state, code)
         elif code == 100:
-            offsets.set_data(self.state, block, self.note)
+            offsets.set_data(self.state, block, self.found)
         else:
             offsets.shift_origin(self.state, block)
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, compensation, drilling, feeds, further_moves, moves, threads
+from planner.nc import codes, compensation, drilling, feeds, further_moves, moves, offsets, threads
 from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block
 from planner.nc.cutter import Cutter
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.program import Kind
 from planner.nc.splines import SplineReader, is_spline_line
@@ -30,7 +29,7 @@ class Mover:
     """Executes the motion of blocks, one after the other: moves the state, and appends to the store.
 
     feed_default : of moves before the first F word [mm/s], or None
-    note    : keeps what was assumed on a line
+    found   : keeps what is assumed
     cutter  : the cutter radius compensation that is on, or None
     splines : of lines that are read, and of those that are open
     """
@@ -41,10 +40,10 @@ class Mover:
         store: Store,
         assumed: Assumed,
         feed_default: float | None,
-        note: Callable[[str, int], None],
+        found: Findings,
     ):
         self.state, self.store, self.assumed = state, store, assumed
-        self.feed_default, self.note = feed_default, note
+        self.feed_default, self.found = feed_default, found
         self.cutter: Cutter | None = None
         self.splines = SplineReader()
 
@@ -56,6 +55,7 @@ class Mover:
             return
         if block.g.get("one-shot") == 530:
             moves.check_machine_coordinates(state, block)
+            offsets.assume_origin(state, "G53", block, self.found)
         if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
             self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
@@ -64,8 +64,8 @@ class Mover:
         elif moves.is_move(state, block):
             self._move(block)
         elif "motion" in block.g and state.motion > 3:
-            found = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
-            raise WordFault(block.at["motion"], found)
+            text = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
+            raise WordFault(block.at["motion"], text)
 
     def _take_code(self, block: Block) -> None:
         """The motion code of a block stays in force, until another one or G80."""
@@ -77,7 +77,7 @@ class Mover:
 
     def _take_default_feed(self, block: Block) -> None:
         if not self.assumed.strict:
-            feeds.take_default(self.state, self.feed_default, block, self.note)
+            feeds.take_default(self.state, self.feed_default, block, self.found)
 
     def _move(self, block: Block) -> None:
         """A block with a motion code in force, and somewhere to go."""
@@ -95,12 +95,12 @@ class Mover:
         if state.motion > 3:
             further_moves.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
-            threads.thread(state, self.store, block, self.note)
+            threads.thread(state, self.store, block, self.found)
         elif state.motion == codes.THREADING:
-            threads.cut_thread(state, self.store, block, self.note)
+            threads.cut_thread(state, self.store, block, self.found)
         elif state.motion in codes.CYCLES:
             feeds.check_feed(state, block)
-            drilling.drill(state, self.store, block, self.note)
+            drilling.drill(state, self.store, block, self.found)
         elif state.motion in (2, 3):
             self._arc(block)
         else:

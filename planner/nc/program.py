@@ -157,7 +157,9 @@ class Program:
     synchronised : (K,) indices of the blocks that are cut in step with the spindle, at their feed and no other, ascending
     splines      : of the blocks of kind SPLINE
     events       : words without influence on the motion
-    notes        : what the reader assumed and a user should know ("line 9: tool 3 has no length in the machine file: 0 (2 times)")
+    notes        : what a user should know of how it was read; `assumptions` come first
+    assumptions  : what the reader assumed and what may change geometry or time: "line 9: tool 3 has no length in the machine file: 0
+                   (2 times)"
     frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
     frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
     expansion    : what was expanded; None where nothing was
@@ -187,6 +189,7 @@ class Program:
     splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     notes: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
@@ -219,6 +222,8 @@ class Program:
             raise ValueError(f"Program.splines: {self.splines.points.shape[2]} axes, expected {axes}")
         freeze(self, "frame", np.int32, (blocks if self.frames else 0,))
         freeze(self, "extruded", np.float64, (blocks if len(self.extruded) else 0,))
+        if self.notes[: len(self.assumptions)] != self.assumptions:
+            raise ValueError("Program.notes: the assumptions come first")
         if not (self.feed > 0).all():
             raise ValueError("Program.feed: every feed must be positive")
 

@@ -138,7 +138,7 @@ def execute(
     dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
     if is_turned(words, dialect, reading, machine):
         dialect = LATHE
-        interpreter.note(LATHE_NOTE, int(words.line[0]))
+        interpreter.assume(LATHE_NOTE, int(words.line[0]))
     elif dialect != SIEMENS and not reading.strict:
         interpreter.two_axes = has_two_axes(words)
     interpreter.state.fanuc = (
@@ -165,7 +165,9 @@ def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Progr
         f"line {open_arcs[0][0]}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
         "(--arc-centres absolute|incremental says which)"
     )
-    return dataclasses.replace(program, notes=(note, *program.notes))
+    return dataclasses.replace(
+        program, notes=(note, *program.notes), assumptions=(note, *program.assumptions)
+    )
 
 
 def load(path: str | Path) -> bytes:

@@ -25,11 +25,13 @@ UNKNOWN_M = Assumption(
     "M code that this reader does not know",
     "M codes that this reader does not know",
     "assumed not to move anything",
+    changes=True,
 )
 TOOL_POINT_M = Assumption(
     "switch to the tool centre point, as some controls have it (M128, M428)",
     "switches to the tool centre point, as some controls have them (M128, M428)",
     "not followed: every axis is planned as a joint, and with the switch on the tool takes another path",
+    changes=True,
 )
 # M codes that switch the tool centre point on and off, by number: Heidenhain's and LinuxCNC's.
 TOOL_POINT_ON, TOOL_POINT_OFF = (128, 428), (129, 429)
@@ -47,16 +49,19 @@ RETRACTION = Assumption(
     "retraction of an extruder (G10, G11)",
     "retractions of an extruder (G10, G11)",
     "they take no time in this plan",
+    changes=True,
 )
 G_SETTING = Assumption(
     "G code that sets the control or cancels what this reader does not have",
     "G codes that set the control or cancel what this reader does not have",
     "assumed not to move anything",
+    changes=True,
 )
 PARKS = Assumption(
     "code that changes or loads filament, or parks the head",
     "codes that change or load filament, or park the head",
     "a full stop; what it moves is not planned, and the head is assumed to come back",
+    changes=True,
 )
 
 # By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.

@@ -111,6 +111,7 @@ class State:
     actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     strict       : nothing is assumed (`Reading.strict`)
     fanuc        : G10 L2 and L20 are those of Fanuc and Haas
+    change_timed : how long a tool change takes is known
     in_thread    : the last block was cut in step with the spindle
     further      : axes beside x, y and z
     """
@@ -145,6 +146,7 @@ class State:
     series: CycleSeries | None = None
     cycle_dwell: float = 0.0
     actual: FloatArray | None = None
+    change_timed: bool = False
     in_thread: bool = False
     strict: bool = False
     fanuc: bool = False
@@ -227,11 +229,13 @@ class Setup:
 
     def start(self) -> State:
         """The modal state at the start of a program."""
+        times = self.machine.times if self.machine is not None else None
         state = State(
             path_control=self.path_control,
             systems={code: System(origin) for code, origin in self.systems.items()},
             homes=dict(self.positions),
             tools=dict(self.tools),
+            change_timed=times is not None and times.tool_change is not None,
             further=further_of(self.machine, system_code),
         )
         state.apply_offsets()

@@ -12,6 +12,7 @@ from planner.base.units import RAD_PER_DEG
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
+from planner.nc.faults import Notes
 from planner.nc.further import LETTERS, ROTARY, rotary_feed
 from planner.nc.program import FEED_MOVES, Frame, Kind, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
@@ -158,7 +159,7 @@ class Store:
     def finish(
         self,
         source: str,
-        notes: Sequence[str],
+        notes: Notes,
         frames: Sequence[Frame] = (),
         reading: Reading = AS_USUAL,
         further: str = "",
@@ -202,7 +203,8 @@ class Store:
                 letter=self.event.letter[seen].copy(),
                 value=self.event.value[seen].copy(),
             ),
-            notes=tuple(notes),
+            notes=notes.assumptions + notes.others,
+            assumptions=notes.assumptions,
             reading=reading,
             frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
             frames=tuple(frames),

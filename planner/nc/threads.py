@@ -8,25 +8,22 @@ LinuxCNC accelerates in the synchronised move, too. G33.1 taps: along the thread
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes, moves, thread_cycle
 from planner.nc.block import Block
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.store import Store
 
-Note = Callable[[str, int], None]
-
 _AND_BACK = 331  # G33.1
 
 
-def thread(state: State, store: Store, block: Block, note: Note) -> None:
+def thread(state: State, store: Store, block: Block, found: Findings) -> None:
     """G33, or G33.1 with its way back. Raises WordFault for words that are missing or impossible."""
     name = f"G{codes.number(state.motion)}"
     if block.value.get("K", 0.0) == 0.0:
@@ -41,10 +38,10 @@ def thread(state: State, store: Store, block: Block, note: Note) -> None:
         stop(state, store, block.line)
         state.in_thread = True
         _cut(state, store, block.line, start, feed * faster)
-    _say(state, block, note)
+    _say(state, block, found)
 
 
-def cut_thread(state: State, store: Store, block: Block, note: Note) -> None:
+def cut_thread(state: State, store: Store, block: Block, found: Findings) -> None:
     """G76. Raises WordFault for words that are missing or impossible."""
     target, here = moves.target(state, block), state.programmed()
     state.position[:], there = target, state.position.copy()
@@ -59,7 +56,7 @@ def cut_thread(state: State, store: Store, block: Block, note: Note) -> None:
         else:
             _rapid(state, store, block.line, place)
     _rapid(state, store, block.line, target)
-    _say(state, block, note)
+    _say(state, block, found)
 
 
 def stop(state: State, store: Store, line: int) -> None:
@@ -90,8 +87,8 @@ def _rapid(state: State, store: Store, line: int, place: FloatArray) -> None:
         store.add(Kind.RAPID, line, state)
 
 
-def _say(state: State, block: Block, note: Note) -> None:
-    note(
+def _say(state: State, block: Block, found: Findings) -> None:
+    found.note(
         f"G{codes.number(state.motion)} is in step with the spindle: its feed is pitch times S, between a run-in and a run-out "
         "that begin and end with full stops",
         block.line,

@@ -153,6 +153,7 @@ def summary(plan: Plan) -> dict[str, Any]:
     return json_ready(
         {
             "program": plan.program.source,
+            "assumptions": plan.program.assumptions,
             "machine": plan.machine.name,
             "method": plan.method,
             "geometry": plan.geometry,
@@ -216,6 +217,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "run_id": run_id,
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "program": plan.program.source,
+            "assumptions": plan.program.assumptions,
             "method": plan.method,
             "geometry": plan.geometry,
             "corner": plan.corner,

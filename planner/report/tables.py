@@ -31,12 +31,13 @@ CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.cor
 # Lines of each, so that a table fits a terminal of 24 rows.
 FAULTS_SHOWN = 8
 NOTES_SHOWN = 8
+ASSUMED_SHOWN = 8
 
 
 def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing time, how it was solved.
 
-    notes : printed below; None for those of the plan
+    notes : printed below, without what `assumed_lines` says first; None for those of the plan
     """
     title = f"{plan.program.source}: {plan.method}{_smoothing(plan)}, machine {plan.machine.name}"
     table = _pairs()
@@ -61,8 +62,14 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
     table.add_row("solution", plan.sentence)
-    said = plan.notes if notes is None else notes
+    first = set(plan.program.assumptions)
+    said = [note for note in (plan.notes if notes is None else notes) if note not in first]
     return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
+
+
+def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
+    """What was assumed of a program and may change geometry or time: the first lines of what a command prints; at most so many."""
+    return [Text(f"assumed: {text}", style="yellow") for text in _first(assumptions, most)]
 
 
 def _smoothing(plan: Plan) -> str:
@@ -117,7 +124,7 @@ def corners_table(corners: CornerCheck) -> Table | None:
 
 
 def info_table(info: ProgramInfo) -> Group:
-    """What a program contains, then what the reader assumed and every construct that is not supported."""
+    """What the reader assumed, what a program contains, and every construct that is not supported."""
     blocks = sum(info.blocks.values())
     title = f"{info.source}: {info.lines:,} lines, {blocks:,} blocks"
     table = _pairs()
@@ -153,10 +160,17 @@ def info_table(info: ProgramInfo) -> Group:
         table.add_row(
             "tool centre point", f"on by {point.word}, line {point.line}; a tool of {point.length:g} mm"
         )
-    notes = [Text(f"note: {note}") for note in info.notes]
-    if not info.unsupported:
-        return _titled(title, table, *notes, Text("every construct is supported", style="green"))
-    return _titled(title, table, *notes, *_unsupported(info.unsupported))
+    others = info.notes[len(info.assumptions) :]
+    below = [Text(f"note: {note}") for note in others]
+    if info.unsupported:
+        below += _unsupported(info.unsupported)
+    elif info.assumptions:
+        below.append(
+            Text("nothing is refused; geometry and time hold if what is assumed above is so", style="yellow")
+        )
+    else:
+        below.append(Text("every construct is supported", style="green"))
+    return Group(*assumed_lines(info.assumptions, PLACES_SHOWN), Text(title, style="bold"), table, *below)
 
 
 def _expanded(expansion: Expansion) -> str:

@@ -49,10 +49,13 @@ def test_notes_are_printed_and_in_json(tmp_path: Path) -> None:
     job, out = tmp_path / "job.ngc", tmp_path / "out"
     job.write_text("F3000\nG1 X10\nY10\n")
     note = "line 2: no G20 or G21 before the first move: mm"
-    assert f"note: {note}" in run(job, "--method", "stop").stdout
+    printed = run(job, "--method", "stop").stdout
+    assert printed.startswith(f"assumed: {note}\n")
+    assert printed.count(note) == 1
     said = json.loads(run(job, "--method", "stop", "--json", "-o", out).stdout)
     assert said["notes"] == json.loads((out / "summary.json").read_text())["notes"]
     assert said["notes"][0] == note
+    assert said["assumptions"] == [note]
     assert said["notes"][1].startswith("planned.ngc equals the program")
 
 

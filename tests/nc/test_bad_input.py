@@ -10,9 +10,10 @@ import pytest
 
 from planner.base.errors import InputError
 from planner.nc import codes
+from planner.nc.faults import require_none
 from planner.nc.info import inspect_program
 from planner.nc.lexer import LINE_MAX
-from planner.nc.reader import parse_program, read_program
+from planner.nc.reader import interpret, parse_program, read_program
 from planner.nc.reading import Reading
 from planner.nc.settings import setting
 
@@ -147,7 +148,7 @@ def test_refused(text: str | bytes, line: int, column: int, parts: list[str], st
         parse_program(text)
         return
     with pytest.raises(InputError) as caught:
-        parse_program(text, reading=Reading(strict=strict), source="job.ngc")
+        _read(text, strict)
     fault = caught.value
     assert (fault.source, fault.line, fault.column) == ("job.ngc", line, column)
     for part in parts:
@@ -155,11 +156,17 @@ def test_refused(text: str | bytes, line: int, column: int, parts: list[str], st
     assert str(fault).startswith(f"job.ngc:{line}:{column}: ")
 
 
+def _read(text: str | bytes, strict: bool) -> None:
+    """Read a text; of strict reading without what it refuses of the missing G21 alone."""
+    _, faults = interpret(text, None, Reading(strict=strict), source="job.ngc")
+    require_none([it for it in faults if "assumed without --strict" not in it.message], "job.ngc")
+
+
 @pytest.mark.parametrize(("letter", "needs"), codes.LETTER_NEEDS.items())
 def test_words_that_nothing_uses_are_refused(letter: str, needs: str) -> None:
     if letter == "E":
         return  # refused as an extruder's
-    text = f"G21 {letter}1\nG0 X1" if letter in "QH" else f"G0 X1 {letter}1"
+    text = f"G21 {letter}1\nG0 X1" if letter in "QH" else f"G21 G0 X1 {letter}1"
     with pytest.raises(InputError, match=f"{letter} word without {needs}"):
         parse_program(text, reading=Reading(strict=letter in "DH"))
 

@@ -185,7 +185,7 @@ def test_g92_3_brings_back_what_g92_2_took() -> None:
 
 
 def test_home_through_a_point() -> None:
-    of = machine(positions={"g28": {"x": 100.0, "z": 50.0}})
+    of = machine(positions={"g28": {"x": 100.0, "z": 50.0}}, work_offsets={"g54": {"x": 0.0}})
     program = parse_program("G21 G0 X1 Y2 Z3\nG91 G28 Z4\nG28\nG90 G30 X5 Y5", of)
     assert program.end.tolist() == [[1, 2, 3], [1, 2, 7], [1, 2, 50], [100, 0, 50], [5, 5, 50], [0, 0, 50]]
     assert program.line.tolist() == [1, 2, 2, 3, 4, 4]
@@ -235,13 +235,15 @@ def test_a_motion_code_alone_moves_nothing() -> None:
 def test_notes_say_what_is_missing() -> None:
     program = parse_program("T3 M6\nG43 H3\nG56\nG28\nG28\nG64 Q1 P1\nG64 Q1 P1\nG43 H3", machine())
     assert program.notes == (
-        "line 1: a tool change is a full stop of the motion that moves nothing",
+        "line 1: a tool change is a full stop of the motion that moves nothing; it has no time, which [times] tool_change of the "
+        "machine file gives",
         "line 2: tool 3 has no length in the machine file: 0 (2 times)",
         "line 3: G56 has no offset in the machine file: 0",
         "line 4: G28 has no position in the machine file: machine zero (2 times)",
         "line 4: no G20 or G21 before the first move: mm",
         "line 6: G64 Q is not used: the tolerance of P bounds every deviation (2 times)",
     )
+    assert program.assumptions == program.notes[:-1]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.machine import LINEAR_AXES
 from planner.nc.events import EventTable
+from planner.nc.faults import Notes
 from planner.nc.program import Kind, PathControl, Program
 
 Point = tuple[float, float]
@@ -54,7 +55,7 @@ class Drawing:
         """An event before the next block."""
         self.events.append((len(self.kind), at, letter, value))
 
-    def finish(self, data: bytes, source: str, path_control: PathControl, notes: Sequence[str]) -> Program:
+    def finish(self, data: bytes, source: str, path_control: PathControl, notes: Notes) -> Program:
         """The program; `data` is the text it was read from."""
         blocks, arcs = len(self.kind), len(self.arcs)
         newline = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
@@ -80,7 +81,8 @@ class Drawing:
                 letter=np.array([ord(event[2]) for event in self.events], dtype=np.uint8),
                 value=np.array([event[3] for event in self.events], dtype=np.float64),
             ),
-            notes=tuple(notes),
+            notes=notes.assumptions + notes.others,
+            assumptions=notes.assumptions,
             pen=True,
         )
 

@@ -23,7 +23,7 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
-from planner.nc.faults import Fault
+from planner.nc.faults import Fault, Notes
 from planner.nc.hpgl.arcs import circle_through
 from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point
 from planner.nc.hpgl.instructions import ALLOWED, FORMS, IGNORED, PAGE_ENDS, REFUSED
@@ -110,12 +110,15 @@ class _Run:
         text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
         return text if text.isprintable() else ""
 
-    def all_notes(self) -> list[str]:
+    def all_notes(self) -> Notes:
         notes = [f"read as a plotter file (HPGL), 1 plotter unit = {self.plotter.unit:g} mm"]
+        assumed = []
         at_will = next((k for k in range(len(self.drawing.kind)) if self._is_unlimited(k)), None)
         if at_will is not None:
             line = self._place(self.drawing.at[at_will])[0]
-            notes.append(f"line {line}: no speed (VS) before it; the pen runs as fast as the machine allows")
+            assumed.append(
+                f"line {line}: no speed (VS) before it; the pen runs as fast as the machine allows"
+            )
         for name, places in self.ignored.items():
             line, times = self._place(places[0])[0], f"{len(places)} times, first " if len(places) > 1 else ""
             notes.append(f"{name} ignored, {times}on line {line}: {IGNORED.get(name, 'the end of a page')}")
@@ -127,8 +130,8 @@ class _Run:
                 else "instructions that this reader does not know"
             )
             word, line = self._word(first, first + 2), self._place(first)[0]
-            notes.append(f"{count:,} {what}: left out, as plotters do; first {word} line {line}")
-        return [*notes, *self.notes]
+            assumed.append(f"{count:,} {what}: left out, as plotters do; first {word} line {line}")
+        return Notes(tuple(assumed), (*notes, *self.notes))
 
     def _is_unlimited(self, block: int) -> bool:
         return self.drawing.kind[block] in (Kind.LINE, Kind.ARC) and self.drawing.feed[block] == math.inf

@@ -73,7 +73,7 @@ def tapped(
     if not (speed > 0.0 and lead != 0.0):
         raise ValueError("tapping needs the lead of the thread and the speed of the spindle")
     size = abs(lead)
-    making.note(
+    making.assume(
         "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
     )
     first, second = (3.0, 4.0) if lead > 0.0 else (4.0, 3.0)

@@ -22,7 +22,7 @@ from planner.nc.program import Kind
 
 def compensate(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """Radius compensation: side 1 left, -1 right, 0 off."""
-    making.travel.compensate(round(given["side"]), making.note)
+    making.travel.compensate(round(given["side"]), making.assume)
     return []
 
 
@@ -51,7 +51,7 @@ def _approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
         compensated=given["side"] != 0.0,
     )
     found.check("APPR")
-    making.travel.approach(found, making.note)
+    making.travel.approach(found, making.assume)
     return []
 
 

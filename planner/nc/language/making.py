@@ -55,6 +55,12 @@ class Making:
         """Keep a note of the command's line."""
         self.interpreter.note(text, self.line)
 
+    def assume(self, text: str) -> None:
+        """Keep what is assumed of the command and may change geometry or time. Raises ValueError where nothing may be assumed."""
+        if self.interpreter.found.strict:
+            raise ValueError(f"{text} (assumed without --strict)")
+        self.interpreter.assume(text, self.line)
+
 
 def equal_steps(whole: float, most: float) -> int:
     """The number of equal steps of at most `most` that a length is divided into; 1 where `most` is 0. Raises ValueError."""

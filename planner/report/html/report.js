@@ -36,6 +36,7 @@
       row.append(said);
       element("judged").append(row);
     }
+    for (const text of summary.assumptions || []) element("assumed").append(make("li", `assumed: ${text}`));
     for (const note of summary.notes.length ? summary.notes : ["nothing was assumed or given up"]) element("notes").append(make("li", note));
     const prices = summary.prices, saved = prices && prices.saved_s ? Object.entries(prices.saved_s) : [];
     if (saved.length) {

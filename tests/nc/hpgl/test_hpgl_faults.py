@@ -109,7 +109,10 @@ def test_what_is_left_out_is_noted():
     assert "device control (ESC sequences, @PJL lines) is left out" in program.notes
     assert "the file ends with '$\\x1a', which is no instruction; left out" in program.notes
     assert any(note.startswith("SM ignored") for note in program.notes)
-    assert "1 plotter unit = 0.025 mm" in program.notes[0]
+    assert "1 plotter unit = 0.025 mm" in program.notes[1]
+    assert program.assumptions == (
+        "line 2: no speed (VS) before it; the pen runs as fast as the machine allows",
+    )
 
 
 # --- which language -----------------------------------------------------------------------------------------------------------
@@ -145,7 +148,10 @@ def test_info_of_a_plotter_file(tmp_path):
     result = CliRunner().invoke(app, ["info", str(path), "-m", "plotter"])
     assert result.exit_code == 0, result.output
     assert "as fast as the machine allows" in result.stdout
-    assert "every construct is supported" in result.stdout
+    assert "every construct is supported" not in result.stdout
+    path.with_name("slow.plt").write_text("IN;VS10;SP1;PU0,0;PD400,0;CI200;")
+    slow = CliRunner().invoke(app, ["info", str(path.with_name("slow.plt")), "-m", "plotter"])
+    assert "every construct is supported" in slow.stdout
     said = json.loads(CliRunner().invoke(app, ["info", str(path), "--json"]).stdout)
     assert said["blocks"] == {"rapid": 3, "line": 1, "arc": 1, "dwell": 0, "stop": 6}
     assert said["feed"] == [None, None]

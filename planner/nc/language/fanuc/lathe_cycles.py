@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.faults import Notes
 from planner.nc.language.tree import SourcePlace
 from planner.nc.lathe_cuts import Pecking, pecked, single_cut, single_thread
 from planner.nc.lathe_thread import LatheThread, Pass, ThreadFault, thread_passes
@@ -106,7 +107,7 @@ class LatheCycles:
     def _contour(self) -> Contour:
         """The blocks that were executed aside as a profile; the state is again what it was before them. Raises ValueError."""
         interpreter = self.run.interpreter
-        program, offset = interpreter.store.finish("", ()), interpreter.state.offset.copy()
+        program, offset = interpreter.store.finish("", Notes()), interpreter.state.offset.copy()
         self.leave()
         if (offset != interpreter.state.offset).any():
             raise ValueError("the profile changes an offset; write it before the cycle")
@@ -121,7 +122,7 @@ class LatheCycles:
     def _removal(self, given: Given, *, facing: bool) -> Iterable[Words]:
         contour, unit = self._contour(), self._unit
         if "R" not in given:
-            self.run.interpreter.note(
+            self.run.interpreter.assume(
                 f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", self._place.line
             )
         roughing = Roughing(
@@ -174,7 +175,7 @@ class LatheCycles:
     def _pecking(self, given: Given, *, grooving: bool) -> Iterable[Words]:
         start = self._here()
         if "K" in given and "R" not in given:
-            self.run.interpreter.note(
+            self.run.interpreter.assume(
                 f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", self._place.line
             )
         pecking = Pecking(

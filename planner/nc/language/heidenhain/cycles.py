@@ -170,10 +170,10 @@ def _plan(making: Making, given: Mapping[str, float]) -> PocketPlan:
     if kind not in (0, 1, 2):
         raise ValueError(f"Q215 {given['Q215']:g} is none of 0 (all), 1 (roughing) and 2 (finishing)")
     if given["Q366"]:
-        making.note(
+        making.assume(
             "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
         )
-    making.note("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
+    making.assume("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
     top = given["Q203"]
     return PocketPlan(
         clear=top + given["Q200"],

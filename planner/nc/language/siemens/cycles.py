@@ -140,7 +140,7 @@ def _pocket(name: str) -> Maker:
             raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
         radius = making.tool_radius()
         plan = _plan(making, name, given, radius)
-        making.note(
+        making.assume(
             f"{name}: passes and allowances are those of the cycle, the single paths this reader's own"
         )
         place = complex(given["PA"], given["PO"])

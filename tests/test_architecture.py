@@ -92,6 +92,7 @@ VERIFY_MAY_IMPORT = {
     "base.called",
     "base.kernels",
     "base.series",
+    "base.sizes",
     "base.threads",
     "machine",
     "geometry.toolpath",

@@ -19,6 +19,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.base.sizes import SIZES
 from planner.base.units import MM_PER_INCH
 from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
@@ -26,7 +27,7 @@ from planner.motion.trajectory import Trajectory
 DEPTH = 4000  # rows that wait in the FIFO: four seconds at 1 ms, while the disk may be busy
 AXES_MAX = 20  # pins of one streamer
 _NANOSECONDS = 1e9  # in a second: HAL gives a thread's period in them
-_ROWS_AT_ONCE = 100_000  # that are written as text together: 100 bytes each, so some 10 MB
+_ROWS_AT_ONCE = SIZES.text_rows
 # mm in a length unit of the streamed positions.
 UNITS = {"mm": 1.0, "inch": MM_PER_INCH}
 FILES = ("setpoints.txt", "stream.hal", "try.hal")

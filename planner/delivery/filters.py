@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.delivery.filtered_setpoints import PER_PERIOD, FilteredSetpoints
 from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
 from planner.delivery.periods import Standing, standing, with_standstills
@@ -40,7 +41,7 @@ from planner.verify.pieces import ProgramPieces, program_pieces, widened
 SPARE = 2e-3
 # A motion that leaves the tolerance is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
 WIDER = 16.0
-STOPS_AT_ONCE = 500  # 5 MB an array
+STOPS_AT_ONCE = SIZES.stops_at_once
 # At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
 # together by up to 240, which leaves 1/57,600 of any filter's error.
 ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5

@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.names import known_name
+from planner.base.sizes import SIZES
 from planner.base.units import MICROMETRE
 from planner.interactive.scene import fitted_scene
 from planner.job.at_tip import of_axes
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 
     from planner.job.plan import Plan
 
-# Samples of a figure at most [-]; the path of 11,157 samples makes a figure of 1.1 MB.
-POINTS_MAX = 40_000
+POINTS_MAX = SIZES.figure_samples
+FLAT = 0.12  # third extent over the largest below which a path is seen from above
 COLOURINGS = ("feed", "limit", "deviation")
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]"}
 QUANTITIES = ("velocity", "acceleration", "jerk")

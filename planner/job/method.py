@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from planner.base.names import KINEMATIC, OPTIMAL
+from planner.base.sizes import SIZES
 from planner.constraints.extruder import with_extruder_limit
 from planner.delivery import periods
 from planner.feedrate.solution import Status
@@ -33,7 +34,7 @@ PERIOD_ROUNDS = 8
 CORNER_ROUNDS = 4
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
-INSTEAD_POINTS = 50_000
+INSTEAD_POINTS = SIZES.instead_planned
 # Of motions in closed form, whose accelerations bound what filters do to them: these four are as fast in the mean as seven were, for
 # 0.7 of the processor time (48 random jobs by `kinematic` and `bezier`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))

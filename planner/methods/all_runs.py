@@ -7,13 +7,14 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.methods.free import Start, search, solver_of
 from planner.optimal.effort import Search
 from planner.tube.parts import FoundRun
 from planner.tube.run import TubeRun
 
-LONG = 3_000  # steps of a run that is divided into windows enough for itself
+LONG = SIZES.searched_shared
 
 
 def searched_runs(

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.names import AUTO, NORMAL, QUICK, effort_name
+from planner.base.sizes import SIZES
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
@@ -41,7 +42,7 @@ SIGMA2 = 0.94
 # lines of dense chords the search took half of the computing and found nothing; on a random job of ten blocks it found 9e-4. Nor are
 # the splines of such a motion reshaped because its path doubles back somewhere: 4,153 blocks of a V-carving took 50 CPU s instead of 19
 # for 8e-5 of the time.
-LEAST_LEFT, CHEAP = 1e-3, 10_000
+LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
 # Steps that a motion has on a leg at least (tube/guess.py).
 LEAST_STEPS = 2
 

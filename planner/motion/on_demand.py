@@ -13,10 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.motion.trajectory import COLUMNS, Trajectory, joined
 
-# Samples evaluated at a time: 9 MB with three axes.
-CHUNK = 65_536
+CHUNK = SIZES.samples_at_once
 
 
 class _AnyMotion(Protocol):

@@ -21,6 +21,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.sizes import SIZES
 from planner.base.threads import in_parts
 from planner.corners.elements import (
     GAUSS_NODES,
@@ -41,7 +42,7 @@ LENGTH_ROUNDING = 1e-13
 ONE_STEP = 8e-8
 S_ROUNDING = 2.0**-52  # of s itself [-], which is not an error of the polynomial
 COEFFICIENTS = 11  # of an interval's polynomial, with how far it is off
-POINTS_SHARED = 5_000  # intervals that are worth a thread: 2 us each, and threads take 1 ms to begin
+POINTS_SHARED = SIZES.intervals_shared
 # Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
 # A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].

@@ -22,6 +22,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.search import nearest
+from planner.base.sizes import SIZES
 from planner.motion.lots import sample
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.sampling import Grid, inverses
@@ -36,10 +37,8 @@ WATCHED = np.array([0.05, 0.5, 0.95])
 SHORTEST_PIECE = 1e-9
 # More samples than this are refused: a day at 1 ms, and with three axes 14 GB of files.
 SAMPLES_MAX = 1e8
-# Up to so many are kept, 138 MB with three axes; more are evaluated again for the verdict and for the files.
-SAMPLES_KEPT = 2**20
-# Samples per chunk of a finely sampled motion: 20 MB with three axes.
-CHUNK = 100_000
+SAMPLES_KEPT = SIZES.samples_kept
+CHUNK = SIZES.times_at_once
 
 
 # `inverses` of the grids in use: motions on one grid differ in their time laws only.

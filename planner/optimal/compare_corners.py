@@ -15,6 +15,7 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.base.sizes import SIZES
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.job.job import Job
@@ -26,7 +27,7 @@ from planner.optimal.order import Order, second_order
 from planner.path.samples import RESOLUTION, sample_path
 from planner.smoothing.spline_path import with_spline
 
-COMPARED_POINTS = 1_000_000  # some 10 s and 1 GB
+COMPARED_POINTS = SIZES.corners_compared
 # On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on chords of 0.1 mm): this
 # share of it is less than what corners take (tested). The errors of a grid go with the square of its intervals: it has a tenth of the
 # usual one's points (22.7 and 213 for each corner on chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).

@@ -20,6 +20,7 @@ import dataclasses
 from collections.abc import Iterator
 from functools import cached_property
 
+from planner.base.sizes import SIZES
 from planner.corners.smooth import round_corners
 from planner.job.job import Job
 from planner.job.plan import Plan
@@ -30,9 +31,7 @@ from planner.optimal.geometry import corner_shape
 from planner.optimal.order import Order
 from planner.path.samples import RESOLUTION
 
-RIVAL_POINTS = (
-    40_000  # of the plan, and of each corner shape: about as many as get the finest grid (effort.py)
-)
+RIVAL_POINTS = SIZES.rivals_planned
 RIVAL_ESTIMATE = 3 * RIVAL_POINTS  # by the closed form, which may say three times as many (tested)
 SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
 # On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from planner.base.names import BEST, NORMAL, QUICK
+from planner.base.sizes import SIZES
 from planner.tube.guess import Cut
 
 # Interpolation error of the axis accelerations on the coarsest grid [share of the limit] (path/samples.py). Rounds of reshaping on a
@@ -63,7 +64,7 @@ class Search:
 
 
 # Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two processors. Steps of a small one.
-STEPS_MAX, SMALL = 1_000_000, 30_000
+STEPS_MAX, SMALL = SIZES.searched_most, SIZES.searched_finely
 THOROUGH = Search(steps_max=float("inf"), kept=-1.0, finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
 
 
@@ -93,6 +94,7 @@ class Effort:
 # 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than
 # on 2e-4 (zig-zag on mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the
 # coarse grid leave small jobs 1e-3 slower.
+_TINY, _FEW, _MANY = SIZES.small_grids
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
     QUICK: Effort(
@@ -107,13 +109,13 @@ EFFORTS = {
         rounds=40,
         left=1e-5,
         search=Search(steps_max=STEPS_MAX, small=SMALL),
-        sizes=(Grids(1_500, 2e-3, 2e-4), Grids(4_000, 8e-3, 5e-4), Grids(40_000, COARSE, 2e-3), _LARGE),
+        sizes=(Grids(_TINY, 2e-3, 2e-4), Grids(_FEW, 8e-3, 5e-4), Grids(_MANY, COARSE, 2e-3), _LARGE),
     ),
     BEST: Effort(
         work=5_000_000,
         rounds=100,
         left=1e-6,
         search=THOROUGH,
-        sizes=(Grids(4_000, 2e-3, 2e-4), Grids(40_000, 8e-3, 5e-4), Grids(400_000, COARSE, 2e-3), _LARGE),
+        sizes=(Grids(_FEW, 2e-3, 2e-4), Grids(_MANY, 8e-3, 5e-4), Grids(10.0 * _MANY, COARSE, 2e-3), _LARGE),
     ),
 }

@@ -49,6 +49,7 @@ import numpy as np
 
 from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, NORMAL, QUICK, SPLINE
+from planner.base.sizes import SIZES
 from planner.base.threads import beside, threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
@@ -75,9 +76,7 @@ from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
 # Of 345 plans 9 exceeded a limit between the places looked at, and one of these once more (benchmarks/retries.py); each time with ten
 # times the margin. A shaped motion did three times (55117 of the campaign).
 SEEN_ROUNDS = 3
-PRICED_BESIDE = (
-    30_000  # grid points: with more, prices are found while the motion is judged, by another thread
-)
+PRICED_BESIDE = SIZES.priced_beside
 
 
 @dataclass(frozen=True, kw_only=True)

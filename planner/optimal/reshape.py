@@ -27,6 +27,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.constraints.limits import CHORD_ERROR, FEED, VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
@@ -39,7 +40,7 @@ from planner.smoothing.spline_path import SplineShape, cusps
 
 BOUND = 0.98  # of what bounds the square of the feed: from there on it does [-]
 DEAR = 0.95  # of what the tolerance costs: the runs on which a wider one is solved for [-]
-PRICED = 100_000  # points of the grid whose prices are made at a time: half a kilobyte each
+PRICED = SIZES.prices_at_once
 FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]

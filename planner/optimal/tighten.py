@@ -17,6 +17,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.constraints import normal_limit, own
 from planner.constraints.limits import LIMITS
@@ -41,7 +42,7 @@ TIGHTENING_ROUNDS = 2
 # Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more than the first of `WORTH` [-]
 # at first, where nearly all has to be solved again anyway, and then of more than the second, while there is one: of a relief of
 # 100,000 blocks 0.35 is solved again in the second round, with the first everywhere 0.82. Few places are left to the later rounds.
-TIGHTENED_POINTS, WORTH, LONG_ROUNDS = 50_000, (2e-5, 1e-4), 8
+TIGHTENED_POINTS, WORTH, LONG_ROUNDS = SIZES.tightened_everywhere, (2e-5, 1e-4), 8
 SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps, by 5e-9 a round on SheepTile
 # What is slowed down is slowed down by this much more [-]: of 928 motions none needed it twice (benchmarks/retries.py). Less is
 # rounding.

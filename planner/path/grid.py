@@ -13,6 +13,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.sizes import SIZES
 from planner.base.threads import in_parts
 from planner.corners.elements import (
     ElementTable,
@@ -25,7 +26,7 @@ from planner.path.rows import PathLimits, grown, set_row
 
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
 MARGIN_SAFETY = 1.25
-POINTS_SHARED = 5_000  # points that are worth a thread: 2 us each, and threads take 1 ms to begin
+POINTS_SHARED = SIZES.grid_shared
 # The jerk between grid points may be off by so many times `resolution` [-]: 1 %, made good by slowing down (methods/optimal.py).
 JERK_SHARE = 5.0
 # Halvings of one interval at most, and so its smallest part; 2^-20 of a corner is below a nanometre.

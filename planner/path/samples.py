@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.sizes import SIZES
 from planner.constraints import normal_limit
 from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
@@ -41,7 +42,7 @@ from planner.path.rows import Joints, Longest, PathLimits, cut_path
 RESOLUTION = 2e-3
 # Jobs with more corners than the first number get the second resolution instead, or their grids would fill the memory (a relief of
 # 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the cycle time.
-MANY_CORNERS, COARSE_RESOLUTION = 50_000, 1e-2
+MANY_CORNERS, COARSE_RESOLUTION = SIZES.corners_finely, 1e-2
 # For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis needs for its
 # acceleration [-], where path/calm.py does not say that it may last longer.
 ARC_PERIOD = 0.5

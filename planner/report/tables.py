@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.base.names import SINGLE_CORNERS
+from planner.base.sizes import SIZES
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.nc.info import PLACES_SHOWN
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from planner.verify import CornerCheck, Ringing, Verdict
 
 CALLS_SHOWN = 10  # subprograms that `info` names
-CORNERS_SHOWN = 1_000  # rows of the corner table: a second of layout; `plan.corners` has them all
+CORNERS_SHOWN = SIZES.table_corners
 # Lines of each, so that a table fits a terminal of 24 rows.
 FAULTS_SHOWN = 8
 NOTES_SHOWN = 8

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.geometry.chords import points_on
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from planner.job.plan import Plan
 
 PIXELS = 900  # about the extent of a tool path in pixels
-POINTS_MAX = 150_000  # points of a tool path; the pixel grows until there are no more
-DENSE = 60_000  # points from which on thick lines would hide each other
+POINTS_MAX = SIZES.picture_points
+DENSE = SIZES.picture_dense
 FLAT = 0.12  # third extent over the largest below which a path is shown from the side it is thinnest on
 TOOLS = 240  # places at which the tool is drawn
 GREY, LIGHT = "#8c8c8c", "#b5b5b5"

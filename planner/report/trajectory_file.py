@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.base.sizes import SIZES
 from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.trajectory_reader import CSV_METADATA, FORMATS, Format, read_trajectory
@@ -33,7 +34,7 @@ __all__ = ["FORMATS", "Format", "read_trajectory", "units", "write_trajectory"]
 
 Joints = Callable[[Trajectory], Trajectory]
 TIP = "tip_"  # before the names of the columns of the tool's tip
-ROW_GROUP = 2**20  # samples in memory while a file is written: 138 MB with three axes
+ROW_GROUP = SIZES.row_group
 
 
 def write_trajectory(

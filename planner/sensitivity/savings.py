@@ -31,6 +31,7 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.constraints.assemble import feedrate_problem
 from planner.constraints.own import ScaledLimit
 from planner.constraints.problem import FeedrateProblem
@@ -47,8 +48,8 @@ INTERVALS_MIN = 12  # intervals that a piece keeps at least, as far as it has th
 # slower on the thinned grid, and more jerk of x saved 1.2 times what a new plan found; with 0.025 it is 0.7 % slower, and that is 0.98.
 STEP_OWN = 0.025
 # Of all thinned problems together: a quarter of the job's grid, but no fewer and no more than these.
-POINTS, POINTS_MOST = 25_000, 200_000
-WINDOW = 1_000  # points of a window, where the thinned grid is too large
+POINTS, POINTS_MOST = SIZES.priced
+WINDOW = SIZES.priced_window
 SOLVER = JerkLimited(tol=1e-5)  # with a gap a tenth of the usual one: differences of times are wanted
 SLOPE_STEP = 1e-4  # for the thinned problem's own price [-]: as in sensitivity/prices.py
 
@@ -224,10 +225,10 @@ def windows_of_grid(piece: Array, kept: Array, most: int) -> tuple[Array, Array,
 
     piece : (G+1,) of the grid that was thinned
     kept  : (n,) its points that the thinned grid keeps
-    most  : number of points in the windows, at most
+    most  : number of points in the windows, at most, but for a single window
     """
     start = np.searchsorted(kept, piece)
-    if len(kept) <= most:
+    if len(kept) <= max(most, WINDOW):
         return start, kept, False
     count = max(most // WINDOW, 1)
     first = np.linspace(0, len(kept) - WINDOW, count).astype(np.int64)

@@ -34,6 +34,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
@@ -49,10 +50,10 @@ from planner.smoothing.sites import Sites, with_radius
 from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
 from planner.smoothing.windows import TIGHTENED, next_window
 
-WINDOW = 400  # control points improved at a time ...
-OVERLAP = 40  # ... and of them again with the next window
-RANGE = 4_000  # control points of a range of a long run; a window more for each; runs of fewer than two are improved as one
-SPANS_SHARED = 400  # fewer are improved by one thread: threads take 1 ms to begin, a span some 100 us
+WINDOW = SIZES.improved_window
+OVERLAP = SIZES.improved_overlap
+RANGE = SIZES.improved_range
+SPANS_SHARED = SIZES.improved_shared
 ITERATIONS = 40  # per window; 10 to 25 are the rule
 HELD = (
     3  # control points of theta that stay 0 where a run ends on a straight leg: speed and acceleration go on

@@ -20,6 +20,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
 from planner.smoothing.corridor import Corridor, run_corridor
@@ -34,7 +35,7 @@ DENSER = 0.75  # factor on the distance of knots where it uses more [-]
 DENSER_MAX = 16  # so many times at most: knots are 100 times as dense then
 INSIDE = 0.99  # of the tolerance that it may use in the end [-]: the relaxation starts strictly inside of its own corridor, relax.USED
 SPANS_MIN = 8  # of a run: with five control points fixed at either end three are left to move
-RANGE = 4_000  # vertices of a range of a long run; runs of fewer than two ranges are laid as a whole
+RANGE = SIZES.laid_range
 
 
 def lay(corridor: Corridor, longest: FloatArray) -> Splines:

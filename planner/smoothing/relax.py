@@ -21,6 +21,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
@@ -44,9 +45,8 @@ USED = 0.9995
 # Of tightening, in windows around the sites that need it; 2 are the rule. With 3, a run of each of 10 plans that need
 # more gets no spline; 7 of them take longer, up to 2.7e-2 (benchmarks/retries.py at 2ad8a9c).
 ROUNDS = 20
-SPANS_SHARED = 2_000  # fewer are relaxed by one thread: threads take 1 ms to begin, a span some 20 us
-# Control points of a range of a long run; a window more for each of them: 6 % of the work. Runs of fewer than two are relaxed as one.
-RANGE = 4_000
+SPANS_SHARED = SIZES.relaxed_shared
+RANGE = SIZES.relaxed_range
 
 
 class Goal(NamedTuple):

@@ -8,16 +8,16 @@ import numpy as np
 
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
+from planner.base.sizes import SIZES
 from planner.smoothing.basis import DEGREE, ORDER
 from planner.smoothing.sites import site_distance
 
 TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it
-# On those six jobs windows of 120 and 480 end up to 2e-4 and 5e-4 later; overlaps of 15 and 60 change them by -2e-4 to 1e-3 and by
-# -7e-4 to 3e-3, and FIRST_GAP = 10 and 100 by up to 2e-3 and 3e-5.
-WINDOW = 240  # control points relaxed at a time ...
-OVERLAP = 30  # ... and of them again with the next window, or on each side of a tightened site
+# On those six jobs FIRST_GAP = 10 and 100 change the time by up to 2e-3 and 3e-5.
+WINDOW = SIZES.relaxed_window
+OVERLAP = SIZES.relaxed_overlap
 
 
 class ControlWindow(NamedTuple):

@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
 from planner.tube.checks import Keeps, normal_shares, worst_shares
@@ -33,9 +34,9 @@ from planner.tube.run import TubeRun
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
 # divided into.
-WINDOW, OVERLAP, LEAST = 1500, 120, 60
+WINDOW, OVERLAP, LEAST = SIZES.searched_window, SIZES.searched_overlap, SIZES.searched_least
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
-JOIN_WITHIN = 40
+JOIN_WITHIN = SIZES.searched_join
 # What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do not converge with the
 # first do with the second (pentagon on mill), and the other way round. By how much rows may be missed at the end [-]: on some windows
 # with arcs they keep trembling by 1e-5. Where a plan is made otherwise if one window fails there is one try: of 130 random jobs
@@ -45,7 +46,7 @@ TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
 MISSED_MOST = max(missed for _, missed in TRIES)
 # Iterations of a window, about, and the share of its work that is told to be done at most before all of it is [-].
 USUAL, NEARLY = 25.0, 0.9
-QUIET = 1000  # steps: of windows that have fewer together nothing is told before they end
+QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-]: of any motion, and of one that is an optimum of longer
 # steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
 # and 0.01 693 and 364.

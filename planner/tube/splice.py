@@ -71,7 +71,8 @@ class Spliced:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
         of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
         chunks = []
-        for k in np.unique(of):
+        # Without times there are the columns of the first run, without rows.
+        for k in np.unique(of) if len(of) else [0]:
             run, asked = self.runs[k], times[of == k]
             local = run.begin + (asked - self.begin[k])
             if run.moving:  # rounding of times: its end belongs to the next one

@@ -42,6 +42,7 @@ from functools import reduce
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
@@ -55,8 +56,7 @@ from planner.verify.times import AnyMotion
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
-# Corners looked at together: 50 MB.
-AT_ONCE = 100_000
+AT_ONCE = SIZES.corners_at_once
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

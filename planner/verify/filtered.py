@@ -29,6 +29,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.sizes import SIZES
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
@@ -41,7 +42,7 @@ from planner.verify.verdict import AfterFilters
 
 NOTE = "after the filters"
 STEPS_PER_PERIOD, STEPS_PER_FILTER = 4, 8  # of the times at which filters are evaluated (module text)
-CHUNK = 50_000  # times evaluated at once: 5 MB with three axes
+CHUNK = SIZES.filtered_at_once
 
 
 def filtered(

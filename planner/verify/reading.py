@@ -6,6 +6,7 @@ import functools
 import itertools
 from collections.abc import Callable, Iterator
 
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.motion.trajectory import Trajectory
 from planner.verify.dense import Comparison
@@ -16,7 +17,7 @@ from planner.verify.samples import Delivered
 from planner.verify.stream import Limits, Watch
 from planner.verify.times import AnyMotion, look
 
-SIDE_BY_SIDE = 65_536  # samples; fewer are read by one thread
+SIDE_BY_SIDE = SIZES.read_shared
 
 
 class Reader:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory
 from planner.verify.axes_apart import both_apart
 from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
@@ -19,7 +20,7 @@ from planner.verify.matching import AtStop, Located, Match, match_samples, new_m
 from planner.verify.own import OwnSeen, SampleBlock
 from planner.verify.pieces import ProgramPieces
 
-BLOCK_SAMPLES = 65_536  # read at a time: 8 MB for three axes
+BLOCK_SAMPLES = SIZES.judged_at_once
 CARRIED = 3  # samples before a block that its third differences need
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk")
 

@@ -19,7 +19,7 @@ from planner.report.export import write_plan
 from planner.report.trajectory_file import write_trajectory
 from planner.verify import reading, times
 
-METHODS = ("stop", "bezier", "fir", "kinematic")
+METHODS = ("optimal", "stop", "bezier", "fir", "kinematic")
 
 
 @pytest.fixture(scope="module", params=METHODS)
@@ -55,6 +55,7 @@ def test_the_samples_are_the_same_by_chunks_by_rows_and_as_a_whole(both):
         )
         np.testing.assert_allclose(getattr(rows, name), wanted[k], atol=1e-12 * scale)
         np.testing.assert_allclose(getattr(asked, name), wanted, atol=1e-12 * scale)
+    assert len(asked.rows(k[:0])) == len(kept.rows(k[:0])) == 0
     with pytest.raises(AttributeError):
         _ = asked.colour
     later = dataclasses.replace(asked, t=asked.t + 1.0)

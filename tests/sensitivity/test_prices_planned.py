@@ -189,3 +189,12 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
         assert whole or len(part) > savings.INTERVALS_MIN
     assert (points < 4000).any()
     assert savings.windows_of_grid(piece, kept, 9_000)[2] is False
+
+
+def test_a_grid_that_fits_in_one_window_is_taken_whole():
+    """Many limits leave each of their problems fewer points than a window has."""
+    kept = np.arange(0, 1_800, 2)
+    assert len(kept) < savings.WINDOW
+    edges, points, sampled = savings.windows_of_grid(np.array([0, 800, 1_800]), kept, len(kept) - 100)
+    np.testing.assert_array_equal(points, kept)
+    assert (edges.tolist(), sampled) == ([0, 400, 900], False)

@@ -37,6 +37,12 @@ def test_every_part_is_where_it_was():
         assert (np.diff(there.s) > 0).all()
 
 
+def test_at_no_times_it_has_columns_without_rows():
+    """Corners are looked at in the samples beside them, and a straight program has none."""
+    none = spliced().at(np.zeros(0), 1e-3)
+    assert (len(none), none.position.shape, none.axes) == (0, (0, len(FIRST.axes)), FIRST.axes)
+
+
 def test_it_stands_between_its_runs():
     still = spliced().at(FIRST.end + np.linspace(0.0, HOLD, 11)[1:-1], 1e-3)
     np.testing.assert_allclose(still.position[:, 0], 1.0, atol=1e-12)

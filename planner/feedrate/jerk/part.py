@@ -13,13 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from planner.base.sizes import SIZES
 from planner.feedrate.jerk.chain import BRAKING_WAYS, Chain, Task, way_to_brake
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.window import ScaledWindow, Way
 
-# Parts of fewer windows than this are solved forward only: the joining window costs 3 % there (a relief of 15,000 intervals: 3.6 %).
-LONG = 10
+LONG = SIZES.solved_windows
 # The joining window starts and ends at points so far from the middle, in windows [-]; of these, where most speed would help.
 NEAR, FAR = 0.25, 0.5
 # What is passed backward reaches so far beyond the middle [windows]: its windows end in a stop of their own before that.

@@ -47,6 +47,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.again import WIDER, Range, RangeAgain, ranges_of
@@ -64,7 +65,7 @@ PLACES_NAMED = 3  # in a sentence
 # A piece of which more than this share has to be solved again is solved as a whole [-].
 SHARE_MAX = 0.8
 CHANGE_MAX = 0.05  # limits of speed that change by more than this are felt beyond the ranges [-]
-POINTS_SHARED = 3_000  # fewer are solved by one thread: threads take 1 ms to begin, a point some us
+POINTS_SHARED = SIZES.points_shared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +80,7 @@ class JerkLimited:
 
     tol: float = 1e-4
     iterations: int = 100
-    window: int = 2_000
+    window: int = SIZES.solved_window
     settings: InteriorPointSettings = field(default=SETTINGS, repr=False)
 
     def solve(

@@ -20,6 +20,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from planner.base.sizes import SIZES
 from planner.nc.language.basic_blocks import BasicBlocks
 from planner.nc.language.endless import never_ends
 from planner.nc.language.expressions import Expressions
@@ -50,7 +51,7 @@ from planner.nc.language.tree import (
 )
 
 # Turns of loops between two looks at the limits and at the length of what is pending.
-TURNS_AT_ONCE = 500
+TURNS_AT_ONCE = SIZES.turns_at_once
 # M codes that end the program: what is pending is executed, to see whether the program goes on.
 ENDS = (2.0, 30.0)
 _HEAD = "P=run.numbered;G=run.shared;S=run.rows.pending.append;V=run.rows.values.extend;R=run.get;A=run.ask;T=run.tick;n=0;pc=0"

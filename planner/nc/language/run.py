@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
@@ -32,8 +33,8 @@ IDLE_MAX = 20_000  # rows one after the other that neither move nor stop: a loop
 ROWS_MAX = 5_000_000  # rows of words: 50 bytes each in the program that is made of them
 DEPTH_MAX = 100  # open calls; LinuxCNC allows 10
 BY_WORD_MAX = 500_000  # rows that are no plain straight moves: they take 0.1 ms each, a minute in all
-ROWS_AT_ONCE = 100_000  # rows that are executed together, at most
-IDLE_AT_ONCE = 2_000  # rows that are executed together at first, and as long as nothing moves
+ROWS_AT_ONCE = SIZES.program_rows
+IDLE_AT_ONCE = SIZES.idle_rows
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.colours import COLOURS
 from planner.report.compare import Row, best_of
@@ -20,7 +21,7 @@ from planner.report.replace import check_file, replacing_file
 if TYPE_CHECKING:
     from planner.nc.program import Program
 
-SAMPLES_MAX = 20_000  # of each motion: ten methods have a page of some ten megabytes
+SAMPLES_MAX = SIZES.compared_samples
 
 
 def check_page_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:

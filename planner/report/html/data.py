@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
 from planner.job.at_tip import of_axes
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
     from planner.job.plan import Plan
 
-SAMPLES_MAX = 150_000  # of the motion: the page of a program of 250,000 blocks then has less than 20 MB
-PROGRAMMED_MAX = 60_000  # points of the programmed path that are shown
+SAMPLES_MAX = SIZES.page_samples
+PROGRAMMED_MAX = SIZES.page_programmed
 ARC_POINTS = 24  # of every arc and curve that are shown
 NO_LIMIT = "none"
 # Around a joint its price is shown within so many tolerances, a rounded corner reaches back some ten of them, and at least within this

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.base.arrays import Array
+from planner.base.sizes import SIZES
 from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import in_degrees
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
 
 REPORT = "report.html"
 PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
-CORNERS_MAX = 20_000  # corners that are listed, those closest to eq. 18-19
-CALLS_MAX = 10_000  # chains of calls that the page names; places in others have their line alone
+CORNERS_MAX = SIZES.page_corners
+CALLS_MAX = SIZES.page_calls
 MARK = '<meta name="generator" content="feedrate-planner">'
 MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
 

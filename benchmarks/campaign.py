@@ -1,28 +1,22 @@
 """Thousands of random jobs, planned, judged twice, and held against laws: what goes wrong?
 
-<<<<<<< HEAD
     python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C] [--anew]
-=======
     python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C] [--sizes small]
->>>>>>> 4e738403 (benchmarks: campaign jobs on the ways of large ones, compared with the usual ways)
 
 A job follows from its seed (campaign_jobs.py): program, machine, tolerance, period, method. Its plan (campaign_rows.py) is judged by
 the planner's verifier and by another judge that shares no code with the package (campaign_judge.py); every tenth job is planned once
 more, changed by a law (campaign_laws.py). Each job has C processor seconds in a child process, which is ended if they do not suffice.
 
-<<<<<<< HEAD
 Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (campaign_tally.py),
 with a summary in campaign.md, and removed. Jobs that are in one of them are not planned again. --again plans jobs once more; what comes
 of that is told beside, and they count as they came out the first time. All jobs of a campaign are planned at one commit of the planner:
 at another one, and after a change of the draws, --anew begins again. What compiling a kernel takes, once on a machine, is not counted:
 a job that was ended in it would leave it to the next one.
-=======
 Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (campaign_tally.py), with
 a summary in campaign.md, and removed. Jobs that are in one of them are not planned again; --again plans what is not as it should be. A
 change of the draws makes other jobs of the seeds: the campaign then begins anew. What compiling a kernel takes, once on a machine, is
 not counted: a job that was ended in it would leave it to the next one. With --sizes jobs go the ways of large ones
 (planner/base/sizes.py), and their rows to a file of their own; `python -m benchmarks.sizes` compares them.
->>>>>>> 4e738403 (benchmarks: campaign jobs on the ways of large ones, compared with the usual ways)
 """
 
 from __future__ import annotations
@@ -44,13 +38,8 @@ from benchmarks.campaign_jobs import fingerprint, job
 from benchmarks.campaign_rows import Row, about, outcome
 from benchmarks.campaign_table import write_summary
 from benchmarks.campaign_tally import CRASH, TOO_LONG, Tally, wrongs
-<<<<<<< HEAD
 from benchmarks.record import RESULTS, planner_state
-from planner.base import kernels
-=======
-from benchmarks.record import RESULTS, provenance
 from planner.base import kernels, sizes
->>>>>>> 4e738403 (benchmarks: campaign jobs on the ways of large ones, compared with the usual ways)
 from planner.base.threads import use_threads
 
 KEPT, SUMMARY = RESULTS / "campaign.jsonl", RESULTS / "campaign.json"

@@ -62,7 +62,7 @@ class Sizes:
 
     # The judge and what it is asked for before.
     judged_at_once: int = _size(PARTS, 65_536, 64)  # samples: 8 MB
-    cells_at_once: int = _size(PARTS, 100_000, 350)  # times of its own: 30 MB
+    places_at_once: int = _size(PARTS, 100_000, 350)  # times of its own: 30 MB
     corners_at_once: int = _size(PARTS, 100_000, 3)  # 50 MB
     filtered_at_once: int = _size(PARTS, 50_000, 37)  # times behind filters: 5 MB
     stops_at_once: int = _size(PARTS, 500, 2)  # 5 MB an array

@@ -27,7 +27,7 @@ PER_PIECE = 4  # cells; the planner's own places are three a piece
 PER_PERIOD = 2  # cells: chords between neighbouring times last less than a period, and cut no corner more than the machine's do
 BOW, MOST_PER_PERIOD = 0.01, 16  # [share of the tolerance]; cells, where axes are strong enough for anything
 SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the rounding of a position in it
-CELLS = SIZES.cells_at_once
+CELLS = SIZES.places_at_once
 
 
 class AnyMotion(Protocol):

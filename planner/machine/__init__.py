@@ -13,7 +13,7 @@ template with every key and its unit.
 
 from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict
 from planner.machine.kinematics_data import KinematicsData
-from planner.machine.parts import Axis, DialectData, Fir, Mode, Plotter, Times, ToolData
+from planner.machine.parts import Axis, ControlData, DialectData, Fir, Mode, Plotter, Times, ToolData
 from planner.machine.whole import (
     ALL_AXES,
     EXTRUDER,
@@ -32,6 +32,7 @@ __all__ = [
     "ROTARY_AXES",
     "WORK_OFFSETS",
     "Axis",
+    "ControlData",
     "DialectData",
     "Fir",
     "KinematicsData",

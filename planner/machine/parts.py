@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
@@ -142,7 +142,27 @@ class Times(Record):
 
 class DialectData(Record):
     """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit; `lathe`
-    says whether they are a lathe's, or None: their words tell."""
+    says whether they are a lathe's, or None: their words tell; `inch` whether lengths are inches before the first G20 or G21."""
 
     least_increment: Positive | None = None
     lathe: bool | None = None
+    inch: bool = False
+
+
+class ControlData(Record):
+    """What is set in the control's own planner, for predictions of how long it takes (control_files/models.py); None for its default.
+
+    name                   : of the control; the other keys count for programs that are written for it
+    acceleration           : largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204
+    square_corner_velocity : of Klipper, speed at a corner of 90 degrees [mm/s]
+    minimum_cruise_ratio   : of Klipper [-], the share of the way that is not to be sped up and braked on
+    junction_deviation     : of grbl ($11) and Marlin (M205 J) [mm]
+    corner_jump            : of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have [mm/s]
+    """
+
+    name: Literal["grbl", "klipper", "marlin", "reprapfirmware", "linuxcnc"]
+    acceleration: Positive | None = None
+    square_corner_velocity: NotNegative | None = None
+    minimum_cruise_ratio: Annotated[float, Field(ge=0, lt=1)] | None = None
+    junction_deviation: NotNegative | None = None
+    corner_jump: dict[str, Positive] = {}

@@ -17,6 +17,7 @@ from planner.machine.faults import faults_in_words
 from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import (
     Axis,
+    ControlData,
     DialectData,
     Finite,
     Fir,
@@ -57,6 +58,7 @@ class Machine(Record):
     rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is `ROTARY_RADIUS`. A machine
                           file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
     kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
+    control             : what is set in the control's own planner, or None: its defaults
     """
 
     name: str
@@ -76,6 +78,7 @@ class Machine(Record):
     dialect: DialectData | None = None
     times: Times | None = None
     kinematics: KinematicsData | None = None
+    control: ControlData | None = None
     tools: dict[str, ToolData] = Field(default_factory=dict)
     positions: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     work_offsets: dict[str, dict[str, Finite]] = Field(default_factory=dict)
@@ -204,5 +207,6 @@ _KEYS = {
     "dialect": [*DialectData.model_fields],
     "times": [*Times.model_fields],
     "kinematics": [*KinematicsData.model_fields],
+    "control": [*ControlData.model_fields],
     "tools": [*ToolData.model_fields],
 }

@@ -13,6 +13,7 @@ Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); 
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from pathlib import Path
 
 from planner.base.errors import InputError
 from planner.base.names import known_name
-from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine, machine_from_dict
+from planner.machine import ALL_AXES, Machine, machine_from_dict
 from planner.machine_import import grbl, klipper, linuxcnc, marlin
 from planner.machine_import.ini_file import read_settings
 from planner.machine_import.settings import ControlSettings, Sourced
@@ -31,6 +32,7 @@ TOLERANCE = {
     "grbl": 0.05,
     "Klipper": 0.05,
     "Marlin": 0.05,
+    "RepRapFirmware": 0.05,
 }  # [mm], as of the built-in mill and router
 DT = 0.001  # [s], where the control does not say: setpoints of offline plans
 
@@ -73,7 +75,12 @@ def import_machine(
     """
     text, source = read_settings(Path(path)), str(path)
     found = _settings_of(text, source, control)
-    axes, assumed = _axes(found, ramp_time, given or {}, source)
+    lathe = _without_y(found)
+    axes, assumed = _axes(lathe or found, ramp_time, given or {}, source)
+    if lathe is not None:
+        assumed.append(
+            "y: the machine has none; its limits are those of x, and a program that moves y is not refused"
+        )
     eps = found.tolerance or Sourced(TOLERANCE[found.control], "assumed")
     if tolerance is not None:
         eps = Sourced(tolerance, "given")
@@ -82,7 +89,7 @@ def import_machine(
         assumed.append(f"tolerance {eps.value:g} mm: the settings have none; --tolerance gives another")
     if dt.place == "assumed":
         assumed.append(f"interpolation period {dt.value * 1e3:g} ms: the settings do not say it")
-    written = _text(found, Path(path), axes, eps, dt, [*found.notes, *assumed])
+    written = _text(lathe or found, Path(path), axes, eps, dt, [*found.notes, *assumed])
     machine = machine_from_dict(tomllib.loads(written), source=source)
     return Imported(written, machine, (*found.notes, *assumed))
 
@@ -100,13 +107,22 @@ def _settings_of(text: str, source: str, control: str | None) -> ControlSettings
     )
 
 
+def _without_y(found: ControlSettings) -> ControlSettings | None:
+    """The settings of a lathe, which says nothing of y, with those of x for y; None for other machines."""
+    limits = (found.velocity, found.acceleration)
+    if not all("z" in limit and "x" in limit and "y" not in limit for limit in limits):
+        return None
+    of_x = [{**limit, "y": Sourced(limit["x"].value, "x's: the machine has no y")} for limit in limits]
+    return dataclasses.replace(found, velocity=of_x[0], acceleration=of_x[1])
+
+
 def _axes(
     found: ControlSettings, ramp_time: float, given: Mapping[str, float], source: str
 ) -> tuple[dict[str, dict[str, Sourced]], list[str]]:
     """Limits by axis and quantity, and what of them is assumed. Raises InputError for what is missing."""
     if not 0.0 < ramp_time < float("inf"):
         raise InputError(f"the ramp time must be above 0 s, found {ramp_time:g}")
-    letters = LINEAR_AXES + ROTARY_AXES
+    letters = ALL_AXES
     limits = {
         "velocity": dict(found.velocity),
         "acceleration": dict(found.acceleration),
@@ -164,6 +180,8 @@ def _text(
         lines.append(_line("feed_max", found.feed_max))
     for letter, limits in axes.items():
         lines += ["", f"[axes.{letter}]", *(_line(quantity, limit) for quantity, limit in limits.items())]
+        lines += ["wrapped = true  # WRAPPED_ROTARY"] * (letter in found.wrapped)
+    lines += _tables(found)
     for mode in found.modes:
         lines += [
             "",
@@ -172,6 +190,25 @@ def _text(
             f"damping = {mode.damping!r}",
         ]
     return "\n".join(_printable(line) for line in lines) + "\n"
+
+
+def _tables(found: ControlSettings) -> list[str]:
+    """The tables that say how the control reads programs, what its planner does, and how it carries the tool."""
+    lines: list[str] = []
+    if found.inch or found.lathe:
+        lines += ["", "[dialect]", *["inch = true  # G20 is in force at the start"] * found.inch]
+        lines += ["lathe = false  # X is a radius until G7"] * found.lathe
+    lines += ["", "[control]", f'name = "{found.control.lower()}"']
+    lines += [_line(key, value) for key, value in found.law.items() if value is not None]
+    if found.corner_jump:
+        lines += ["", "[control.corner_jump]", *(_line(*jump) for jump in found.corner_jump.items())]
+    if found.kinematics:
+        lines += ["", "[kinematics]"]
+        lines += [
+            f'{key} = "{value}"' if isinstance(value, str) else _line(key, value)
+            for key, value in found.kinematics.items()
+        ]
+    return lines
 
 
 def _printable(text: str) -> str:

@@ -1,6 +1,11 @@
 """Marlin's settings, as M503 prints them: M203 velocities [mm/s], M201 accelerations of the axes and M204 along the path [mm/s2],
-M593 input shaping. In inches after G20. Marlin's "jerk" (M205 X Y Z) is a jump of velocity at a corner, not a jerk. RepRapFirmware's
-config.g has the same commands, but velocities in mm/min; it is known by M566 or M584, which Marlin has not."""
+M205 the law of corners, M593 input shaping. In inches after G20. RepRapFirmware's config.g has the same commands, but velocities in
+mm/min, M566 for M205 and M208 for the travel; it is known by M566 or M584, which Marlin has not.
+
+M204 P is for moves that print, T for the others; S, of older firmware, is for both, and T beside S is for filament alone (Marlin 1.0,
+Marlin_main.cpp: "S normal moves T filament only moves"). Corners have a junction deviation (M205 J), or a jump of velocity by axis that
+they may have (M205 X Y Z, M566), which Marlin calls jerk.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +13,14 @@ import re
 
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES
-from planner.machine_import.numbers import positive
-from planner.machine_import.settings import ControlSettings, FoundMode, Sourced, least
+from planner.machine_import.numbers import finite_number, positive
+from planner.machine_import.settings import ControlSettings, FoundMode, Sourced, least, travel_note
 
 _COMMAND = re.compile(r"^(?:\s*echo:)?\s*([GM]\d+)\b([^;\n]*)", re.MULTILINE)
-_WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)")
+_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
+_RANGE = re.compile(r"([A-Z])\s*([-+]?[\d.]+):([-+]?[\d.]+)")
 _DAMPING = 0.15  # [-], Marlin's own where M593 has no D
+_LIMITS, _JUMPS = "M208", ("M566", "M205")
 
 
 def recognised(text: str) -> bool:
@@ -23,48 +30,98 @@ def recognised(text: str) -> bool:
 
 def settings(text: str, source: str) -> ControlSettings:
     """The settings that M503 printed. Raises InputError for numbers that cannot be used."""
-    unit = 1.0
-    given: dict[str, dict[str, float]] = {}
-    lines: dict[str, int] = {}
-    shapers: list[dict[str, float]] = []
-    for command in _COMMAND.finditer(text):
-        code, line = command.group(1), text.count("\n", 0, command.start(1)) + 1
-        words = {letter: float(value) for letter, value in _WORD.findall(command.group(2))}
-        if code in ("G20", "G21"):
-            unit = MM_PER_INCH if code == "G20" else 1.0
-        elif code == "M593":
-            shapers.append(words)
-        else:
-            given[code] = {**given.get(code, {}), **words}
-            lines[code] = line
+    return _Commands(text, source).settings()
 
-    def length(code: str, letter: str) -> Sourced | None:
-        if letter not in given.get(code, {}):
+
+class _Commands:
+    """The commands of a text, each word with the last value that it was given, in mm."""
+
+    def __init__(self, text: str, source: str):
+        self.source, self.unit = source, 1.0
+        self.given: dict[str, dict[str, float]] = {}
+        self.lines: dict[str, int] = {}
+        self.shapers: list[dict[str, float]] = []
+        self.travel: dict[str, tuple[float | None, float | None]] = {}
+        for command in _COMMAND.finditer(text):
+            code, line = command.group(1), text.count("\n", 0, command.start(1)) + 1
+            words = {letter: float(value) for letter, value in _WORD.findall(command.group(2))}
+            if code in ("G20", "G21"):
+                self.unit = MM_PER_INCH if code == "G20" else 1.0
+            elif code == "M593":
+                self.shapers.append(words)
+            elif code == _LIMITS:
+                self._range(command.group(2), words)
+            else:
+                self.given[code] = {**self.given.get(code, {}), **words}
+                self.lines[code] = line
+        self.reprap = bool(self.given.keys() & {"M566", "M584"})
+
+    def _range(self, text: str, words: dict[str, float]) -> None:
+        """M208 X0:200, or X200, which is the upper end, and the lower one with S1."""
+        for letter, low, high in _RANGE.findall(text):
+            self.travel[letter.lower()] = (
+                finite_number(low, _LIMITS, self.source),
+                finite_number(high, _LIMITS, self.source),
+            )
+            words.pop(letter, None)
+        for letter in LINEAR_AXES:
+            if letter.upper() in words:
+                low_end, high_end = self.travel.get(letter, (None, None))
+                found = words[letter.upper()]
+                self.travel[letter] = (found, high_end) if words.get("S") == 1 else (low_end, found)
+
+    def length(self, code: str, letter: str) -> Sourced | None:
+        """A word of a command in mm; None where it has none. Raises InputError if it is not above 0."""
+        if letter not in self.given.get(code, {}):
             return None
         place = f"{code} {letter}"
-        return Sourced(positive(str(given[code][letter]), place, source, lines[code]) * unit, place)
+        value = positive(str(self.given[code][letter]), place, self.source, self.lines[code])
+        return Sourced(value * self.unit, place)
 
-    along = least(length("M204", "T"), length("M204", "P"))
-    per_minute = bool(given.keys() & {"M566", "M584"})
-    velocity, acceleration = {}, {}
-    for letter in LINEAR_AXES:
-        speed, own = length("M203", letter.upper()), length("M201", letter.upper())
-        if speed:
-            velocity[letter] = Sourced(speed.value / SECONDS_PER_MINUTE, speed.place) if per_minute else speed
-        if own:
-            acceleration[letter] = least(own, along) or own
-    notes = ["M203 is in mm/min: M566 and M584 are commands of RepRapFirmware"] if per_minute else []
-    if given.get("M205", {}).keys() & {"X", "Y"}:
-        notes.append("M205 X Y Z are jumps of velocity at corners: here velocity never jumps")
-    if "J" in given.get("M205", {}):
-        notes.append(
-            "M205 J, a junction deviation, sets corner speeds in Marlin and is no tolerance: Marlin stays on the path"
+    def settings(self) -> ControlSettings:
+        """Everything that a machine file takes, and notes on what it does not."""
+        both = self.length("M204", "S")
+        printing = self.length("M204", "P") or both
+        travelling = both if both and "P" not in self.given["M204"] else self.length("M204", "T")
+        along = least(travelling, printing)
+        per_second = 1.0 / SECONDS_PER_MINUTE if self.reprap else 1.0
+        velocity, acceleration = {}, {}
+        for letter in LINEAR_AXES:
+            speed, own = self.length("M203", letter.upper()), self.length("M201", letter.upper())
+            if speed:
+                velocity[letter] = Sourced(speed.value * per_second, speed.place)
+            if own:
+                acceleration[letter] = least(own, along) or own
+        deviation = None if self.reprap else self.length("M205", "J")
+        modes = {words["F"]: words.get("D", _DAMPING) for words in self.shapers if words.get("F", 0.0) > 0}
+        return ControlSettings(
+            control="RepRapFirmware" if self.reprap else "Marlin",
+            velocity=velocity,
+            acceleration=acceleration,
+            law={"acceleration": along, "junction_deviation": deviation},
+            corner_jump={} if deviation else self._jumps(per_second),
+            modes=tuple(FoundMode(frequency, damping, "M593") for frequency, damping in modes.items()),
+            notes=tuple(self._notes(printing, travelling)),
         )
-    modes = {words["F"]: words.get("D", _DAMPING) for words in shapers if words.get("F", 0.0) > 0}
-    return ControlSettings(
-        control="Marlin",
-        velocity=velocity,
-        acceleration=acceleration,
-        modes=tuple(FoundMode(frequency, damping, "M593") for frequency, damping in modes.items()),
-        notes=tuple(notes),
-    )
+
+    def _jumps(self, per_second: float) -> dict[str, Sourced]:
+        """The jump of velocity by axis [mm/s] that a corner may have; y has x's where M205 does not say it."""
+        code = next((code for code in _JUMPS if code in self.given), "")
+        found = {letter: self.length(code, letter.upper()) for letter in LINEAR_AXES}
+        found["y"] = found["y"] or found["x"]
+        return {
+            letter: Sourced(jump.value * per_second, jump.place) for letter, jump in found.items() if jump
+        }
+
+    def _notes(self, printing: Sourced | None, travelling: Sourced | None) -> list[str]:
+        said = ["M203 is in mm/min: M566 and M584 are commands of RepRapFirmware"] if self.reprap else []
+        if printing and travelling and printing.value != travelling.value:
+            said.append(
+                f"{printing.place} {printing.value:g} and {travelling.place} {travelling.value:g} mm/s2 are for moves that print and "
+                "for the others: the smaller one is taken for both"
+            )
+        if {"E"} & (self.given.get("M203", {}).keys() | self.given.get("M201", {}).keys()):
+            said.append(
+                "limits of the extruder, E of M203 and M201, are left out: a table [axes.e] takes them"
+            )
+        return [one for one in (*said, travel_note(self.travel)) if one]

@@ -3,8 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 
 from planner.base.errors import InputError
+
+_BEGINS = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+def leading_number(text: str) -> float | None:
+    """The number with which a text begins, as C's scanf reads "3 mm"; None where it begins with none."""
+    found = _BEGINS.match(text.strip())
+    return float(found.group()) if found else None
 
 
 def finite_number(text: str, place: str, source: str, line: int | None = None) -> float:

@@ -7,7 +7,8 @@ and without tool offsets:
 
 F goes as in RS274NGC: it is the speed of x, y and z together if one of them moves, else that of u, v and w, else that of the rotary
 axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in absolute mode to the programmed place within a
-turn, forwards if the number is positive (0 included), backwards if it has a minus.
+turn, forwards if the number is positive (0 included), backwards if it has a minus; after G53 too, where LinuxCNC takes the magnitude of
+the number less the offsets (rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
 """
 
 from __future__ import annotations
@@ -51,13 +52,15 @@ def move(state: State, block: Block) -> None:
         value, here = block.value[letter] * scale(state, column), float(further.position[column])
         if not state.absolute and not in_machine:
             further.position[column] = here + value
-        elif letter in further.wrapped and not in_machine:
+        elif letter in further.wrapped:
             if abs(value) >= _TURN:
                 raise WordFault(
                     block.at[letter],
                     f"axis {letter} is wrapped: its places are above -360 and below 360 degrees",
                 )
-            further.position[column] = _unwrapped(value, here - offset[column]) + offset[column]
+            zero = further.offset(state.system)[column]
+            place = abs(value - zero if in_machine else value)
+            further.position[column] = _unwrapped(math.copysign(place, value), here - zero) + zero
         else:
             further.position[column] = value + offset[column]
 

@@ -194,6 +194,9 @@ class Interpreter:
             return
         self._units_known = True
         line = int(self.store.block.line[moves.argmax()])
+        if self.setup.inch:
+            self.note("no G20 or G21 before the first move: inches, as the machine file says", line)
+            return
         row = int((self._words.line == line).argmax())
         self.found.assume("no G20 or G21 before the first move: mm", line, int(self._words.first[row]))
 

@@ -227,10 +227,19 @@ class Setup:
             },
         )
 
+    @property
+    def inch(self) -> bool:
+        """Whether the machine file says that programs begin in inches."""
+        dialect = self.machine.dialect if self.machine is not None else None
+        return dialect is not None and dialect.inch
+
     def start(self) -> State:
         """The modal state at the start of a program."""
         times = self.machine.times if self.machine is not None else None
+        unit = MM_PER_INCH if self.inch else 1.0
         state = State(
+            unit=unit,
+            feed_unit=unit,
             path_control=self.path_control,
             systems={code: System(origin) for code, origin in self.systems.items()},
             homes=dict(self.positions),

@@ -69,7 +69,10 @@ square_corner_velocity: 5.0
 gcode:
     max_velocity: 1
     G1 X0 ; away
+
 #*# <---------------------- SAVE_CONFIG ---------------------->
+#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.
+#*#
 #*# [input_shaper]
 #*# shaper_freq_x = 57.2
 #*# shaper_freq_y = 34.0
@@ -113,7 +116,8 @@ def test_grbl_has_rates_per_minute(tmp_path: Path) -> None:
     x, z = found.machine.axes["x"], found.machine.axes["z"]
     assert (x.velocity, x.acceleration, x.jerk) == pytest.approx((100.0, 500.0, 25_000.0))
     assert (z.velocity, z.acceleration, z.jerk) == pytest.approx((10.0, 50.0, 2500.0))
-    assert any("junction deviation" in said for said in found.assumed)
+    assert found.machine.control is not None
+    assert found.machine.control.junction_deviation == 0.01
     assert any("jerk of x, y, z" in said for said in found.assumed)
 
 
@@ -126,7 +130,9 @@ def test_klipper_takes_saved_settings_and_skips_macros(tmp_path: Path) -> None:
 
 def test_klipper_takes_the_last_of_equal_settings_and_included_files(tmp_path: Path) -> None:
     (tmp_path / "limits.cfg").write_text("[printer]\nmax_accel: 700\n")
-    found = imported(tmp_path, KLIPPER + "\n[include lim*.cfg]\n")
+    found = imported(tmp_path, KLIPPER.replace("[mcu]", "[include lim*.cfg]\n[mcu]"))
+    assert found.machine.axes["x"].acceleration == 3000.0, "what stands behind it counts"
+    found = imported(tmp_path, KLIPPER.replace("[gcode_macro", "[include lim*.cfg]\n[gcode_macro"))
     assert found.machine.axes["x"].acceleration == 700.0
     with pytest.raises(InputError, match=r"gone\.cfg: included in .*settings\.txt, line 3: "):
         imported(tmp_path, "[printer]\nkinematics: cartesian\n[include gone.cfg]\n")
@@ -144,7 +150,9 @@ def test_marlin_has_the_smaller_of_axis_and_path_acceleration(tmp_path: Path) ->
     assert [axes[letter].velocity for letter in "xyz"] == [500.0, 400.0, 5.0]
     assert [axes[letter].acceleration for letter in "xyz"] == [400.0, 400.0, 100.0]
     assert [mode.frequency for mode in found.machine.modes] == [40.0, 50.0]
-    assert any("jumps of velocity" in said for said in found.assumed)
+    assert found.machine.control is not None
+    assert found.machine.control.corner_jump == {"x": 8.0, "y": 8.0, "z": 0.4}
+    assert found.machine.control.acceleration == 400.0
     inches = imported(tmp_path, MARLIN.replace("G21", "G20"))
     assert inches.machine.axes["x"].velocity == pytest.approx(500.0 * 25.4)
 
@@ -201,7 +209,9 @@ def test_command_writes_a_machine_file_that_loads(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not SAMPLES.is_dir(), reason="LinuxCNC's sample configurations are not installed")
-@pytest.mark.parametrize("name", ["axis", "axis_mm", "axis_9axis", "histogram_demo"])
+@pytest.mark.parametrize(
+    "name", ["axis", "axis_mm", "axis_9axis", "histogram_demo", "ini_with_includes/includes_demo"]
+)
 def test_linuxcnc_samples_are_read(name: str) -> None:
     found = import_machine(SAMPLES / f"{name}.ini")
     assert {"x", "y", "z"} <= found.machine.axes.keys()

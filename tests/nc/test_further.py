@@ -174,8 +174,19 @@ def test_a_wrapped_axis_goes_in_the_direction_of_its_sign() -> None:
     machine = machine_of("xyza", a={"wrapped": True})
     program = parse_program("G21 G0 A90\nA10\nA-350\nA0\n", machine)
     np.testing.assert_allclose(program.end[:, 3] / RAD_PER_DEG, [90.0, 370.0, 350.0, 360.0])
+    stays = parse_program("G21 G0 A30\nA-30\nA30\nG91 A30\nG90 A-30\n", machine)
+    np.testing.assert_allclose(stays.end[:, 3] / RAD_PER_DEG, [30.0, 30.0, 30.0, 60.0, 30.0])
     with pytest.raises(InputError, match=r":1:.*A is wrapped"):
         parse_program("G21 G0 A360\n", machine)
+
+
+def test_a_wrapped_axis_with_offsets_goes_where_linuxcnc_s_interpreter_goes() -> None:
+    """Answers of `rs274 -g -i` with WRAPPED_ROTARY, plus its offsets: after G53 the magnitude of the number less the offsets counts."""
+    machine = machine_of("xyzc", c={"wrapped": True})
+    moves = "G0 C350\nC10\nG53 C20\nG53 C-20\nC-0\nG1 C-350 F1000\nG91 C-30\n"
+    program = parse_program(f"G21 G10 L2 P1 C30\n{moves}G90 G92 C5\nG53 G0 C100\nC100\nC-100\n", machine)
+    answers = [-10, 10, 10, -310, -360, -370, -400, 475 - 405, 820 - 405, 820 - 405]
+    np.testing.assert_allclose(program.end[:, 3] / RAD_PER_DEG, np.add(answers, 30.0))
 
 
 @pytest.mark.parametrize(

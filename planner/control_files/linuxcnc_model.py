@@ -5,17 +5,18 @@ between legs l, LinuxCNC puts an arc into the corner that misses it by P at most
 
     d = min(P sin(h) / (1 - cos(h)), l / 2)        tangent length            R = d / tan(h)          v^2 = N a R
 
-with N = 3^(1/2)/2 of the acceleration a across. Where the feed is lower, the arc is as long as a blend by overlapping ramps with a/2
-would be, but no larger than R. On arcs half of the acceleration is left along the path. So a path of many short chords, which becomes
-one chain of arcs, is braked and sped up with half of the acceleration, and corners with long legs lose less: a smooth path can be the
-slower one here. Where it is faster, the corner is a kink: passed within one period dt as long as the step of the velocity takes no
-more than a tenth (K) of what an axis may do in it,
+with N = 3^(1/2)/2 of the acceleration a across: a is what the axes allow in every direction of the corner's plane, the smallest of
+a_k / |e_k| with e_k the part of axis k's direction in that plane. Where the feed is lower, the arc is as long as a blend by
+overlapping ramps with a/2 would be, but no larger than R. On arcs half of the acceleration is left along the path. So a path of
+many short chords, which becomes one chain of arcs, is braked and sped up with half of the acceleration, and corners with long legs
+lose less: a smooth path can be the slower one here. Where it is faster, the corner is a kink: passed within one period dt as long
+as the step of the velocity takes no more than a tenth (K) of what an axis may do in it,
 
     v <= K v_max / max_axes |u2 - u1| (v_max / dt + a) / a,
 
 at nine tenths of the acceleration beside it. A rest of a line that is passed in less than four periods belongs to the arc after it.
-The last move ends with half of the acceleration. Moves are seen `BLOCKS` ahead, at the end of which the motion must be able to stand.
-Q joins moves before all that: points within Q of the straight line from the first point to the last are left out.
+The last move ends with half of the acceleration. Moves are seen `BLOCKS` ahead, at the end of which the motion must be able to
+stand. Q joins moves before all that: points within Q of the straight line from the first point to the last are left out.
 
 Held against LinuxCNC's own planner on five programs, and on their planned paths with chords of 0.2 um to 25 um and P of 1 um and more:
 -2.1 to +0.9 % (tests/control_files/test_linuxcnc_model.py has some of them).
@@ -99,13 +100,15 @@ def _moving_time(
     way = step / length[:, None]
     velocity, acceleration = (machine.limits(name, axes) for name in ("velocity", "acceleration"))
     top = np.minimum(np.minimum(feed, along(way, velocity)), length / machine.dt)
-    cut, arc, speed, left = _corners(way, length, top, acceleration, tolerance, machine.dt)
+    top = np.minimum(top, machine.feed_max or np.inf)  # [TRAJ] MAX_LINEAR_VELOCITY holds for rapids too
+    across = _in_the_plane(way, acceleration)
+    cut, arc, speed, left = _corners(way, length, top, acceleration, across, tolerance, machine.dt)
     rest = np.maximum(length - np.append(0.0, cut) - np.append(cut, 0.0), 0.0)
     straight = along(way, acceleration)
     kinks = arc == 0
     straight *= np.where(np.append(False, kinks) | np.append(kinks, False), 1.0 - KINK, 1.0)
     swallowed = np.append(~kinks, False) & (rest < GAP_CYCLES * machine.dt * np.append(speed, 0.0))
-    straight = np.where(swallowed, np.minimum(straight, TANGENTIAL * acceleration.min()), straight)
+    straight = np.where(swallowed, np.minimum(straight, np.append(np.inf, left)), straight)
     straight[-1] *= LAST
     pieces, tops, accels = (_alternate(*pair) for pair in ((rest, arc), (top, speed), (straight, left)))
     bound = np.append(np.append(0.0, np.minimum(tops[1:], tops[:-1]) ** 2), 0.0)
@@ -123,16 +126,25 @@ def _alternate(lines: FloatArray, arcs: FloatArray) -> FloatArray:
     return found
 
 
+def _in_the_plane(way: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """(n-1,) acceleration that the axes allow in every direction of the plane of two moves [mm/s2]: way (n, A), acceleration (A,)."""
+    first = way[:-1]
+    second = way[1:] - (way[1:] * first).sum(axis=1, keepdims=True) * first
+    size = np.linalg.norm(second, axis=1, keepdims=True)
+    second = np.divide(second, size, out=np.zeros_like(second), where=size > STRAIGHT)
+    return along(np.sqrt(first**2 + second**2), acceleration)
+
+
 def _corners(
     way: FloatArray,
     length: FloatArray,
     top: FloatArray,
     acceleration: FloatArray,
+    a: FloatArray,
     tolerance: float,
     dt: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """The n-1 corners of n moves: tangent length, length of the arc (0 of a kink), speed, and the acceleration left along it."""
-    a = float(acceleration.min())
     half = np.arctan2(
         np.linalg.norm(np.diff(way, axis=0), axis=1), np.linalg.norm(way[1:] + way[:-1], axis=1)
     )
@@ -150,7 +162,7 @@ def _corners(
     change = (np.abs(np.diff(way, axis=0)) / acceleration).max(axis=1) * (slow / dt + a)
     kink = slow * np.minimum(1.0, KINK / np.maximum(change, 1e-12))
     is_kink = kink >= speed
-    left = np.full(len(arc), TANGENTIAL * a)
+    left = TANGENTIAL * a
     return (
         np.where(is_kink, 0.0, radius * np.tan(h)),
         np.where(is_kink, 0.0, arc),

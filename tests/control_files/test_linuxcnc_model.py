@@ -74,6 +74,28 @@ def test_a_corner_is_passed_at_the_speed_of_its_arc() -> None:
     assert time_of(points, 0.02) > time_of(points), "less tolerance, a slower corner"
 
 
+def test_axes_that_do_not_move_slow_nothing_down() -> None:
+    """Corners in x and y know nothing of a slow z; a corner that z has a part in does, and so does one tilted by a little."""
+    slow = Machine(
+        name="m",
+        dt=0.001,
+        tolerance=0.05,
+        axes={"x": AXIS, "y": AXIS, "z": AXIS | {"acceleration": 50.0}},
+    )
+    flat = np.array([[0.0, 0, 0], [40, 0, 0], [40, 40, 0], [70, 40, 0]])
+    tilted = flat + np.outer([0, 0, 1, 1], [0, 0, 8])
+    args = (np.full(3, 60.0), np.zeros(4, bool))
+    found = [
+        linuxcnc_time(points, *args, machine, ("x", "y", "z"), 0.05)
+        for points in (flat, tilted)
+        for machine in (MACHINE, slow)
+    ]
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+    assert found[3] > 1.05 * found[2]
+    plane = linuxcnc_time(flat[:, :2], *args, slow, ("x", "y"), 0.05)
+    assert plane == pytest.approx(found[0], rel=1e-12), "two axes or three"
+
+
 def test_short_moves_bound_the_speed_by_what_is_seen_ahead() -> None:
     """On kinks of no angle, v^2 <= 2 a (BLOCKS l): the motion can stand within the moves that are seen."""
     points = np.zeros((4001, 3))

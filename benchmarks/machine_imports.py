@@ -68,7 +68,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def kind(note: str) -> str:
     """A note without its names and numbers: up to the first colon, axes and what has digits or points left out."""
-    head = re.sub(r"(?<![\w[])[a-cu-z](?:, [a-cu-z])*(?![\w\]])", "AXES", note.split(": ")[0])
+    head = re.sub(r"(?<=of )[a-cu-z](?:, [a-cu-z])*|^[a-cu-z](?= is|$)", "AXES", note.split(": ")[0])
     named = [
         word if word.startswith("[") or not re.search(r"\d|\w\.\w", word) else "..." for word in head.split()
     ]

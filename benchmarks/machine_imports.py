@@ -28,8 +28,9 @@ def main() -> None:
     options = parser.parse_args()
     files = sorted(options.folder.rglob(options.pattern))
     rows = [imported(file, options.folder, options.control) for file in files]
-    write_results(RESULT, {"files": rows}, table(rows))
-    print(table(rows))
+    said = Counter(note for row in rows for note in row.pop("notes"))
+    write_results(RESULT, {"files": rows}, table(rows, said))
+    print(table(rows, said))
 
 
 def imported(file: Path, folder: Path, control: str | None) -> dict[str, Any]:
@@ -49,10 +50,12 @@ def imported(file: Path, folder: Path, control: str | None) -> dict[str, Any]:
     }
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def table(rows: list[dict[str, Any]], said: Counter[str]) -> str:
     """How many files load, each refusal with its reason, and how often each kind of note is said."""
     refused = [[row["file"], row["reason"]] for row in rows if row["reason"]]
-    counted = Counter(kind(note) for row in rows for note in row["notes"])
+    counted: Counter[str] = Counter()
+    for note, count in said.items():
+        counted[kind(note)] += count
     axes = Counter(row["axes"] for row in rows if not row["reason"])
     return "\n".join(
         [

@@ -35,7 +35,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -97,7 +97,7 @@ def as_set(control: Control, machine: Machine) -> Control:
     given = machine.control
     if given is None or given.name != control.name:
         return control
-    values = {
+    values: dict[str, Any] = {
         "deviation": given.junction_deviation,
         "square_corner": given.square_corner_velocity,
         "cruise_ratio": given.minimum_cruise_ratio,
